@@ -31,14 +31,14 @@ class FrameGroups:
 
     read   : returns the frames of a group, from the first (included) to the last (excluded), in order
     starts : first frame of each group, rising from 0, and the number of all frames at the end
-    most_bytes : decoded frames that are kept, beside those of the last two groups
+    max_bytes : decoded frames that are kept, beside those of the last two groups
     Not for several threads.
     """
 
-    def __init__(self, read: ReadFrames, starts: Sequence[int], most_bytes: int = MAX_DECODED_BYTES) -> None:
+    def __init__(self, read: ReadFrames, starts: Sequence[int], max_bytes: int = MAX_DECODED_BYTES) -> None:
         self._read = read
         self._starts = list(starts)
-        self._most_bytes = most_bytes
+        self._max_bytes = max_bytes
         self._groups: OrderedDict[int, list[Frame]] = OrderedDict()
 
     def __len__(self) -> int:
@@ -60,7 +60,7 @@ class FrameGroups:
         if group not in self._groups:
             while len(self._groups) > 1:
                 largest = max(sum(frame.nbytes for frame in frames) for frames in self._groups.values())
-                if (len(self._groups) + 1) * largest <= self._most_bytes:
+                if (len(self._groups) + 1) * largest <= self._max_bytes:
                     break
                 self._groups.popitem(last=False)
             self._groups[group] = list(self._read(self._starts[group], self._starts[group + 1]))
@@ -183,14 +183,14 @@ def decode_pictures(data: Stream) -> Frame:
         if first is None or count * first.nbytes > MAX_PICTURE_BYTES:
             raise ValueError(f"{count} pictures of {first.nbytes if first is not None else 0} bytes")
         pictures = np.empty((count, *first.shape), np.uint8)
-        found = 0
+        decoded_count = 0
         for picture in chain([first], decoded):
-            if found == count or picture.shape != first.shape:
+            if decoded_count == count or picture.shape != first.shape:
                 raise ValueError("pictures of several sizes, or more of them than begin")
-            pictures[found] = picture
-            found += 1
-        if found != count:
-            raise ValueError(f"{found} of {count} pictures can be decoded")
+            pictures[decoded_count] = picture
+            decoded_count += 1
+        if decoded_count != count:
+            raise ValueError(f"{decoded_count} of {count} pictures can be decoded")
         return pictures
 
 

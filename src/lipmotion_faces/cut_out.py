@@ -38,11 +38,6 @@ class CutOut:
 
     pictures: Mapping[str, Picture]
 
-    @property
-    def shapes(self) -> str:
-        """The letters of the shapes that are drawn."""
-        return "".join(self.pictures)
-
     def draw(self, shapes: Iterable[str], staging: Staging) -> Iterator[Picture]:
         """Yield a picture for each shape, RGB or RGBA, of even sizes, with size and background of the staging."""
         staged = {name: _stage(picture, staging) for name, picture in self.pictures.items()}

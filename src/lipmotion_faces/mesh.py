@@ -30,7 +30,7 @@ Turn = Sequence[float]
 
 SHARE_BELOW_MOUTH = 0.55
 """The picture shows as much below the mouth as this share of what is above it, up to the top of the head."""
-KEPT_SHARE = 0.92
+PICTURE_SHARE = 0.92
 """The picture is cut to this share of that height: hair may leave it at the top."""
 DISTANCE = 2.8
 """The camera is this many heights of the picture away."""
@@ -126,7 +126,7 @@ class MeshStage:
         self._rest = self._place(mesh.vertices)
         face = surface.pieces == surface.pieces[placement.vertices[0]]
         top = float(self._rest[face, 1].max())
-        across = KEPT_SHARE * (1 + SHARE_BELOW_MOUTH) * top
+        across = PICTURE_SHARE * (1 + SHARE_BELOW_MOUTH) * top
         camera = Camera(width, height, (0.0, (1 - SHARE_BELOW_MOUTH) / 2 * top), across, DISTANCE * across)
         near = np.linalg.norm(self._rest, axis=1) < DRAWN_HEIGHTS * across
         shown = np.asarray(near[mesh.triangles].any(axis=1))

@@ -17,7 +17,7 @@ from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.characters.file_limits import Budget
 from lipmotion_faces.filmed.face import SUFFIX
 from lipmotion_faces.mesh import MeshFace
-from lipmotion_faces.outputs.scenes import KEPT, build_head_scene, write_scene
+from lipmotion_faces.outputs.scenes import ANIMATED_SUFFIXES, build_head_scene, write_scene
 from lipmotion_faces.outputs.shown_faces import shown_face
 from lipmotion_faces.registry import FACES
 
@@ -67,7 +67,7 @@ class Faces:
         path = self._characters.get(name)
         if self.is_filmed(name):
             raise InputError(f"{name} is a filmed face, and no mesh; ask for a video of it")
-        if path is not None and path.suffix.lower() in KEPT:
+        if path is not None and path.suffix.lower() in ANIMATED_SUFFIXES:
             self._meshes[name] = Budget().read_bytes(path, "character")
             return self._meshes[name]
         if path is None and name not in (HEAD, HEAD_OF_MOODS):

@@ -238,7 +238,10 @@ def test_a_change_is_worth_its_cost() -> None:
 
 @pytest.mark.long
 def test_the_mouths_of_a_corpus_become_sharper(toy_corpus: Corpus) -> None:
-    crops = {split: crops_of(toy_corpus, split) for split in ("train", "val")}
+    crops = {
+        split: np.concatenate([toy_corpus.utterance(name).track.crops for name in toy_corpus.names(split)])
+        for split in ("train", "val")
+    }
     space = fit_eigenlips(crops["train"][::4], 2)
     known = space.project(crops["train"])
     refiner = Refiner(space, make_candidates(space, crops["train"][choose_candidates(known, 100)]))
@@ -246,12 +249,6 @@ def test_the_mouths_of_a_corpus_become_sharper(toy_corpus: Corpus) -> None:
     true, blurred, refined = map(edges, (crops["val"], space.restore(wanted), refine(refiner, wanted)))
     assert blurred < 0.97 * true
     assert abs(refined - true) < 0.5 * (true - blurred)
-
-
-def crops_of(corpus: Corpus, split: str) -> np.ndarray:
-    """The mouth pictures of all utterances of a split."""
-    tracks = [corpus.utterance(name).track for name in corpus.names(split)]
-    return np.concatenate([track.crops for track in tracks if track.crops is not None])
 
 
 def edges(images: np.ndarray) -> float:

@@ -328,9 +328,7 @@ def with_line(chin_px: float = CHIN_PX, scale: int = 1, count: int = 1) -> np.nd
     """Lower faces of one colour, with a soft dark line at the tip of the chin."""
     y = (np.arange(lower_face.HEIGHT * scale) + 0.5) / scale + lower_face.CORNER[1]
     levels = np.rint(180 - 120 * np.exp(-(((y - chin_px) / 1.5) ** 2))).astype(np.uint8)
-    return np.broadcast_to(
-        levels[:, None, None], (count, lower_face.HEIGHT * scale, lower_face.WIDTH * scale, 3)
-    ).copy()
+    return np.tile(levels[:, None, None], (count, 1, lower_face.WIDTH * scale, 3))
 
 
 def line_px(picture: np.ndarray, x: float = 0.0) -> float:
@@ -352,14 +350,9 @@ def test_the_tip_moves_as_far_as_it_should() -> None:
     chins = np.array([112.0, 125.0])  # elsewhere in every frame
     moved = lower_face.move_chin(np.concatenate([with_line(chin) for chin in chins]), chins, np.full(2, 5.0))
     assert [line_px(picture) for picture in moved] == pytest.approx(chins + 5, abs=0.3)
-    for wanted, done in (
-        (40.0, lower_face.LARGEST_PX),
-        (-40.0, -lower_face.LARGEST_PX),
-    ):  # no further than a neck allows
-        moved, limit = (
-            lower_face.move_chin(with_line(), np.array([CHIN_PX]), np.array([drop])) for drop in (wanted, done)
-        )
-        assert np.array_equal(moved, limit)
+    chins, limits = np.full(2, CHIN_PX), np.array([1.0, -1.0]) * lower_face.LARGEST_PX  # no further than a neck allows
+    moved, limit = (lower_face.move_chin(with_line(count=2), chins, drops) for drops in (3 * limits, limits))
+    assert np.array_equal(moved, limit)
 
 
 def test_what_does_not_move_stays_to_the_bit() -> None:
@@ -371,11 +364,8 @@ def test_what_does_not_move_stays_to_the_bit() -> None:
     assert np.array_equal(noise, before)  # the given pictures are not changed
     y = np.arange(lower_face.HEIGHT) + 0.5 + lower_face.CORNER[1]
     x = np.abs(np.arange(lower_face.WIDTH) + 0.5 + lower_face.CORNER[0])
-    untouched = (
-        (y[:, None] < lower_face.STILL_PX)
-        | (y[:, None] > CHIN_PX + 8 + 4 + lower_face.NECK_PX)
-        | (x[None] >= lower_face.SIDE_PX[1])
-    )
+    untouched = (y < lower_face.STILL_PX)[:, None] | (y > CHIN_PX + 8 + 4 + lower_face.NECK_PX)[:, None]
+    untouched = untouched | (x >= lower_face.SIDE_PX[1])
     assert np.array_equal(moved[:, untouched], before[:, untouched])
     assert (moved != before)[:, ~untouched].mean() > 0.5
 
@@ -400,14 +390,10 @@ def test_the_part_that_may_differ_holds_all_that_does() -> None:
 
 def test_no_chin_folds_or_tears() -> None:
     """A picture that gets lighter downwards still does. Short chins, of children or a tracker's errors, move less."""
-    ramp = np.broadcast_to(
-        np.arange(lower_face.HEIGHT, dtype=np.uint8)[:, None, None], (lower_face.HEIGHT, lower_face.WIDTH, 3)
-    )
+    ramp = np.tile(np.arange(lower_face.HEIGHT, dtype=np.uint8)[:, None, None], (1, lower_face.WIDTH, 3))
     chins = np.repeat([60.0, 80.0, 86.0, 92.0, 99.0, CHIN_PX], 2)
-    drops, above = (
-        np.tile([-lower_face.LARGEST_PX, lower_face.LARGEST_PX], 6),
-        round(lower_face.STILL_PX - lower_face.CORNER[1]),
-    )
+    drops = np.tile([-lower_face.LARGEST_PX, lower_face.LARGEST_PX], 6)
+    above = round(lower_face.STILL_PX - lower_face.CORNER[1])
     for moved in lower_face.move_chin(np.repeat(ramp[None], 12, axis=0), chins, drops).astype(int):
         assert np.array_equal(moved[:above], ramp[:above])
         steps = np.diff(moved[:, lower_face.WIDTH // 2, 0])

@@ -26,14 +26,14 @@ def draw(folder: Path, names: str, size: tuple[int, int] = (20, 30)) -> Path:
 
 def test_letters_and_what_stands_before_them(tmp_path: Path) -> None:
     found = read_cut_out(draw(tmp_path, " ".join(f"anna_{name}" for name in LETTERS) + " notes"))
-    assert found.shapes == LETTERS
+    assert "".join(found.pictures) == LETTERS
     assert [int(picture[-1, 0, 0]) for picture in found.pictures.values()] == list(range(10, 100, 10))
-    assert read_cut_out(draw(tmp_path / "six", "a b c d mouth-e f")).shapes == "ABCDEF"
+    assert read_cut_out(draw(tmp_path / "six", "a b c d mouth-e f")).pictures.keys() == {*"ABCDEF"}
 
 
 def test_names_of_preston_blair(tmp_path: Path) -> None:
     found = read_cut_out(draw(tmp_path, "MBP etc E AI O WQ FV L rest"))
-    assert "".join(BLAIR[name] for name in "mbp etc e ai o wq fv l rest".split()) == found.shapes
+    assert "".join(BLAIR[name] for name in "mbp etc e ai o wq fv l rest".split()) == "".join(found.pictures)
     assert read_cut_out(draw(tmp_path, "MBP etc E AI O WQ FV L rest U")).pictures["F"][-1, 0, 0] == 100
 
 

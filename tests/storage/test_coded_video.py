@@ -145,8 +145,6 @@ class TestDamage:
                 coded_video.stored_video_from_arrays(wrong)
 
     def test_larger_pictures_than_allowed_are_not_decoded(self, monkeypatch):
-        from lipmotion_faces import coded_video
-
         data = coded_video.encode_pictures(film(4))
         monkeypatch.setattr(coded_video, "MAX_PICTURE_BYTES", 4 * 48 * 64 * 3 - 1)
         with pytest.raises(ModelFormatError, match="4 pictures of 9216 bytes"):
@@ -170,9 +168,9 @@ class Film:
 @pytest.mark.parametrize(
     "order", [range(18), range(17, -1, -1), [5, 17, 0, 5, 6, 16, 4], [*range(18), *range(16, 0, -1)]]
 )
-@pytest.mark.parametrize("most_bytes", [0, 3 * 4 * 300, 10**6])
-def test_every_frame_is_the_right_one(order, most_bytes):
-    groups = coded_video.FrameGroups(Film().frames, STARTS, most_bytes)
+@pytest.mark.parametrize("max_bytes", [0, 3 * 4 * 300, 10**6])
+def test_every_frame_is_the_right_one(order, max_bytes):
+    groups = coded_video.FrameGroups(Film().frames, STARTS, max_bytes)
     assert [int(groups.decode(n)[0, 0, 0]) for n in order] == list(order)
 
 
@@ -183,7 +181,7 @@ def test_frames_are_read_once_each_way_and_memory_is_bounded():
         groups.decode(n)
     ways = [(0, 4), (4, 8), (8, 12), (12, 16), (16, 18)]
     assert film.read == [*ways, *ways[2::-1]]  # the last two were still there
-    long, sizes = coded_video.FrameGroups(film.frames, range(0, 401, 4), most_bytes=3 * 4 * 300), []
+    long, sizes = coded_video.FrameGroups(film.frames, range(0, 401, 4), max_bytes=3 * 4 * 300), []
     for n in range(400):
         long.decode(n)
         sizes.append(long.nbytes)

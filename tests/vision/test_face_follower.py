@@ -132,9 +132,8 @@ def test_a_moving_face_is_one_scene_and_the_one_shown_longest_is_the_person(show
     assert followed == [150.0 + n for n in range(30)]
     assert follower.mark_person().all()
     assert follower.list_cuts() == []
-    assert (
-        len(show([([ANNA], 0)] * 110)[0].list_thumbnails()) == face_follower.MAX_THUMBNAILS
-    )  # later looks are kept when they are new
+    follower, _ = show([([ANNA], 0)] * 110)
+    assert len(follower.list_thumbnails()) == face_follower.MAX_THUMBNAILS  # later looks are kept when they are new
     follower, _ = show([([BELLA], 1)] * 8 + [([ANNA], 0)] * 20 + [([BELLA], 1)] * 5)
     assert follower.mark_person().tolist() == [False] * 8 + [True] * 20 + [False] * 5
     assert follower.list_cuts() == [8, 28]
@@ -223,10 +222,10 @@ def test_away_for_long_is_compared_again(show: Show) -> None:
 pytest.importorskip("cv2")
 
 
-def dot(height: int, width: int, x: int, y: int) -> NDArray[np.uint8]:
-    """Return a picture with a bright square of 8 px, its upper left corner at a position."""
+def bright(height: int, width: int, left: int, top: int, side: int) -> NDArray[np.uint8]:
+    """Return a picture with a bright square."""
     image = np.zeros((height, width, 3), np.uint8)
-    image[max(y, 0) : y + 8, max(x, 0) : x + 8] = 255
+    image[top : top + side, left : left + side] = 255
     return image
 
 
@@ -239,19 +238,17 @@ def middle_of_bright(image: NDArray[np.uint8]) -> NDArray[np.float64]:
 def test_positions_in_the_window_are_those_in_the_picture():
     for side in (96, 384, 800):
         window = face_follower.FaceWindow.place(500, 300, side)
-        shown = window.cut(dot(720, 1280, 480, 310))
+        shown = window.cut(bright(720, 1280, 480, 310, 8))
         assert shown.shape == (face_follower.SIZE_PX, face_follower.SIZE_PX, 3)
         np.testing.assert_allclose(window.to_picture(middle_of_bright(shown)), [484, 314, 0], atol=0.6)
-    scaled = face_follower.FaceWindow(10, 20, 2 * face_follower.SIZE_PX).to_picture(
-        np.array([[3.0, 4.0, 5.0]])
-    )  # depth is scaled, too
-    np.testing.assert_allclose(scaled, [[16.0, 28.0, 10.0]])
+    scaled = face_follower.FaceWindow(10, 20, 2 * face_follower.SIZE_PX).to_picture(np.array([[3.0, 4.0, 5.0]]))
+    np.testing.assert_allclose(scaled, [[16.0, 28.0, 10.0]])  # depth is scaled, too
 
 
 def test_beyond_the_edges_it_is_black():
     for x, y in ((4, 4), (1270, 4), (4, 710), (1270, 710)):
         window = face_follower.FaceWindow.place(x, y, 300)
-        shown = window.cut(dot(720, 1280, x - 4, y - 4))
+        shown = window.cut(bright(720, 1280, x - 4, y - 4, 8))
         np.testing.assert_allclose(window.to_picture(middle_of_bright(shown)), [x, y, 0], atol=3)
         assert (shown == 0).mean() > 0.9
     assert not face_follower.FaceWindow(2000, 0, 100).cut(np.full((72, 128, 3), 255, np.uint8)).any()
@@ -260,7 +257,6 @@ def test_beyond_the_edges_it_is_black():
 class BrightMesh:
     """Stands for the face mesh: a face is the box around what is bright."""
 
-    shapes: list[tuple[int, ...]] = []  # noqa: RUF012
     closed = 0
 
     def __exit__(self, *_: object) -> None:
@@ -273,28 +269,17 @@ class BrightMesh:
         return [np.array([[columns.min(), rows.min(), 0.0], [columns.max() + 1.0, rows.max() + 1.0, 0.0]])]
 
 
-def square(x: int, side: int) -> NDArray[np.uint8]:
-    image = np.zeros((720, 1280, 3), np.uint8)
-    image[300 : 300 + side, x : x + side] = 255
-    return image
-
-
 def test_the_window_goes_along_and_grows_with_the_face():
-    with face_follower.WindowedMesh(
-        trackers.FaceBox(230, 330, 60, 0.9),
-        cast(trackers.LandmarkTracker, SimpleNamespace(open_point_finder=BrightMesh)),
-    ) as mesh:
+    tracker = cast(trackers.LandmarkTracker, SimpleNamespace(open_point_finder=BrightMesh))
+    with face_follower.WindowedMesh(trackers.FaceBox(230, 330, 60, 0.9), tracker) as mesh:
         for n in range(40):  # it moves much further than a window's side, and becomes twice as large
             x, side = 200 + 20 * n, 60 + 2 * n
-            (found,) = mesh.find_faces(square(x, side))
+            (found,) = mesh.find_faces(bright(720, 1280, x, 300, side))
             np.testing.assert_allclose(found[:, :2], [[x, 300], [x + side, 300 + side]], atol=2)
         assert mesh._window.side == pytest.approx(face_follower.REACH * side, rel=0.3)
         assert mesh.find_faces(np.zeros((720, 1280, 3), np.uint8)) == []
-        assert len(mesh.find_faces(square(x, side))) == 1
+        assert len(mesh.find_faces(bright(720, 1280, x, 300, side))) == 1
     assert BrightMesh.closed == 1
-
-
-Box = tuple[float, float, float, float]  # left, top, side, score, px of a picture of 1280 × 720
 
 
 class Detector:
@@ -316,12 +301,6 @@ class Detector:
 
     def close(self) -> None:
         pass
-
-
-def bright(height: int, width: int, left: int, top: int, side: int) -> NDArray[np.uint8]:
-    image = np.zeros((height, width, 3), np.uint8)
-    image[top : top + side, left : left + side] = 255
-    return image
 
 
 @pytest.fixture

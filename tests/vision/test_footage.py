@@ -102,10 +102,10 @@ def test_a_part_and_frames_in_any_order_are_the_same_as_in_the_whole(write_video
     footage = track_footage(write_video(ticks=ticks))
     order = [*range(20), *range(18, -1, -1), 3, 17]
     shown = levels(decode_footage(footage))
-    for most_bytes in (0, 20 * 48 * 64 * 3):
-        groups = open_footage(footage, most_bytes)
+    for max_bytes in (0, 20 * 48 * 64 * 3):
+        groups = open_footage(footage, max_bytes)
         assert levels(groups.decode(n) for n in order) == [shown[n] for n in order]
-        assert groups.nbytes <= max(most_bytes, 2 * 48 * 64 * 3)
+        assert groups.nbytes <= max(max_bytes, 2 * 48 * 64 * 3)
     for start, stop in ((0, 20), (0, 1), (7, 7), (12, 17), (19, None), (3, None)):
         assert levels(decode_footage(footage, start, stop)) == shown[start:stop]
     scripted(FACES[5:15])
@@ -367,12 +367,8 @@ class TestRegistration:
         def make(places, tremble, cuts=(), seen=None, contrast=4) -> Footage:
             texture = GaussianBlur(np.random.default_rng(1).uniform(0, 255, (120, 170)), (0, 0), 2.0)
             texture = 128 + contrast * (texture - texture.mean())
-            frames = [
-                np.repeat(
-                    np.clip(shift(texture, place[::-1], mode="reflect"), 0, 255).astype(np.uint8)[..., None], 3, 2
-                )
-                for place in places
-            ]
+            greys = (np.clip(shift(texture, place[::-1], mode="reflect"), 0, 255) for place in places)
+            frames = [np.repeat(grey.astype(np.uint8)[..., None], 3, 2) for grey in greys]
             path = write_frames(tmp_path / "scene.mkv", frames, options={"qp": "0"})
             count = len(places)
             shown = np.ones(count, bool) if seen is None else seen

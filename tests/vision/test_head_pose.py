@@ -30,8 +30,8 @@ def moved(speech) -> NDArray[np.float64]:
 
 
 def test_head_motion_is_removed_and_speech_is_not(speech, moved):
-    still = head_pose.remove_head_motion(speech, trackers.TRACKED_POINTS)
-    np.testing.assert_allclose(head_pose.remove_head_motion(moved, trackers.TRACKED_POINTS), still, atol=1e-6)
+    still = head_pose.remove_head_motion(speech)
+    np.testing.assert_allclose(head_pose.remove_head_motion(moved), still, atol=1e-6)
     np.testing.assert_allclose(  # distances within a frame, in eye distances, are those of the speech
         np.linalg.norm(still[:, COLUMN[13]] - still[:, COLUMN[14]], axis=1),
         np.linalg.norm(speech[:, COLUMN[13]] - speech[:, COLUMN[14]], axis=1),
@@ -40,7 +40,7 @@ def test_head_motion_is_removed_and_speech_is_not(speech, moved):
 
 
 def test_the_axes_are_those_of_the_head(moved):
-    head = head_pose.remove_head_motion(moved, trackers.TRACKED_POINTS)
+    head = head_pose.remove_head_motion(moved)
     right, left = (head[:, COLUMN[index]].mean(axis=0) for index in trackers.EYE_CORNERS)
     np.testing.assert_allclose(right, [-0.5, 0, 0], atol=1e-6)
     np.testing.assert_allclose(left, [0.5, 0, 0], atol=1e-6)
@@ -52,12 +52,10 @@ def test_the_axes_are_those_of_the_head(moved):
 
 
 def test_noise_of_the_rigid_points_hardly_reaches_the_lips(speech, moved):
-    clean = head_pose.remove_head_motion(speech, trackers.TRACKED_POINTS)
+    clean = head_pose.remove_head_motion(speech)
     noise = np.random.default_rng(7).normal(size=moved.shape)
     noise[:, [COLUMN[index] for index in trackers.LIP_POINTS]] = 0
-    noisy = head_pose.remove_head_motion(
-        moved + 0.5 * noise, trackers.TRACKED_POINTS
-    )  # under 1 % of the distance between the eyes
+    noisy = head_pose.remove_head_motion(moved + 0.5 * noise)  # under 1 % of the distance between the eyes
     lips = [COLUMN[index] for index in trackers.LIP_POINTS]
     assert np.sqrt(np.square(noisy - clean)[:, lips].mean()) < 0.01
 
@@ -192,9 +190,8 @@ def test_a_face_looks_the_same_from_nearer_and_turned():
     assert image_similarity.correlate_images(upright, image_similarity.reduce_face(near, 3 * eyes)) > 0.95
     turned = image_similarity.reduce_face(np.rot90(far), np.stack([eyes[:, 1], far.shape[1] - eyes[:, 0]], axis=1))
     assert image_similarity.correlate_images(upright, turned) > 0.95
-    assert (
-        image_similarity.correlate_images(upright, image_similarity.reduce_face(far, eyes + np.array([20, 25]))) < 0.6
-    )
+    shifted = image_similarity.reduce_face(far, eyes + np.array([20, 25]))
+    assert image_similarity.correlate_images(upright, shifted) < 0.6
 
 
 def test_likeness_is_a_correlation_without_tint():

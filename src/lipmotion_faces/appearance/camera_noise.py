@@ -62,9 +62,9 @@ def estimate_noise(clips: Iterable[Pictures]) -> CameraNoise:
         if len(pictures) < 3 or not pictures.size:
             continue
         steps = np.diff(pictures.astype(np.float32), axis=0)
-        moved = np.abs(steps).mean(axis=(1, 2, 3))
-        moved = np.maximum(moved[1:], moved[:-1])
-        stillest = np.argsort(moved, kind="stable")[: max(1, round(STILL_SHARE * len(moved)))]
+        change = np.abs(steps).mean(axis=(1, 2, 3))
+        change = np.maximum(change[1:], change[:-1])
+        stillest = np.argsort(change, kind="stable")[: max(1, round(STILL_SHARE * len(change)))]
         still = steps[stillest + 1] - steps[stillest]  # second differences over time
         products += np.einsum("thwc,thwd->cd", still, still)
         down += _sum_neighbours(still, 1)

@@ -168,8 +168,8 @@ def draw_to_recorded(wanted: Values, recorded: Values) -> Values:
         products = (steps @ steps.swapaxes(1, 2)).astype(np.float64)
         penalty = np.take_along_axis(distances, near, axis=1).astype(np.float64)
         penalty /= 1 + MIN_NEARNESS - penalty / np.maximum(penalty.max(axis=1, keepdims=True), np.finfo(float).tiny)
-        least = NO_DISTANCE * np.trace(products, axis1=1, axis2=2)[:, None] + np.finfo(float).tiny
-        products[:, np.arange(count), np.arange(count)] += penalty + least
+        ridge = NO_DISTANCE * np.trace(products, axis1=1, axis2=2)[:, None] + np.finfo(float).tiny
+        products[:, np.arange(count), np.arange(count)] += penalty + ridge
         weights = np.maximum(np.linalg.solve(products, np.ones((len(some), count, 1)))[:, :, 0], 0)
         weights /= weights.sum(axis=1, keepdims=True)
         mixtures = np.einsum("tn,tnd->td", weights.astype(np.float32), recorded[near])
@@ -194,9 +194,9 @@ def _find_nearest(values: Values, others: Values) -> Index:
         best, number = np.full(len(values), np.inf, np.float32), np.zeros(len(values), np.intp)
         for start in range(0, len(others), BLOCK):
             distances = square_distances(values, others[start : start + BLOCK])
-            least = distances.min(axis=1)
-            nearer = least < best
-            best[nearer], number[nearer] = least[nearer], distances.argmin(axis=1)[nearer] + start
+            smallest = distances.min(axis=1)
+            nearer = smallest < best
+            best[nearer], number[nearer] = smallest[nearer], distances.argmin(axis=1)[nearer] + start
         return number
     starts = range(0, len(values), BLOCK)
     return np.concatenate([square_distances(values[start : start + BLOCK], others).argmin(axis=1) for start in starts])
@@ -345,9 +345,9 @@ class Refiner:
             distances = np.stack([square_distances(frame, candidate) for frame, candidate in pairs])
             if self.options.together:
                 distances = distances.sum(axis=0, keepdims=True)
-            least = np.argpartition(distances, count - 1, axis=2)[:, :, :count]
-            order = np.argsort(np.take_along_axis(distances, least, axis=2), axis=2, kind="stable")
-            numbers[:, part] = np.take_along_axis(least, order, axis=2)
+            nearest = np.argpartition(distances, count - 1, axis=2)[:, :, :count]
+            order = np.argsort(np.take_along_axis(distances, nearest, axis=2), axis=2, kind="stable")
+            numbers[:, part] = np.take_along_axis(nearest, order, axis=2)
             costs[:, part] = np.take_along_axis(distances, numbers[:, part], axis=2)
         return numbers, costs
 

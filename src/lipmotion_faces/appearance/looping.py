@@ -5,7 +5,7 @@ Frames are compared by descriptors: what a viewer would see change from one to a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal
@@ -65,11 +65,13 @@ class FrameDescriptors:
         Whole frame, upper face and place of the face have the same weight [shape=(T, A + B + 6)].
         """
         groups = []
-        for rows, least, frames in zip((self.whole, self.face, self.place), MIN_ORDINARY, (fade, 1, fade), strict=True):
+        for rows, min_step, frames in zip(
+            (self.whole, self.face, self.place), MIN_ORDINARY, (fade, 1, fade), strict=True
+        ):
             steps = [np.linalg.norm(np.diff(rows[start:stop], axis=0), axis=1) for start, stop in scenes]
             different = np.concatenate([part[part > 0] for part in steps])
             ordinary = float(np.median(different)) if len(different) else 0.0
-            groups.append(rows / (frames * max(ordinary, least * np.sqrt(rows.shape[1]))))
+            groups.append(rows / (frames * max(ordinary, min_step * np.sqrt(rows.shape[1]))))
         return np.concatenate(groups, axis=1) / np.sqrt(len(groups))
 
 
@@ -140,10 +142,10 @@ def _sample(grey: Floats, to_image: Array, box: tuple[float, float, float, float
     height, width = image.shape  # bilinear samples; outside, the picture is as at its edge
     rows, columns = np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
     top, left = np.minimum(rows.astype(int), max(height - 2, 0)), np.minimum(columns.astype(int), max(width - 2, 0))
-    below, beside = np.minimum(top + 1, height - 1), np.minimum(left + 1, width - 1)
+    below, next_column = np.minimum(top + 1, height - 1), np.minimum(left + 1, width - 1)
     down, across = rows - top, columns - left
-    upper = (1 - across) * image[top, left] + across * image[top, beside]
-    under = (1 - across) * image[below, left] + across * image[below, beside]
+    upper = (1 - across) * image[top, left] + across * image[top, next_column]
+    under = (1 - across) * image[below, left] + across * image[below, next_column]
     return (1 - down) * upper + down * under
 
 
@@ -207,9 +209,6 @@ class LoopOrder:
 
     def __len__(self) -> int:
         return len(self.first)
-
-    def __iter__(self) -> Iterator[tuple[int, int, float]]:
-        return zip(self.first.tolist(), self.second.tolist(), self.weight.tolist(), strict=True)
 
 
 def find_loop_order(
@@ -358,8 +357,8 @@ class _Plan:
         wrong |= ((behind < 0) | (room < around) | self.busy)[:, None]
         power[wrong] = np.inf
         best = np.stack([start + np.argmin(power[:, start:stop], axis=1) for start, stop in self.scenes], axis=1)
-        least = np.sqrt(np.take_along_axis(power, best, axis=1))
-        return np.where(np.isfinite(least), best, -1), least
+        smallest = np.sqrt(np.take_along_axis(power, best, axis=1))
+        return np.where(np.isfinite(smallest), best, -1), smallest
 
 
 def count_fade(rate_hz: float) -> int:

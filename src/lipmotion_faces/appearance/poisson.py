@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 from math import prod
 from typing import TYPE_CHECKING, Any
@@ -52,15 +51,6 @@ class NestedGrids:
     region: NDArray[np.bool_]
     nodes: tuple[Index, ...]
 
-    @cached_property
-    def positions(self) -> list[Index]:
-        """The nodes of each grid, as numbers of the pixels of that grid, counted row by row."""
-        width = self.region.shape[1]
-        return [
-            (pixels // width >> level) * self.shape(level)[1] + (pixels % width >> level)
-            for level, pixels in enumerate(self.nodes)
-        ]
-
     def shape(self, level: int) -> tuple[int, int]:
         """Return the number of rows and columns of a grid."""
         height, width = self.region.shape
@@ -93,7 +83,11 @@ class GridFiller:
 
     def __init__(self, grids: NestedGrids, count: int, colours: int) -> None:
         """Take memory for ``count`` pictures at once, each of the given number of colours."""
-        self._grids = grids
+        self._grids, width = grids, grids.region.shape[1]
+        self._positions = [  # of the nodes among the pixels of their grid
+            (pixels // width >> level) * grids.shape(level)[1] + (pixels % width >> level)
+            for level, pixels in enumerate(grids.nodes)
+        ]
         shapes = [grids.shape(level) for level in range(len(grids.nodes))]
         self._filled = [np.zeros((count, *shape, colours), np.float32) for shape in shapes]
         halves = [(coarse[0], fine[1]) for fine, coarse in pairwise(shapes)]
@@ -112,7 +106,7 @@ class GridFiller:
                 fine[:, ::2] = half
                 self._fill_between(half, fine[:, 1::2], 1)
             start = stop - len(self._grids.nodes[level])
-            fine.reshape(count, -1, fine.shape[-1])[:, self._grids.positions[level]] = values[:, start:stop]
+            fine.reshape(count, -1, fine.shape[-1])[:, self._positions[level]] = values[:, start:stop]
             stop = start
         return self._filled[0][:count]
 

@@ -70,5 +70,5 @@ def convert_to_fbx(source: Path, target: Path, rate_hz: int) -> None:
         except (OSError, subprocess.TimeoutExpired) as error:
             raise ExportError(f"{target}: Blender does not write it: {error}") from error
         if done.returncode or not path.is_file() or not path.stat().st_size:
-            said = (done.stderr or done.stdout).decode(errors="replace").strip().rpartition("\n")[2]
-            raise ExportError(f"{target}: Blender does not write it (exit code {done.returncode}): {said[:300]}")
+            message = (done.stderr or done.stdout).decode(errors="replace").strip().rpartition("\n")[2]
+            raise ExportError(f"{target}: Blender does not write it (exit code {done.returncode}): {message[:300]}")

@@ -203,8 +203,8 @@ def read_aligned_words(path: Path) -> tuple[str, ...]:
     """
     size = path.stat().st_size
     if size > LARGEST_ALIGNMENT_BYTES:
-        most = f"required at most {LARGEST_ALIGNMENT_BYTES}"
-        raise InputError(f"{path}: {size} bytes, {most}: are they the words of one sentence?")
+        required = f"required at most {LARGEST_ALIGNMENT_BYTES}"
+        raise InputError(f"{path}: {size} bytes, {required}: are they the words of one sentence?")
     rows = [line.split() for line in path.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
     for number, row in enumerate(rows, 1):
         if len(row) != 3 or not re.fullmatch(r"[0-9]+ [0-9]+", " ".join(row[:2])):
@@ -300,7 +300,7 @@ def _read_grid_words(directory: Path, video: Path, groups: Mapping[str, str]) ->
     return _find_words(video, folders)
 
 
-def _read_tcd_words(_directory: Path, video: Path, _said: Mapping[str, str]) -> Words | None:
+def _read_tcd_words(_directory: Path, video: Path, _groups: Mapping[str, str]) -> Words | None:
     """Return the words of the script beside a video, ``SA1.txt`` of ``sa1.mp4``: lines of start, end, word; or text."""
     scripts = (video.with_name(f"{stem}.txt") for stem in (video.stem, video.stem.upper()))
     return next((read_labels(path).words for path in scripts if path.is_file()), None)

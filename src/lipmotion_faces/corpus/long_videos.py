@@ -17,12 +17,12 @@ from lipmotion.errors import InputError
 from lipmotion.formats.label_files import find_labels
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import find_quietest, list_spans, measure_levels_db
-from lipmotion.storage.sources import list_video, open_media, read_duration
 from lipmotion.types import Audio, Monitor, Progress, TimedTranscript
 from lipmotion.units.written_forms import list_readings
 from lipmotion_faces.corpus.folder import LRS, VIDEO_KINDS
 from lipmotion_faces.corpus.source_recordings import LISTS, RecordingFolder, SourceRecording
 from lipmotion_faces.corpus.supplied import align_sound, separate_sound
+from lipmotion_faces.tracking.frames import read_stated_duration
 from lipmotion_faces.tracking.track import VideoScan, scan_video
 
 SHORTEST_S, LONGEST_S = 3.0, 12.0
@@ -237,7 +237,8 @@ def divide_long_videos(
     place   : the folder itself, where lists of splits may lie
     Of a single video, without lists, the last parts become ``val`` and ``test``; others have the split of the whole.
     """
-    videos = [item for item in folder.recordings if folder.kind in DIVIDED_KINDS and _is_long_video(item)]
+    candidates = [item for item in folder.recordings if folder.kind in DIVIDED_KINDS and item.motion_file is None]
+    videos = [item for item in candidates if read_stated_duration(item.file) > LONG_S]
     if not videos:
         return folder, {}
     is_only_one = len(folder.recordings) == 1 and not any((place / name).is_file() for name in LISTS)
@@ -260,20 +261,6 @@ def divide_long_videos(
     recordings += [part.recording for part in parts.values()]
     recordings.sort(key=lambda recording: recording.name)
     return RecordingFolder(f"{folder.kind}, divided into utterances", tuple(recordings), problems), parts
-
-
-def _is_long_video(recording: SourceRecording) -> bool:
-    """Return whether a recording is a video that states more than ``LONG_S``; False if it cannot be read."""
-    import av
-
-    if recording.motion_file is not None:
-        return False
-    try:
-        with open_media(recording.file) as container:
-            stream = next(iter(list_video(container)), None)
-            return stream is not None and read_duration(container, stream) > LONG_S
-    except (av.FFmpegError, ValueError, OSError):
-        return False
 
 
 def divide_video(
@@ -311,7 +298,15 @@ def divide_video(
     if splits_by_time and len(spans) >= MIN_SPLIT_UTTERANCES:
         held_out = round(HELD_OUT_SHARE * len(spans))
     splits = [recording.split] * (len(spans) - 2 * held_out) + ["val"] * held_out + ["test"] * held_out
-    return [_cut_part(span, recording, split, audio, scan) for span, split in zip(spans, splits, strict=True)]
+    result = []
+    for span, split in zip(spans, splits, strict=True):
+        minutes, seconds = divmod(round(span.start_s, 2), 60)
+        name = f"{recording.name}-{int(minutes) // 60:02}h{int(minutes) % 60:02}m{seconds:05.2f}s"
+        described = replace(recording, name=name, words=span.words, split=split, phones=None)
+        described = replace(described, start_s=span.start_s, end_s=span.end_s)
+        first, last = round(span.start_s * audio.rate_hz), round(span.end_s * audio.rate_hz)
+        result.append(VideoPart(described, Audio(audio.samples[first:last], audio.rate_hz), scan.person))
+    return result
 
 
 def _fit_to_pictures(span: SpokenPart, scan: VideoScan, end_s: float) -> SpokenPart:
@@ -320,12 +315,3 @@ def _fit_to_pictures(span: SpokenPart, scan: VideoScan, end_s: float) -> SpokenP
     is_last = span.end_s >= end_s - 1e-6
     start_s, before_s = float(scan.times_s[max(first, 0)]), float(scan.times_s[max(last, 0)])
     return replace(span, start_s=start_s, end_s=end_s if is_last else before_s)
-
-
-def _cut_part(part: SpokenPart, recording: SourceRecording, split: str, audio: Audio, scan: VideoScan) -> VideoPart:
-    minutes, seconds = divmod(round(part.start_s, 2), 60)
-    name = f"{recording.name}-{int(minutes) // 60:02}h{int(minutes) % 60:02}m{seconds:05.2f}s"
-    described = replace(recording, name=name, words=part.words, split=split, phones=None)
-    described = replace(described, start_s=part.start_s, end_s=part.end_s)
-    first, last = round(part.start_s * audio.rate_hz), round(part.end_s * audio.rate_hz)
-    return VideoPart(described, Audio(audio.samples[first:last], audio.rate_hz), scan.person)

@@ -288,8 +288,8 @@ def _make_utterance(job: _Job, source: dict[str, str]) -> Utterance:
         audio = job.part.sound if job.part else read_audio(recording.file)
         motion = _track(job, audio.duration_s)
     else:
-        own_s = None if recording.recorder is None else read_audio(recording.file, warn=False).duration_s
-        audio, motion, begin_s = supplied.trim_to_shared(separate, _track(job, own_s))
+        camera_s = None if recording.recorder is None else read_audio(recording.file, warn=False).duration_s
+        audio, motion, begin_s = supplied.trim_to_shared(separate, _track(job, camera_s))
         labelled_s = begin_s if recording.recorder is not None else begin_s + separate.late_s
         recording = replace(recording, phones=supplied.shift_phones(recording.phones, labelled_s))
         source = source | {"sound_late_ms": f"{separate.late_s * 1000:.3f}", "sound_found_by": separate.how}

@@ -112,8 +112,10 @@ def _find_beeps(audio: Audio) -> list[SoundMark]:
     same = np.concatenate([[False], good[1:] & good[:-1] & (np.abs(np.diff(hertz)) <= 1.01 / BEEP_FRAME_S), [False]])
     starts = np.flatnonzero(same[1:] & ~same[:-1])
     ends = np.flatnonzero(same[:-1] & ~same[1:])
-    least = MIN_BEEP_S / BEEP_STEP_S
-    long = [(first, last) for first, last in zip(starts.tolist(), ends.tolist(), strict=True) if last - first >= least]
+    min_frames = MIN_BEEP_S / BEEP_STEP_S
+    long = [
+        (first, last) for first, last in zip(starts.tolist(), ends.tolist(), strict=True) if last - first >= min_frames
+    ]
     marks = []
     for first, last in long:
         frames = slice(first, last + 1)
@@ -277,8 +279,8 @@ def _find_beginning(audio: Audio, beep: SoundMark) -> float:
     turned = samples * np.exp(-2j * np.pi * beep.hertz * np.arange(len(samples)) / rate)
     width = round(SMOOTH_S * rate)
     loudness = np.abs(np.convolve(turned, np.hanning(width + 2), mode="same"))
-    own = [round((MARK_WINDOW_S[1] + time_s) * rate) for time_s in PLATEAU_S]
-    return (begin + int(np.argmax(loudness >= 0.5 * np.median(loudness[own[0] : own[1]])))) / rate
+    plateau = [round((MARK_WINDOW_S[1] + time_s) * rate) for time_s in PLATEAU_S]
+    return (begin + int(np.argmax(loudness >= 0.5 * np.median(loudness[plateau[0] : plateau[1]])))) / rate
 
 
 def _refine(first: Audio, second: Audio, late_s: float, reach_s: float) -> float:

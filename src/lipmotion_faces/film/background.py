@@ -149,8 +149,8 @@ def choose_parts(footages: Sequence[Footage]) -> list[_Part]:
         lengths[kind] = lengths.get(kind, 0.0) + _measure_duration(part)
     most_common = max(lengths, key=lambda kind: lengths[kind])
     parts = [part for part in parts if (part[0].size, part[0].rate_hz) == most_common]
-    least_s = COMPARED_SHARE * min(SHORT_S, max(map(_measure_duration, parts)))
-    parts = [part for part in parts if _measure_duration(part) >= least_s]
+    min_s = COMPARED_SHARE * min(SHORT_S, max(map(_measure_duration, parts)))
+    parts = [part for part in parts if _measure_duration(part) >= min_s]
     return [parts[number] for number in choose_evenly(MAX_PARTS, len(parts))]
 
 

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import ceil
+from math import ceil, inf
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,7 @@ from lipmotion.pipeline.workers import open_workers, process_count
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import QUIETEST_DB, measure_levels_at
 from lipmotion.stats.pca import choose_evenly
-from lipmotion.storage.sources import check_source, hash_file, list_video, open_media, read_duration
+from lipmotion.storage.sources import check_source, hash_file
 from lipmotion.types import Audio, Item, Monitor, Progress, silent_monitor
 from lipmotion_faces.appearance import lower_face
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
@@ -29,7 +29,7 @@ from lipmotion_faces.corpus.source_recordings import SourceRecording, filter_vid
 from lipmotion_faces.film.background import find_best_background, find_chin
 from lipmotion_faces.filmed.face import FilmedFace, SpokenTake
 from lipmotion_faces.tracking.damaged_pictures import describe_damage, find_damaged
-from lipmotion_faces.tracking.frames import VideoSpan
+from lipmotion_faces.tracking.frames import VideoSpan, read_stated_duration
 from lipmotion_faces.tracking.track import UNSEEN_LIMIT, Footage, decode_footage, track_footage
 
 MAX_FOOTAGE_S = 240.0
@@ -80,7 +80,11 @@ def choose_takes(source: Path, recordings: Path | None = None, speaker: str = ""
         takes = [_make_take(item, source) for item in [item for item in items if item.split == "train"] or items]
     if not takes:
         raise InputError(f"{source}: no videos in it; give a video of the person, or a folder of videos")
-    durations_s = [_read_duration(takes[index]) for index in choose_evenly(MAX_MEASURED_RECORDINGS, len(takes))]
+    measured = [takes[index] for index in choose_evenly(MAX_MEASURED_RECORDINGS, len(takes))]
+    durations_s = [
+        take.span.end_s - take.span.start_s if take.span.end_s < inf else read_stated_duration(take.file) or LONG_S
+        for take in measured
+    ]
     longest_s = left_s = MAX_FOOTAGE_S
     for number, duration_s in enumerate(sorted(durations_s)):
         share_s = left_s / (len(durations_s) - number)
@@ -139,28 +143,12 @@ def _list_corpus(corpus: Corpus, recordings: Path | None, speaker: str) -> list[
     return [_make_take(item, recordings, collections[item.name]) for item in chosen]
 
 
-def _make_take(
-    item: SourceRecording, folder: Path, collection: str | None = None, seconds: float = float("inf")
-) -> Take:
-    end_s = float("inf") if item.end_s is None else item.end_s
+def _make_take(item: SourceRecording, folder: Path, collection: str | None = None, seconds: float = inf) -> Take:
+    end_s = inf if item.end_s is None else item.end_s
     named = "/".join(folder.resolve().parts[-2:]).strip("/") if collection is None else collection
     rights = tuple(sorted((key, value) for key, value in item.rights.items() if key in RIGHTS))
     span = VideoSpan(item.start_s, min(end_s, item.start_s + seconds))
     return Take(item.name, item.file, span, named, item.speaker, rights)
-
-
-def _read_duration(take: Take) -> float:
-    """Return the duration of a take, as the file states it; ``LONG_S`` if it states none, or cannot be read."""
-    import av
-
-    if take.span.end_s < float("inf"):
-        return take.span.end_s - take.span.start_s
-    try:
-        with open_media(take.file) as container:
-            streams = list_video(container)
-            return (read_duration(container, streams[0]) if streams else 0.0) or LONG_S
-    except (av.FFmpegError, ValueError, OSError):
-        return LONG_S
 
 
 LOG = logging.getLogger("lipmotion")

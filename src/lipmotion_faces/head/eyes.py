@@ -46,7 +46,7 @@ class Eyelids:
         self._x = np.linspace(part.EYE[0] - 0.3, part.EYE[0] + 0.3, 61)
         self._y = np.linspace(-0.28, 0.3, 59)
         grid = np.meshgrid(self._x, self._y, indexing="ij")
-        depth = part.find_front(part.to_head, grid[0].ravel(), grid[1].ravel()).reshape(grid[0].shape)
+        depth = part.find_front(grid[0].ravel(), grid[1].ravel()).reshape(grid[0].shape)
         self._depth = spline_filter(depth, order=3)
 
     def find_edge(self) -> Real:
@@ -165,7 +165,7 @@ def make_brow() -> part.Part:
     share = np.linspace(0, 1, 30)
     x = 0.135 + 0.40 * share
     y = 0.279 + 0.006 * share + 0.026 * np.sin(np.pi * share**1.3)
-    path = np.stack([x, y, part.find_front(part.to_head, x, y) + 0.004], axis=1)
+    path = np.stack([x, y, part.find_front(x, y) + 0.004], axis=1)
     wide = 0.033 * np.clip(1.02 - share, 0.01, 1) ** 0.6 * np.clip(share / 0.4, 0.02, 1) ** 0.6
     upward = np.broadcast_to([0.25, 0.1, 1.0], path.shape)
     places, triangles, strands = part.make_tube(path, wide, 0.45 * wide + 0.006, upward, sides=12)

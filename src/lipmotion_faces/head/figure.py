@@ -14,7 +14,7 @@ from lipmotion_faces.base import rotate_head
 from lipmotion_faces.characters.surface import compute_normals
 from lipmotion_faces.characters.textures import decode_srgb
 from lipmotion_faces.head import eyes, inside, palette
-from lipmotion_faces.head.part import EYE, MIDDLE, Part, find_around, join, make_grid, make_part, make_tube, to_head
+from lipmotion_faces.head.part import EYE, MIDDLE, Part, find_around, join, make_grid, make_part, make_tube
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import ACROSS, AT_CORNER, REST, RINGS, VISIBLE_RINGS, Skin, find_closure, move_jaw
 from lipmotion_faces.rendering.lighting import Finish, Lighting, Triple, measure_reach, normalise
@@ -62,12 +62,12 @@ def _make_cap() -> Part:
     loop = np.concatenate([half_loop, half_loop[-2:0:-1] * [-1, 1, 1], half_loop[:1]])
     length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(loop, axis=0), axis=1))])
     curve = CubicSpline(length, loop, bc_type="periodic")(np.arange(_COLUMNS) / _COLUMNS * length[-1])
-    line = find_around(to_head, normalise(curve - MIDDLE))  # where the hair begins, clockwise from above
+    line = find_around(normalise(curve - MIDDLE))  # where the hair begins, clockwise from above
     start, pole = normalise(line - MIDDLE), normalise(BUN - MIDDLE)
     share = np.linspace(0, 1, _ROWS)[:, None, None] ** 1.15
     angle = np.arccos(np.clip(start @ pole, -1, 1))[None, :, None]
     ways = (np.sin((1 - share) * angle) * start + np.sin(share * angle) * pole) / np.sin(angle)
-    skin = find_around(to_head, ways.reshape(-1, 3)).reshape(ways.shape)
+    skin = find_around(ways.reshape(-1, 3)).reshape(ways.shape)
     phase = 2 * np.pi * np.arange(_COLUMNS) / _COLUMNS
     share = share[..., 0]
     wave = 0.5 * np.sin(23 * phase + 2 * np.sin(3 * phase)) + 0.3 * np.sin(41 * phase + 1.3) + 0.2 * np.sin(67 * phase)
@@ -107,7 +107,7 @@ def _make_lock(points: Sequence[Sequence[float]], wide: float, thick: float, sha
     share = np.linspace(0, 1, 36)
     curve = CubicSpline(np.linspace(0, 1, len(knots)), knots)(share)
     ways = normalise(curve[:, :3] - MIDDLE)
-    path = find_around(to_head, ways) + curve[:, 3:] * ways
+    path = find_around(ways) + curve[:, 3:] * ways
     taper = np.clip(1.15 * np.sin(np.pi * np.clip(0.12 + 0.87 * share, 0, 1)), 0.015, 1) ** 0.7
     places, triangles, strands = make_tube(path, wide * taper, thick * taper, ways, sides=16)
     across = np.tile(np.cos(2 * np.pi * np.arange(16) / 16), 36)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -98,9 +97,6 @@ def make_tube(path: Real, across: Real, thick: Real, upward: Real, *, sides: int
     return rings.reshape(-1, 3), make_grid(len(path), sides, closed=True), strands
 
 
-Form = Callable[[Real], Real]
-"""The signed distance of places [shape=(N, 3)] from a surface, negative inside [shape=(N,)]."""
-
 EYE = np.array([0.315, 0.0, -0.215])
 """Centre of the left eyeball; the right one is its mirror image."""
 EYEBALL_RADIUS, LID_RADIUS = 0.225, 0.243
@@ -156,11 +152,11 @@ def to_head(p: Real) -> Real:
     return cut(d, to_ellipsoid(q, (0, -0.57, 0.08), (0.036, 0.07, 0.036)), 0.09)
 
 
-def trace_rays(form: Form, start: Real, direction: Real, *, steps: int = 70) -> Real:
-    """Return how far rays [starts and unit directions: shape=(N, 3)] go until they meet a form [shape=(N,)]."""
+def trace_rays(start: Real, direction: Real, *, steps: int = 70) -> Real:
+    """Return how far rays [starts and unit directions: shape=(N, 3)] go until they meet the head [shape=(N,)]."""
     far, going = np.zeros(len(start)), np.arange(len(start))
     for _ in range(steps):
-        gap = form(start[going] + far[going, None] * direction[going])
+        gap = to_head(start[going] + far[going, None] * direction[going])
         far[going] += 0.8 * gap
         going = going[np.abs(gap) > 1e-5]
         if not len(going):
@@ -168,20 +164,20 @@ def trace_rays(form: Form, start: Real, direction: Real, *, steps: int = 70) -> 
     return far
 
 
-def find_front(form: Form, x: Real, y: Real) -> Real:
-    """Return the z of a form's frontmost place at columns and heights [shape=(N,), both]."""
+def find_front(x: Real, y: Real) -> Real:
+    """Return the z of the head's frontmost place at columns and heights [shape=(N,), both]."""
     start = np.stack([x, y, np.full(len(x), 1.0)], axis=1)
-    return np.asarray(1 - trace_rays(form, start, np.broadcast_to([0.0, 0.0, -1.0], start.shape)))
+    return np.asarray(1 - trace_rays(start, np.broadcast_to([0.0, 0.0, -1.0], start.shape)))
 
 
-def find_around(form: Form, directions: Real) -> Real:
-    """Return the places of a form in directions from ``MIDDLE`` [shape=(N, 3)]."""
-    far = trace_rays(form, MIDDLE + 3 * directions, -directions, steps=90)
+def find_around(directions: Real) -> Real:
+    """Return the places of the head in directions from ``MIDDLE`` [shape=(N, 3)]."""
+    far = trace_rays(MIDDLE + 3 * directions, -directions, steps=90)
     return np.asarray(MIDDLE + (3 - far)[:, None] * directions)
 
 
-def find_outward(form: Form, places: Real) -> Real:
-    """Return the normals of a form at places on it [shape=(N, 3)], of length 1."""
+def find_outward(places: Real) -> Real:
+    """Return the normals of the head at places on it [shape=(N, 3)], of length 1."""
     step = 2e-3
-    slope = np.stack([form(places + step * axis) - form(places - step * axis) for axis in np.eye(3)], axis=1)
+    slope = np.stack([to_head(places + step * axis) - to_head(places - step * axis) for axis in np.eye(3)], axis=1)
     return np.asarray(slope / np.linalg.norm(slope, axis=1, keepdims=True))

@@ -18,7 +18,7 @@ from scipy.spatial import Delaunay, cKDTree
 from lipmotion.articulation.contact import MIN_GAP, smooth_step
 from lipmotion_faces.characters.surface import compute_normals
 from lipmotion_faces.head.eyes import LID_COLUMNS, LID_RINGS, Eyelids
-from lipmotion_faces.head.part import MIDDLE, MOUTH_Y, find_around, find_front, find_outward, to_head
+from lipmotion_faces.head.part import MIDDLE, MOUTH_Y, find_around, find_front, find_outward
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.rendering.lighting import normalise
 
@@ -272,7 +272,7 @@ class Skin:
     def __init__(self) -> None:
         self.lids_of_eye = Eyelids()
         contour = place_sections(REST, np.zeros(COLUMNS))[0]
-        self.base_z = find_front(to_head, contour[:, 0], contour[:, 1])
+        self.base_z = find_front(contour[:, 0], contour[:, 1])
         contour[:, 2] = self.base_z
         edge = self.lids_of_eye.find_edge()
         edges = np.concatenate([edge, edge * [-1, 1, 1]])
@@ -293,12 +293,12 @@ class Skin:
         self.rest = self.place(REST)
         self._meshed_rest = compute_normals(self.rest, self.triangles)
         self.normals = self._meshed_rest.copy()
-        self.normals[len(contour) + len(edges) : len(self.face)] = find_outward(to_head, fill)
-        self._before_lips = find_outward(to_head, contour)
+        self.normals[len(contour) + len(edges) : len(self.face)] = find_outward(fill)
+        self._before_lips = find_outward(contour)
         corners = self.rest[[0, _LEFT_CORNER]]
-        beside = np.linalg.norm(self.rest[: len(self.face), None] - corners, axis=2).min(axis=1)
+        corner_distance = np.linalg.norm(self.rest[: len(self.face), None] - corners, axis=2).min(axis=1)
         self._calm = np.ones((len(self.rest), 1))
-        self._calm[: len(self.face), 0] -= 0.85 * np.exp(-((beside / CALM_RADIUS) ** 2))
+        self._calm[: len(self.face), 0] -= 0.85 * np.exp(-((corner_distance / CALM_RADIUS) ** 2))
 
     def list_lip_rows(self) -> Index:
         """Return the vertices of the lips, ring by ring from the skin inwards [shape=(RINGS, COLUMNS)]."""
@@ -321,10 +321,10 @@ class Skin:
         normals[rows[VISIBLE_RINGS - 1]] += closed * (
             normals[rows[VISIBLE_RINGS - 2]] - normals[rows[VISIBLE_RINGS - 1]]
         )
-        beside = AT_CORNER * (CORNER_LIGHT_SHARE + (1 - CORNER_LIGHT_SHARE) * pose.roundness)
+        corner_share = AT_CORNER * (CORNER_LIGHT_SHARE + (1 - CORNER_LIGHT_SHARE) * pose.roundness)
         for ring in range(1, VISIBLE_RINGS):
             of_ring = normals[rows[ring]]
-            share = np.maximum(closed * _JOINED.get(ring, 0.0), beside)
+            share = np.maximum(closed * _JOINED.get(ring, 0.0), corner_share)
             normals[rows[ring]] += 0.5 * share * (of_ring[_OPPOSITE] - of_ring)
         outer = rows[1:VISIBLE_RINGS]
         normals[outer] += CORNER_SKIN_SHARE * (1 - pose.roundness) * _NEAR_CORNER * (self._before_lips - normals[outer])
@@ -349,7 +349,7 @@ class Skin:
         out = np.stack([(np.abs(fill[:, 0]) - 0.40) / 0.15, (fill[:, 1] + 0.47) / 0.15], axis=1)
         share = np.exp(-np.sum(out**2, axis=1)) * (fill[:, 2] > -0.75)
         cheeks, nose = np.zeros_like(face), np.zeros_like(face)
-        cheeks[len(face) - len(fill) :] = share[:, None] * (find_outward(to_head, fill) + np.array([0.0, 0.4, 0.0]))
+        cheeks[len(face) - len(fill) :] = share[:, None] * (find_outward(fill) + np.array([0.0, 0.4, 0.0]))
         out = (np.abs(face[:, 0]) / 0.2) ** 4 + ((face[:, 1] + 0.4) / 0.14) ** 4
         nose[:, 1] = np.exp(-out) * (face[:, 2] > -0.5)
         jaw = smooth_step((-0.47 - face[:, 1]) / 0.40) * smooth_step((face[:, 2] + 0.98) / 0.45)
@@ -387,7 +387,7 @@ def _fill(contour: Real, edges: Real) -> Real:
         step = 1 if away < 0.05 else 2
         rings.append(np.stack([x, y], axis=1)[::step])
     near = np.concatenate(rings)
-    near3 = np.column_stack([near, find_front(to_head, near[:, 0], near[:, 1])])
+    near3 = np.column_stack([near, find_front(near[:, 0], near[:, 1])])
     count = int(1.75 / SPACING)
     i, j = np.meshgrid(np.arange(-count, count + 1), np.arange(-int(count * 1.2), int(count * 1.2) + 1))
     u, v = SPACING * (i + 0.5 * (j % 2)).ravel(), SPACING * 0.866 * j.ravel()
@@ -396,7 +396,7 @@ def _fill(contour: Real, edges: Real) -> Real:
     radius = np.hypot(u, v)
     angle = radius + 0.11 * radius**3  # on the map of the head, whose middle is the front; its rim is stretched
     flat = np.sin(angle) / np.maximum(radius, 1e-9)
-    places = find_around(to_head, np.stack([u * flat, v * flat, np.cos(angle)], axis=1))
+    places = find_around(np.stack([u * flat, v * flat, np.cos(angle)], axis=1))
     close = cKDTree(near3).query(places)[0] < 0.024
     inside = (np.abs(places[:, 0]) < 0.36) & _mark_in(places[:, :2], near[-len(rings[-1]) :]) & (places[:, 2] > -0.5)
     at_eye = cKDTree(edges).query(places)[0] < 0.02

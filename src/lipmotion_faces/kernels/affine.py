@@ -61,12 +61,12 @@ def _pack(values: NDArray[Any], dtype: Any = None) -> NDArray[Any]:
 @compiled
 def _resample(picture: Pictures, to_source: Array, new: Floats) -> None:
     width = new.shape[1]
-    whole, fractions, taps = np.empty((2, width), np.int32), np.empty((2, width), Number), np.empty((8, width), Number)
+    cells, fractions, taps = np.empty((2, width), np.int32), np.empty((2, width), Number), np.empty((8, width), Number)
     needed = np.ones(width, Number)
     for r in range(len(new)):
-        _locate(to_source, r, picture.shape, whole, fractions)
+        _locate(to_source, r, picture.shape, cells, fractions)
         _weigh(fractions, taps)
-        _fill(picture, whole, taps, needed, new[r])
+        _fill(picture, cells, taps, needed, new[r])
 
 
 @compiled
@@ -80,25 +80,25 @@ def _blend(
     to_patch: Array,
 ) -> None:
     width = size[1]
-    whole, fractions, taps = np.empty((2, width), np.int32), np.empty((2, width), Number), np.empty((8, width), Number)
+    cells, fractions, taps = np.empty((2, width), np.int32), np.empty((2, width), Number), np.empty((8, width), Number)
     share, new = np.empty(width, Number), np.empty((width, COLOURS), Number)
     for r in range(size[0]):
-        _locate(to_patch, r, patch.shape, whole, fractions)
-        _share(weight, whole, fractions, share)
+        _locate(to_patch, r, patch.shape, cells, fractions)
+        _share(weight, cells, fractions, share)
         _weigh(fractions, taps)
-        _fill(patch, whole, taps, share, new)
+        _fill(patch, cells, taps, share, new)
         _mix(frame[top + r, left : left + width], new, share)
 
 
 @compiled
-def _locate(to_source: Array, r: int, shape: tuple[int, int, int], whole: Index, fractions: Floats) -> None:
+def _locate(to_source: Array, r: int, shape: tuple[int, int, int], cells: Index, fractions: Floats) -> None:
     """Fill in where the pixels of row ``r`` lie in a picture of ``shape``: columns and rows, fractions of both."""
     from_x, from_y = to_source[0, 1] * r + to_source[0, 2], to_source[1, 1] * r + to_source[1, 2]
-    for c in range(whole.shape[1]):
+    for c in range(cells.shape[1]):
         x = min(max(to_source[0, 0] * c + from_x, -3.0), shape[1] + 2.0)
         y = min(max(to_source[1, 0] * c + from_y, -3.0), shape[0] + 2.0)
         column, row = np.floor(x), np.floor(y)
-        whole[0, c], whole[1, c] = np.int32(column), np.int32(row)
+        cells[0, c], cells[1, c] = np.int32(column), np.int32(row)
         fractions[0, c], fractions[1, c] = Number(x - column), Number(y - row)
 
 
@@ -115,14 +115,14 @@ def _weigh(fractions: Floats, taps: Floats) -> None:
 
 
 @compiled
-def _fill(picture: Pictures, whole: Index, taps: Floats, needed: Floats, new: Floats) -> None:
+def _fill(picture: Pictures, cells: Index, taps: Floats, needed: Floats, new: Floats) -> None:
     """Fill in a row: vertical sums of four columns, and their weighted sum; not where ``needed`` is 0."""
     height, width, _ = picture.shape
     flat, below = picture.reshape(-1), np.uint64(width * COLOURS)
     for c in range(len(new)):
         if needed[c] == BLACK:
             continue
-        column, row = whole[0, c], whole[1, c]
+        column, row = cells[0, c], cells[1, c]
         e, f, g, h = taps[4, c], taps[5, c], taps[6, c], taps[7, c]
         if 1 <= column < width - 2 and 1 <= row < height - 2:
             first = np.uint64((np.int64(row) - 1) * width + column - 1) * NEXT
@@ -162,13 +162,13 @@ def _sum_at_edge(
 
 
 @compiled
-def _share(weight: Floats, whole: Index, fractions: Floats, share: Floats) -> None:
+def _share(weight: Floats, cells: Index, fractions: Floats, share: Floats) -> None:
     """Fill in the weight at each position, interpolated between 2 × 2 pixels."""
     height, width = weight.shape
     for c in range(len(share)):
         x, y = fractions[0, c], fractions[1, c]
-        above, below = _clip(whole[1, c], height), _clip(whole[1, c] + 1, height)
-        left, right = _clip(whole[0, c], width), _clip(whole[0, c] + 1, width)
+        above, below = _clip(cells[1, c], height), _clip(cells[1, c] + 1, height)
+        left, right = _clip(cells[0, c], width), _clip(cells[0, c] + 1, width)
         before = (ONE - y) * weight[above, left] + y * weight[below, left]
         share[c] = (ONE - x) * before + x * ((ONE - y) * weight[above, right] + y * weight[below, right])
 

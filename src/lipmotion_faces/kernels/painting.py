@@ -76,10 +76,10 @@ def paint_band(layer: Layer, top: Floats, bottom: Floats, across: Floats, textur
             highest, lowest = min(highest, top[place, column]), max(lowest, bottom[place, column])
         start, end = start / places, end / places
         length = max(end - start, 1e-3)
-        beside = across[column] * (wide - 1)
-        u0 = min(int(beside), max(wide - 2, 0))
+        along = across[column] * (wide - 1)
+        u0 = min(int(along), max(wide - 2, 0))
         u1 = min(u0 + 1, wide - 1)
-        fu = beside - u0
+        fu = along - u0
         for row in range(max(0, int(np.floor(highest))), min(len(layer), int(np.ceil(lowest)))):
             cover = 0.0
             for place in range(places):

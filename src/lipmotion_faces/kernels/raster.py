@@ -131,7 +131,7 @@ def _resolve(
     depth: Colours, colour: Colours, background: Colours, tone: NDArray[np.uint8], picture: NDArray[np.uint8],
     left: int, right: int, first: int, last: int,
 ) -> None:  # fmt: skip
-    most, quarter = np.float32(len(tone) - 1), np.float32(0.25)
+    top_level, quarter = np.float32(len(tone) - 1), np.float32(0.25)
     zero, one = np.float32(0), np.float32(1)
     for row in range(first, last):
         i = 2 * (row - first)
@@ -145,5 +145,5 @@ def _resolve(
                 total += behind if empty_b else colour[i, j + 1, k]
                 total += behind if empty_c else colour[i + 1, j, k]
                 total += behind if empty_d else colour[i + 1, j + 1, k]
-                level = min(max(quarter * total, zero), one) * most
+                level = min(max(quarter * total, zero), one) * top_level
                 picture[row, column, k] = tone[int(level)]

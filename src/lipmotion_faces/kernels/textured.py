@@ -12,7 +12,7 @@ from lipmotion_faces.kernels.raster import BAND, FAR, GRID, compute_bias, sort_b
 
 Real = NDArray[np.float64]
 Light = NDArray[np.float32]
-Whole = NDArray[np.int32]
+Ints = NDArray[np.int32]
 
 SOLID, CUT, CLEAR = 0, 1, 2
 """Kinds of triangles: without holes; with holes where the texture is clear; blended with what is behind."""
@@ -39,9 +39,9 @@ class TexturedTriangles(NamedTuple):
     levels    : first texel, width and height of each texture [shape=(L, 3)]
     """
 
-    triangles: Whole
+    triangles: Ints
     uv: Real
-    looks: Whole
+    looks: Ints
     alphas: Real
     texels: NDArray[np.uint16]
     levels: NDArray[np.int64]
@@ -83,10 +83,10 @@ def draw_textured(
             t = faces[n]
             a, c, b = triangles[t]
             layered = layered or looks[t, 1] == CLEAR
-            least = alphas[t, 0] if looks[t, 1] == CUT else HIDING_OPACITY
+            lowest = alphas[t, 0] if looks[t, 1] == CUT else HIDING_OPACITY
             _mark(
                 t, x[a], y[a], z[a], x[b], y[b], z[b], x[c], y[c], z[c], 2 * left, 2 * right, 2 * first, 2 * last,
-                looks[t, 1] != 0, least / max(alphas[t, 1], 1e-9), planes, looks[t, 0], texels, levels, depth, shown,
+                looks[t, 1] != 0, lowest / max(alphas[t, 1], 1e-9), planes, looks[t, 0], texels, levels, depth, shown,
                 depth,
             )  # fmt: skip
         if layered:
@@ -108,7 +108,7 @@ def draw_textured(
 
 @compiled
 def _fill_planes(
-    faces: Whole, x: Real, y: Real, z: Real, light: Light, shine: Light, triangles: Whole, uv: Real, planes: Real
+    faces: Ints, x: Real, y: Real, z: Real, light: Light, shine: Light, triangles: Ints, uv: Real, planes: Real
 ) -> None:
     for n in range(len(faces)):
         t = faces[n]
@@ -139,8 +139,8 @@ def _fill_planes(
 @compiled
 def _mark(
     t: int, xa: float, ya: float, za: float, xb: float, yb: float, zb: float, xc: float, yc: float, zc: float,
-    left: int, right: int, top: int, bottom: int, holes: bool, least: float, planes: Real, level: int,
-    texels: NDArray[np.uint16], levels: NDArray[np.int64], depth: Light, marks: Whole, solid: Light,
+    left: int, right: int, top: int, bottom: int, holes: bool, lowest: float, planes: Real, level: int,
+    texels: NDArray[np.uint16], levels: NDArray[np.int64], depth: Light, marks: Ints, solid: Light,
 ) -> None:  # fmt: skip
     x0, x1 = max(left, int(np.ceil(min(xa, xb, xc) - 0.5))), min(right, int(np.floor(max(xa, xb, xc) + 0.5)))
     y0, y1 = max(top, int(np.ceil(min(ya, yb, yc) - 0.5))), min(bottom, int(np.floor(max(ya, yb, yc) + 0.5)))
@@ -172,7 +172,7 @@ def _mark(
                 if (
                     away < depth[i, j]
                     and away <= solid[i, j]
-                    and (not holes or _sample_alpha(t, j + left + 0.5, py, planes, level, texels, levels) >= least)
+                    and (not holes or _sample_alpha(t, j + left + 0.5, py, planes, level, texels, levels) >= lowest)
                 ):
                     depth[i, j] = away
                     marks[i, j] = t
@@ -256,48 +256,50 @@ def _shade(
 
 @compiled
 def _resolve(
-    shown: Whole, before: Whole, layered: bool, planes: Real, looks: Whole, alphas: Real,
+    shown: Ints, before: Ints, layered: bool, planes: Real, looks: Ints, alphas: Real,
     texels: NDArray[np.uint16], levels: NDArray[np.int64],
     background: Light, tone: NDArray[np.uint8], picture: NDArray[np.uint8], opacity: NDArray[np.uint8],
     left: int, right: int, first: int, last: int,
 ) -> None:  # fmt: skip
-    most = float(len(tone) - 1)
+    top_level = float(len(tone) - 1)
     colours, covered, ids = np.empty((4, 3)), np.empty(4), np.empty(4, np.int32)
     for row in range(first, last):
         i = 2 * (row - first)
         for column in range(left, right):
             j = 2 * (column - left)
             t = shown[i, j]
-            whole = t == shown[i, j + 1] and t == shown[i + 1, j] and t == shown[i + 1, j + 1]
-            if whole and layered:
-                whole = before[i, j] == NO_TRIANGLE and before[i, j + 1] == NO_TRIANGLE
-                whole = whole and before[i + 1, j] == NO_TRIANGLE and before[i + 1, j + 1] == NO_TRIANGLE
-            if whole and t == NO_TRIANGLE:
+            uniform = t == shown[i, j + 1] and t == shown[i + 1, j] and t == shown[i + 1, j + 1]
+            if uniform and layered:
+                uniform = before[i, j] == NO_TRIANGLE and before[i, j + 1] == NO_TRIANGLE
+                uniform = uniform and before[i + 1, j] == NO_TRIANGLE and before[i + 1, j + 1] == NO_TRIANGLE
+            if uniform and t == NO_TRIANGLE:
                 for channel in range(3):
-                    picture[row, column, channel] = tone[_quantise(np.float64(background[row, column, channel]), most)]
+                    picture[row, column, channel] = tone[
+                        _quantise(np.float64(background[row, column, channel]), top_level)
+                    ]
                 opacity[row, column] = 0
                 continue
-            if whole:
+            if uniform:
                 red, green, blue, _ = _shade(t, 2 * column + 1.0, 2 * row + 1.0, planes, looks[t, 0], texels, levels)
-                picture[row, column, 0] = tone[_quantise(red, most)]
-                picture[row, column, 1] = tone[_quantise(green, most)]
-                picture[row, column, 2] = tone[_quantise(blue, most)]
+                picture[row, column, 0] = tone[_quantise(red, top_level)]
+                picture[row, column, 1] = tone[_quantise(green, top_level)]
+                picture[row, column, 2] = tone[_quantise(blue, top_level)]
                 opacity[row, column] = 255
                 continue
             _mix(shown, before, layered, i, j, row, column, planes, looks, alphas, texels, levels, background, colours,
                  covered, ids)  # fmt: skip
             for channel in range(3):
                 total = (colours[0, channel] + colours[1, channel]) + (colours[2, channel] + colours[3, channel])
-                picture[row, column, channel] = tone[_quantise(0.25 * total, most)]
+                picture[row, column, channel] = tone[_quantise(0.25 * total, top_level)]
             hidden = (covered[0] + covered[1]) + (covered[2] + covered[3])
             opacity[row, column] = np.uint8(63.75 * hidden + 0.5)
 
 
 @compiled
 def _mix(
-    shown: Whole, before: Whole, layered: bool, i: int, j: int, row: int, column: int, planes: Real, looks: Whole,
+    shown: Ints, before: Ints, layered: bool, i: int, j: int, row: int, column: int, planes: Real, looks: Ints,
     alphas: Real, texels: NDArray[np.uint16], levels: NDArray[np.int64], background: Light,
-    colours: Real, covered: Real, ids: Whole,
+    colours: Real, covered: Real, ids: Ints,
 ) -> None:  # fmt: skip
     """Fill in the colours of the four samples of a pixel [shape=(4, 3)], and how far each is covered [shape=(4,)]."""
     for k in range(4):
@@ -325,12 +327,12 @@ def _mix(
 
 
 @compiled
-def _quantise(light: float, most: float) -> int:
-    return int(min(max(light, 0.0), 1.0) * most)
+def _quantise(light: float, top_level: float) -> int:
+    return int(min(max(light, 0.0), 1.0) * top_level)
 
 
 @compiled
-def _find_earlier(ids: Whole, k: int) -> int:
+def _find_earlier(ids: Ints, k: int) -> int:
     """Return the first of the samples that show the same triangle as sample k."""
     for other in range(k):
         if ids[other] == ids[k]:
@@ -339,7 +341,7 @@ def _find_earlier(ids: Whole, k: int) -> int:
 
 
 @compiled
-def _find_middle(ids: Whole, k: int, row: int, column: int) -> tuple[float, float]:
+def _find_middle(ids: Ints, k: int, row: int, column: int) -> tuple[float, float]:
     """Return the middle of the samples of a pixel that show the same triangle as sample k."""
     px, py, count = 0.0, 0.0, 0.0
     for other in range(4):

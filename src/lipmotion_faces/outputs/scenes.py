@@ -38,7 +38,7 @@ GLTF, USD, FBX = ".glb", ".usda", ".fbx"
 SCENE_SUFFIXES = (GLTF, USD, FBX)
 FBX_RATE_HZ = 60
 """Frames a second of ``.fbx``, which are whole numbers; fewer where fewer keys are asked for."""
-KEPT = (GLTF, ".vrm")
+ANIMATED_SUFFIXES = (GLTF, ".vrm")
 """Suffixes of files of characters that are kept as they are, with an animation more."""
 MARGIN, MOUTH_MARGIN = 10, 50
 """Frames before and after those that are wanted alone, within which weights settle, and the mouth."""
@@ -103,7 +103,12 @@ def write_scene(path: Path, scene: Scene, sound: Path | None = None) -> None:
     if path.suffix.lower() == USD:
         write_usda(path, with_sound)
         return
-    if path.suffix.lower() == GLTF and original is not None and original.suffix.lower() in KEPT and weights is not None:
+    if (
+        path.suffix.lower() == GLTF
+        and original is not None
+        and original.suffix.lower() in ANIMATED_SUFFIXES
+        and weights is not None
+    ):
         write = partial(write_animated_gltf, sound_s=scene.sound_s, stepped=scene.stepped, thinning=scene.thinning)
         if write(path, original, weights, with_sound.sound):
             return

@@ -104,7 +104,7 @@ class ShownCutOut(_WithHead):
 
     def __init__(self, face: CutOut) -> None:
         self.face = face
-        self._optional = "".join(name for name in OPTIONAL if name in face.shapes)
+        self._optional = "".join(name for name in OPTIONAL if name in face.pictures)
 
     def check(self, settings: OutputSettings) -> None:  # noqa: D102
         filmed_video.refuse_film(settings.outputs)

@@ -114,10 +114,10 @@ class MouthPainter:
         hole = line * np.minimum((shape.lower_inner - top) / 0.01, 1)
         ring = line * np.minimum((shape.lower_outer - shape.upper_outer) / 0.01, 1)
         tucked, out = (min(max((share - 0.3) / 0.5, 0), 1) for share in (pose.tuck, pose.protrusion))
-        beside = 0.5 * out * hole  # outside a round hole, which it would fill
+        outside = 0.5 * out * hole  # outside a round hole, which it would fill
         for edge, thick in (
-            (top - beside, (1 - 0.3 * pose.tuck) * hole),
-            (front + beside, (1 - 0.7 * pose.tuck) * hole),
+            (top - outside, (1 - 0.3 * pose.tuck) * hole),
+            (front + outside, (1 - 0.7 * pose.tuck) * hole),
             (shape.upper_outer, out * ring),
             (shape.lower_outer, np.maximum(tucked * hole, out * ring)),
         ):

@@ -42,8 +42,8 @@ Line = tuple[Points, bool]
 """A flattened subpath: points [shape=(N, 2)], and whether it returns to its beginning."""
 
 
-def flatten_path(text: str, most: int = MAX_POINTS) -> list[Line]:
-    """Return subpaths [shape=(N, 2)], and whether each is closed. Raises InputError: no path, over ``most`` points."""
+def flatten_path(text: str, max_count: int = MAX_POINTS) -> list[Line]:
+    """Return subpaths [shape=(N, 2)], and whether each is closed. Raises InputError: no path, or too many points."""
     lines: list[Line] = []
     current: list[Points] = []
     at = start = control = np.zeros(2)
@@ -56,8 +56,8 @@ def flatten_path(text: str, most: int = MAX_POINTS) -> list[Line]:
 
     for letter, numbers in _read_commands(text):
         kind, relative = letter.upper(), letter.islower()
-        most -= _POINTS.get(kind, 1)
-        check_points(most)
+        max_count -= _POINTS.get(kind, 1)
+        check_points(max_count)
         if kind == "Z":
             finish(True)
             at = start
@@ -172,13 +172,13 @@ def check_number(number: float, text: str) -> float:
     return number
 
 
-def read_numbers(text: str, most: int, name: str) -> list[float]:
-    """Return the numbers of a list. Raises InputError, with its name: not numbers, or more than ``most``."""
+def read_numbers(text: str, max_count: int, name: str) -> list[float]:
+    """Return the numbers of a list. Raises InputError, with its name: not numbers, or more than ``max_count``."""
     numbers: list[float] = []
     place = 0
     while match := _NUMBER.match(text, place):
-        if len(numbers) == most:
-            raise InputError(f"{name} is {shorten(text)!r}, required at most {most} numbers")
+        if len(numbers) == max_count:
+            raise InputError(f"{name} is {shorten(text)!r}, required at most {max_count} numbers")
         numbers.append(check_number(float(match[1]), text))
         place = match.end()
     if _end_of_blanks(text, place) < len(text):
@@ -186,9 +186,9 @@ def read_numbers(text: str, most: int, name: str) -> list[float]:
     return numbers
 
 
-def read_points(text: str, most: int = MAX_POINTS) -> Points:
+def read_points(text: str, max_count: int = MAX_POINTS) -> Points:
     """Return the points of a polygon [shape=(N, 2)]. Raises InputError: an odd count, no numbers, or too many."""
-    numbers = read_numbers(text, 2 * most, "points")
+    numbers = read_numbers(text, 2 * max_count, "points")
     if len(numbers) % 2 or len(numbers) < 4:
         raise InputError(f"points have {len(numbers)} numbers, required pairs, two at least")
     return np.array(numbers).reshape(-1, 2)
@@ -491,14 +491,14 @@ def _measure_cover(shape: Shape, box: tuple[float, float, float, float]) -> floa
     return covered
 
 
-def _read_lines(attributes: Mapping[str, str], tag: str, most: int) -> list[Line]:
+def _read_lines(attributes: Mapping[str, str], tag: str, max_count: int) -> list[Line]:
     def read(name: str, default: str = "0") -> float:
         return _read_number(attributes.get(name, default), name)
 
     if tag == "path":
-        return flatten_path(attributes.get("d", ""), most)
+        return flatten_path(attributes.get("d", ""), max_count)
     if tag in ("polygon", "polyline"):
-        return [(read_points(attributes.get("points", ""), most), tag == "polygon")]
+        return [(read_points(attributes.get("points", ""), max_count), tag == "polygon")]
     if tag == "line":
         return [(np.array([[read("x1"), read("y1")], [read("x2"), read("y2")]]), False)]
     if tag == "rect":

@@ -69,7 +69,7 @@ class Camera:
         size = self.width, self.height
         left, top = (max(0, int(edge - 2)) for edge in screen[:, :2].min(axis=0))
         right, bottom = (
-            min(most, int(np.ceil(edge + 2))) for edge, most in zip(screen[:, :2].max(axis=0), size, strict=True)
+            min(limit, int(np.ceil(edge + 2))) for edge, limit in zip(screen[:, :2].max(axis=0), size, strict=True)
         )
         return (left, top, right, bottom) if left < right and top < bottom else None
 
@@ -139,16 +139,12 @@ def fill(camera: Camera, colour: tuple[int, int, int]) -> Colours:
     return np.broadcast_to(np.asarray(level, np.float32), (camera.height, camera.width, 3)).copy()
 
 
-def fill_gradient(
-    camera: Camera,
-    middle: tuple[float, float, float] = (0.86, 0.89, 0.9),
-    edge: tuple[float, float, float] = (0.56, 0.65, 0.7),
-) -> Colours:
-    """Return a background [shape=(H, W, 3)] brighter in the middle, as parts of ``WHITE``; colours in sRGB, 0 to 1."""
+def fill_gradient(camera: Camera) -> Colours:
+    """Return a background [shape=(H, W, 3)] brighter in the middle, as parts of ``WHITE``."""
     columns = (np.arange(camera.width) + 0.5 - camera.width / 2) / (0.75 * camera.height)
     rows = (np.arange(camera.height) + 0.5 - 0.42 * camera.height) / (0.75 * camera.height)
     near = np.exp(-(columns[None] ** 2) - rows[:, None] ** 2)[..., None]
-    light = near * decode_srgb(middle) + (1 - near) * decode_srgb(edge)
+    light = near * decode_srgb((0.86, 0.89, 0.9)) + (1 - near) * decode_srgb((0.56, 0.65, 0.7))
     return np.asarray(light / WHITE, dtype=np.float32)
 
 

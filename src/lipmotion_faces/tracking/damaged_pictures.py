@@ -102,8 +102,8 @@ def find_damaged(
         bank.append(details[places[places[:, 0] == number, 1]])
     unlike = []
     for number, (clip, rate) in enumerate(zip(clips, rate_hz, strict=True)):
-        own = np.where(places[:, 0] == number, places[:, 1], -(10**9))
-        unlike.append(_measure_unlikeness(_describe(clip())[2], np.concatenate(bank), own, APART_S * rate))
+        own_frames = np.where(places[:, 0] == number, places[:, 1], -(10**9))
+        unlike.append(_measure_unlikeness(_describe(clip())[2], np.concatenate(bank), own_frames, APART_S * rate))
     usual = max(_find_median(unlike, seen), MIN_USUAL)
     result = []
     for number, (mask, values) in enumerate(zip(seen, unlike, strict=True)):

@@ -35,8 +35,8 @@ class FaceWindow:
     @staticmethod
     def place(x: float, y: float, side: float) -> FaceWindow:
         """Return the window whose middle is nearest to a point; of a side given, px."""
-        whole = max(1, round(side))
-        return FaceWindow(round(x - whole / 2), round(y - whole / 2), whole)
+        pixels = max(1, round(side))
+        return FaceWindow(round(x - pixels / 2), round(y - pixels / 2), pixels)
 
     def cut(self, image: Image) -> Image:
         """Return this part of a picture, scaled to ``SIZE_PX``; beyond the picture it is black."""
@@ -165,10 +165,8 @@ class FaceFollower:
         of_person, cuts, last = self._find_scenes(), [], None
         for index, scene in enumerate(self._scenes):
             if scene.thumbnails:
-                if last is not None and (index in of_person, True) != (
-                    last in of_person,
-                    scene.is_near(self._scenes[last]),
-                ):
+                is_same = last is None or (index in of_person) == (last in of_person)
+                if not is_same or (last is not None and not scene.is_near(self._scenes[last])):
                     cuts.append(self._scene_of_frame.index(index))
                 last = index
         return cuts

@@ -98,6 +98,18 @@ def open_video(path: Path, span: VideoSpan = WHOLE, *, longest_px: int | None = 
             yield OpenVideo(frames, tuple(rates), stated_s, damage)
 
 
+def read_stated_duration(path: Path) -> float:
+    """Return the duration that a video states, s; 0 if it states none, has no pictures or cannot be read."""
+    import av
+
+    try:
+        with open_media(path) as container:
+            streams = list_video(container)
+            return read_duration(container, streams[0]) if streams else 0.0
+    except (av.FFmpegError, ValueError, OSError):
+        return 0.0
+
+
 def damage_notes(video: OpenVideo, times_s: NDArray[np.float64], rate_hz: float) -> list[str]:
     """Return notes on pictures that cannot be decoded or are missing at the end; ``video`` was read to its end."""
     notes = []
@@ -184,8 +196,8 @@ def _check_size(path: Path, width: int, height: int, pixel_shape: float) -> None
         sides = f"{MIN_SIDE_PX} to {LONGEST_SIDE_PX}"
         raise InputError(f"{path}: pictures of {shown} × {height} pixels, required {sides}; scale the video")
     if shown * height > MAX_PIXELS:
-        most = f"at most {MAX_PIXELS} in all"
-        raise InputError(f"{path}: pictures of {shown} × {height} pixels, required {most}; scale the video")
+        required = f"at most {MAX_PIXELS} in all"
+        raise InputError(f"{path}: pictures of {shown} × {height} pixels, required {required}; scale the video")
 
 
 Array = NDArray[np.float64]

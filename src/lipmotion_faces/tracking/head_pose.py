@@ -5,7 +5,6 @@ In a mouth picture the head is upright, faces the camera and has always the same
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +20,10 @@ Array = NDArray[np.float64]
 ROUNDS = 3
 """Iterations of aligning to the mean face and averaging again. On GRID the second moves points by up to 4e-6 eye
 distances, the third by less than 1e-9."""
-_LIPS = [trackers.TRACKED_POINTS.index(index) for index in trackers.LIP_POINTS]
+_LIPS, _RIGID = (
+    [trackers.TRACKED_POINTS.index(index) for index in points]
+    for points in (trackers.LIP_POINTS, trackers.RIGID_POINTS)
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,15 +47,13 @@ class HeadPose:
         return (rotated + self.translation[:, None, :]) / self.unit
 
 
-def estimate_head_pose(points: Array, layout: Sequence[int]) -> HeadPose:
+def estimate_head_pose(points: Array) -> HeadPose:
     """Return the pose of a head in every frame.
 
-    points : array [shape=(T, N, 3)], any unit, x to the speaker's left, y up, z out of the face
-    layout : the face-mesh index of each of the N points; holds all of RIGID_POINTS
+    points : ``TRACKED_POINTS`` [shape=(T, N, 3)], any unit, x to the speaker's left, y up, z out of the face
     Source: Umeyama 1991 (one frame), Gower 1975 (the mean face).
     """
-    column = {index: n for n, index in enumerate(layout)}
-    rigid = points[:, [column[index] for index in trackers.RIGID_POINTS]]
+    rigid = points[:, _RIGID]
     face = rigid[0] - rigid[0].mean(axis=0)
     size = np.linalg.norm(face)
     for _ in range(ROUNDS):  # generalised Procrustes analysis
@@ -73,14 +73,14 @@ def estimate_head_pose(points: Array, layout: Sequence[int]) -> HeadPose:
     return HeadPose(axes @ rotation, scale, (translation - origin) @ axes.T, unit)
 
 
-def remove_head_motion(points: Array, layout: Sequence[int]) -> Array:
+def remove_head_motion(points: Array) -> Array:
     """Return the points in head coordinates, without the motion of the head [shape=(T, N, 3)].
 
-    points, layout : as in ``estimate_head_pose``
+    points : as in ``estimate_head_pose``
     The origin lies between the outer eye corners of the mean face, the unit is their distance, x points to the
     speaker's left, y up, z out of the face. Each frame moves as a whole, which keeps the motion of speech.
     """
-    return estimate_head_pose(points, layout).to_head_coordinates(points)
+    return estimate_head_pose(points).to_head_coordinates(points)
 
 
 def fit_similarities(points: Array, target: Array) -> tuple[Array, Array, Array]:
@@ -132,7 +132,7 @@ def map_face(points: Array) -> Array:
     lips are on average, so a nod neither moves nor shortens the mouth.
     """
     upright = points * (1, -1, -1)
-    pose = estimate_head_pose(upright, trackers.TRACKED_POINTS)
+    pose = estimate_head_pose(upright)
     depth = float(pose.to_head_coordinates(upright)[:, _LIPS, 2].mean())
     back = pose.rotation.transpose(0, 2, 1) / pose.scale[:, None, None]
     origin = back @ (np.array([0, 0, depth]) * pose.unit - pose.translation)[:, :, None]

@@ -99,7 +99,7 @@ def measure_motion(points: Array) -> Array:
     """Return ``CHANNELS`` [shape=(T, len(CHANNELS))] of points in px, y down, z away [shape=(T, N, 3)]."""
     unit = measure_distance(points, EYE_CORNERS)
     distances = np.stack([measure_distance(points, pair) / unit for pair in DISTANCES.values()], axis=1)
-    head = remove_head_motion(points * (1, -1, -1), TRACKED_POINTS)
+    head = remove_head_motion(points * (1, -1, -1))
     moving = head[:, [COLUMN[index] for index in (*LIP_POINTS, *JAW_POINTS)]]
     return np.concatenate([distances, moving.reshape(len(points), -1)], axis=1)
 
@@ -366,19 +366,19 @@ def decode_footage(footage: Footage, start: int = 0, stop: int | None = None) ->
     return _decode_between(footage, start, stop)
 
 
-def open_footage(footage: Footage, most_bytes: int = MAX_DECODED_BYTES) -> FrameGroups:
+def open_footage(footage: Footage, max_bytes: int = MAX_DECODED_BYTES) -> FrameGroups:
     """Return access to the frames of a tracked video in any order, also backwards, in bounded memory.
 
-    most_bytes : decoded frames that are kept
+    max_bytes : decoded frames that are kept
     Reading a frame raises InputError: the video cannot be read, or has changed since it was tracked.
     Cost: forwards each picture is decoded once; backwards, those between the video's own key frame and a group of up to
     ``GROUP`` frames are decoded again for every group. A video that is played backwards often is better copied into a
     ``coded_video.StoredVideo``.
     """
     frame_bytes = footage.size[0] * footage.size[1] * 3
-    length = min(GROUP, max(1, most_bytes // (3 * frame_bytes)))
+    length = min(GROUP, max(1, max_bytes // (3 * frame_bytes)))
     starts = [*range(0, len(footage), length), len(footage)]
-    return FrameGroups(_SequentialReader(footage), starts, most_bytes)
+    return FrameGroups(_SequentialReader(footage), starts, max_bytes)
 
 
 class _SequentialReader:

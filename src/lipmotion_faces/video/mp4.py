@@ -11,7 +11,7 @@ from heapq import merge
 from itertools import chain
 from operator import itemgetter
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,26 +36,19 @@ def append_xmp(path: Path, packet: str) -> None:
     if len(content) > LARGEST_PACKET_BYTES:
         raise ExportError(f"{path}: XMP metadata of {len(content)} bytes, at most {LARGEST_PACKET_BYTES} are possible")
     with path.open("r+b") as file:
-        ends = list(_list_ends(file))
-        if not ends or ends[-1] != file.seek(0, os.SEEK_END):
-            raise ExportError(
-                f"{path}: {file.tell()} bytes that are not whole boxes of an mp4 file; write the video again"
-            )
+        size, end = file.seek(0, os.SEEK_END), 0
+        while end + 8 <= size:  # the outermost boxes
+            file.seek(end)
+            (length,) = struct.unpack(">I4x", file.read(8))
+            if length == 1 and end + 16 <= size:
+                length = struct.unpack(">Q", file.read(8))[0]
+            if length < file.tell() - end:  # 0: until the end of the file, so nothing may follow; others: damaged
+                break
+            end += length
+        if not end or end != size:
+            raise ExportError(f"{path}: {size} bytes that are not whole boxes of an mp4 file; write the video again")
+        file.seek(size)
         file.write(struct.pack(">I4s", 24 + len(content), b"uuid") + XMP_UUID + content)
-
-
-def _list_ends(file: IO[bytes]) -> Iterator[int]:
-    """Yield where each of the outermost boxes ends."""
-    size, start = file.seek(0, os.SEEK_END), 0
-    while start + 8 <= size:
-        file.seek(start)
-        (length,) = struct.unpack(">I4x", file.read(8))
-        if length == 1 and start + 16 <= size:
-            length = struct.unpack(">Q", file.read(8))[0]
-        if length < file.tell() - start:  # 0: until the end of the file, so nothing may follow; others: damaged
-            return
-        start += length
-        yield start
 
 
 Frame = NDArray[np.uint8]

@@ -58,7 +58,7 @@ def mark_metadata(statement: str = STATEMENT) -> MarkMetadata:
     return MarkMetadata({"comment": statement, "keywords": f"{LABEL}, {SOURCE_TYPE}"}, xmp)
 
 
-def mark_frames(frames: Iterable[Frame], face: Box | None = None, label: str = LABEL) -> Iterator[Frame]:
+def mark_frames(frames: Iterable[Frame], face: Box | None = None) -> Iterator[Frame]:
     """Yield the frames with a small label in a corner, in the same place in all of them; the frames are not changed.
 
     frames : uint8 RGB [shape=(H, W, 3)], all of one size; taken one at a time
@@ -72,7 +72,7 @@ def mark_frames(frames: Iterable[Frame], face: Box | None = None, label: str = L
         raise InputError(f"face {face}, required: {required}")
     placed: tuple[int, int, NDArray[np.float32], NDArray[np.float32]] | None = None
     for frame in frames:
-        placed = placed or _place_label(frame.shape[0], frame.shape[1], face, label)
+        placed = placed or _place_label(frame.shape[0], frame.shape[1], face)
         top, left, ground, letters = placed
         marked = frame.copy()
         part = marked[top : top + ground.shape[0], left : left + ground.shape[1]]
@@ -81,7 +81,7 @@ def mark_frames(frames: Iterable[Frame], face: Box | None = None, label: str = L
 
 
 def _place_label(
-    height: int, width: int, face: Box | None, label: str
+    height: int, width: int, face: Box | None
 ) -> tuple[int, int, NDArray[np.float32], NDArray[np.float32]]:
     """Return top and left of the label in the first free corner, as large as possible, its ground and its letters.
 
@@ -89,7 +89,7 @@ def _place_label(
     """
     largest = max(SMALLEST_LETTERS_PX, round(LETTER_SHARE * min(height, width)))
     for size in range(largest, SMALLEST_LETTERS_PX - 1, -1):
-        ground, letters = _draw(label, size)
+        ground, letters = _draw(size)
         rows, columns = ground.shape
         space = round(EDGE_DISTANCE * size)
         for top in (height - space - rows, space):
@@ -100,24 +100,24 @@ def _place_label(
                 if inside and is_free:
                     return top, left, ground, letters
     raise ExportError(
-        f"no corner of the {width} × {height} px frame has room for the label {label!r} beside the face {face}; "
+        f"no corner of the {width} × {height} px frame has room for the label {LABEL!r} beside the face {face}; "
         "use a video with more space around the face, or the mark in the metadata alone"
     )
 
 
-def _draw(label: str, size: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return opacity and grey levels of a label: white letters of ``size`` px on a dark ground with round corners."""
+def _draw(size: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return opacity and grey levels of the label: white letters of ``size`` px on a dark ground with round corners."""
     from PIL import Image, ImageDraw, ImageFont
 
     font: Any = ImageFont.load_default(size)
-    left, top, right, bottom = font.getbbox(label)
+    left, top, right, bottom = font.getbbox(LABEL)
     across, down = round(0.45 * size), round(0.3 * size)
     room = (int(np.ceil(right - left)) + 2 * across, int(np.ceil(bottom - top)) + 2 * down)
     finer = Image.new("L", (room[0] * 4, room[1] * 4))
     ImageDraw.Draw(finer).rounded_rectangle((0, 0, room[0] * 4 - 1, room[1] * 4 - 1), 4 * down, fill=255)
     shape = np.asarray(finer.resize(room, Image.Resampling.BOX), np.float32) / 255
     text = Image.new("L", room)
-    ImageDraw.Draw(text).text((across - left, down - top), label, fill=255, font=font)
+    ImageDraw.Draw(text).text((across - left, down - top), LABEL, fill=255, font=font)
     letters = (LETTER_OPACITY / 255) * np.asarray(text, np.float32)
     ground = letters + (1 - letters) * GROUND_OPACITY * shape
     return ground.astype(np.float32), (255 * letters).astype(np.float32)

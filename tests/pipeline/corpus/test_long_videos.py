@@ -319,7 +319,6 @@ def test_times_that_are_missing():
     assert (first, second) == ((1.0, 3.0, ("hello", "you")), (3.0, 3.5, ("you",)))
 
 
-RATE_HZ = 16_000
 COUNT = 4
 
 
@@ -331,14 +330,14 @@ def voice(seed: int, late_s: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     def swell(time_s: np.ndarray) -> np.ndarray:
         return np.exp(0.8 * sum(np.sin(2 * np.pi * hertz * time_s + phase) for hertz, phase in tones))
 
-    time_s = np.arange(3 * RATE_HZ) / RATE_HZ
+    time_s = np.arange(3 * RATE) / RATE
     sound = 0.01 * swell(time_s - late_s) * draw.normal(size=len(time_s))
     return sound.astype(np.float32), 0.05 * np.log1p(swell(np.arange(75) / 25))
 
 
 def utterance(seed: int, late_s: float, collection: str) -> Utterance:
     samples, opening = voice(seed, late_s)
-    audio = Audio(samples, RATE_HZ)
+    audio = Audio(samples, RATE)
     found = Track(Motion(opening[:, None], 25.0, (Channel("opening"),)), np.ones(75, bool))
     source = {"collection": collection, "sha256": "0"}
     return Utterance(f"{collection}{seed}", audio, features_of(audio), found, ("a",), "train", source)
@@ -379,7 +378,7 @@ def test_sync_moves_what_is_late_once(corpus):
     moved = remove_offsets(corpus)
     assert moved["there"] == late_s
     again = Corpus.open(corpus.path)
-    shift = round(late_s * RATE_HZ)
+    shift = round(late_s * RATE)
     for seed in range(10, 10 + COUNT):
         name = f"there{seed}"
         one = again.utterance(name)

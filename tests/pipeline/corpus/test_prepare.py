@@ -281,14 +281,14 @@ def corpus_of(folder: Path, *texts: str | None) -> Corpus:
     return corpus
 
 
-def format_moods(path: Path, *lines: str) -> Path:
+def write_lines(path: Path, *lines: str) -> Path:
     path.write_text("\n".join(lines))
     return path
 
 
 def test_counts_and_shares(tmp_path):
     corpus = corpus_of(tmp_path / "corpus", "pab")
-    found = measure_coverage(corpus, format_moods(tmp_path / "text", "pab", "tib", "pab tib"), lexicon=WORDS)
+    found = measure_coverage(corpus, write_lines(tmp_path / "text", "pab", "tib", "pab tib"), lexicon=WORDS)
     phones, diphones, triphones = found.kinds
     assert (phones.needed, phones.covered) == (5, 3)
     assert phones.share == pytest.approx(8 / 12)
@@ -305,7 +305,7 @@ def test_counts_and_shares(tmp_path):
 def test_what_stands_in(tmp_path):
     corpus = corpus_of(tmp_path / "corpus", "pab pab tib")
     lexicon = Lexicon(WORDS.user | {"bad": (("b", "aa", "d"),), "dib": (("d", "iy", "m"),)})
-    text = format_moods(tmp_path / "text", "bad dib")
+    text = write_lines(tmp_path / "text", "bad dib")
     phones, diphones, triphones = measure_coverage(corpus, text, lexicon=lexicon).kinds
     stand_ins = {unit.unit: (unit.stand_in, unit.recorded) for unit in phones.missing}
     assert stand_ins["d"] == ("t", 1)
@@ -326,7 +326,7 @@ def test_the_nearest_has_the_least_distance(tmp_path, toy_corpus):
     for name in toy_corpus.names():
         phones = [p for word in toy_corpus.utterance(name).words or () for p in lexicon.pronunciations(word)[0]]
         recorded.update(zip(["sil", *phones[:-1]], phones, [*phones[1:], "sil"], strict=True))
-    _, _, triphones = measure_coverage(toy_corpus, format_moods(tmp_path / "text", "please judge the toys")).kinds
+    _, _, triphones = measure_coverage(toy_corpus, write_lines(tmp_path / "text", "please judge the toys")).kinds
     assert triphones.missing
 
     def cost(wanted: tuple[str, ...], other: tuple[str, ...]) -> float:
@@ -346,7 +346,7 @@ def test_labelled_phones_count_and_silence_divides_them(tmp_path):
     step_s = utterance.audio.duration_s / len(names)
     spans = tuple(Span(n * step_s, (n + 1) * step_s, Unit(name)) for n, name in enumerate(names))
     corpus.add(replace(utterance, phones=Timeline(spans), words=("tib",)))
-    phones, diphones, _ = measure_coverage(corpus, format_moods(tmp_path / "text", "pab tib"), lexicon=WORDS).kinds
+    phones, diphones, _ = measure_coverage(corpus, write_lines(tmp_path / "text", "pab tib"), lexicon=WORDS).kinds
     assert {unit.unit for unit in phones.missing} == {"t", "iy"}
     assert "aa-b" in {unit.unit for unit in diphones.missing}
     assert "p-aa" not in {unit.unit for unit in diphones.missing}

@@ -113,7 +113,7 @@ def test_a_corpus_with_its_videos(tmp_path, make_videos):
     ],
 )
 def test_footage_of_a_folder_is_bounded(make_videos, monkeypatch, durations_s, used_s):
-    monkeypatch.setattr(takes, "_read_duration", lambda take: durations_s[int(take.name)])
+    monkeypatch.setattr(takes, "read_stated_duration", lambda file: durations_s[int(file.stem)])
     found = choose_takes(make_videos(*(f"{number:02}" for number in range(len(durations_s)))))
     used = {each.name: min(each.span.end_s - each.span.start_s, durations_s[int(each.name)]) for each in found}
     assert sum(used.values()) == pytest.approx(MAX_FOOTAGE_S)
