@@ -24,17 +24,18 @@ def events(done: Done) -> list[dict[str, object]]:
     return [json.loads(line) for line in done.err]
 
 
-def test_it_is_the_functions_of_the_same_names_and_without_a_file_it_is_printed(
-    run, basics, here, toy_speech, toy_model_file
-):
-    generation = animate(toy_speech, model=load_model(toy_model_file))
+def test_without_a_file_it_is_printed(run, basics, here, toy_speech, toy_model_file):
+    sheet = cues(animate(toy_speech, model=load_model(toy_model_file)))
     for form in ("tsv", "xml", "json", "dat"):
         done = run(*basics, *(() if form == "tsv" else ("-f", form)))
-        assert done == (0, CUE_FORMATS[form].text(cues(generation), str(toy_speech)).splitlines(), [])
+        assert done == (0, CUE_FORMATS[form].text(sheet, str(toy_speech)).splitlines(), [])
     assert list(here.iterdir()) == []
+
+
+def test_it_is_the_functions_of_the_same_names(run, basics, here, toy_speech, toy_model_file):
     done = run(*basics, "-o", "a.tsv", "a.xml", "-o", "a.json", "a.dat", "--fps", "30", "--hold", "4", "--shapes", "GX")
     assert done == (0, ["a.tsv", "a.xml", "a.json", "a.dat"], [])
-    sheet = cues(generation, fps=30, hold_frames=4, shapes="GX")
+    sheet = cues(animate(toy_speech, model=load_model(toy_model_file)), fps=30, hold_frames=4, shapes="GX")
     write_cues(sheet, ["b.tsv", "b.xml", "b.json", "b.dat"], speech=toy_speech)
     for form in ("tsv", "xml", "json", "dat"):
         assert (here / f"a.{form}").read_bytes() == (here / f"b.{form}").read_bytes()

@@ -226,8 +226,7 @@ def keys(lines: list[str]) -> list[str]:
     return re.findall(r"^@\w+\{(\w+),$", "\n".join(lines), flags=re.MULTILINE)
 
 
-def test_models_engines_and_keys_are_cited(run, coupled_model_file):
-    """By default the shipped model."""
+def test_the_shipped_model_is_cited_by_default(run, coupled_model_file):
     done = run("cite")
     assert (done.code, done.err) == (0, [])
     assert keys(done.out) == ["lipmotion", *ENGINE_KEYS["trajectory"], "cooke2006"]
@@ -235,6 +234,9 @@ def test_models_engines_and_keys_are_cited(run, coupled_model_file):
     done = run("cite", coupled_model_file)
     assert (done.code, done.err) == (0, [])
     assert keys(done.out) == ["lipmotion", *ENGINE_KEYS["coupled"]]
+
+
+def test_engines_and_keys(run):
     for name in sorted(ENGINE_KEYS):
         assert keys(run("cite", name).out) == ["lipmotion", *ENGINE_KEYS[name]]
     for key in set(bibliography()) - {"lipmotion"}:
@@ -252,6 +254,9 @@ def test_every_entry_is_whole():
         assert entry.count("{") == entry.count("}")
         assert {"author", "title", "year"} <= set(re.findall(r"^ {2}(\w+) +=", entry, flags=re.MULTILINE))
         assert entry.endswith("\n}")
+
+
+def test_what_a_header_adds():
     header = {"engine": "joint", "visual": "both", "adapted": {}, "attribution": ["GRID corpus, CC BY 4.0", "a; b"]}
     text = list_model_citations(header)
     assert keys(text.splitlines()) == ["lipmotion", *ENGINE_KEYS["joint"], "xieliu2007", "gales1998", "cooke2006"]
