@@ -303,20 +303,28 @@ def test_eyes_and_head_move_on_while_the_mouth_is_held(generation, tmp_path):
 
 
 def test_moods_are_channels_that_the_intensity_leaves_and_the_offset_moves(generation):
-    """And words say the mood after the one that is asked for."""
     found = deliver(generation, Delivery(mood="happy:0.5, neutral at 1.0", intensity=2.0, offset_ms=500)).motion
     assert found.names == (*generation.motion.names, "mood_happy")
     assert found["mood_happy"][[0, 100, -1]] == pytest.approx([0.5, 0.5, 0.0])
     again = deliver(replace(generation, motion=found), Delivery())
     assert np.array_equal(again.motion.values, found.values)
-    stepped = deliver_to_face(generation, Delivery(mood="happy, sad at 1.0", stepped=True), 25.0)  # moods move on
+
+
+def test_moods_move_on_while_the_mouth_is_held(generation):
+    stepped = deliver_to_face(generation, Delivery(mood="happy, sad at 1.0", stepped=True), 25.0)
     assert "mood_sad" not in stepped.stepped
     assert len(np.unique(stepped.motion["mood_sad"])) > 6
+
+
+def test_words_say_the_mood_after_the_one_that_is_asked_for(generation):
     tagged = replace(generation, moods=(MoodKey(1.0, "sad"),))
     assert deliver(tagged, Delivery()).motion["mood_sad"][[0, -1]] == pytest.approx([0, 1])
     both = deliver(tagged, Delivery(mood="happy")).motion
     assert (both["mood_happy"][0], both["mood_sad"][-1]) == (1, 1)
     assert both["mood_happy"][-1] == pytest.approx(0)
+
+
+def test_neutral_is_what_no_mood_is(generation):
     plain, neutral = (deliver(generation, Delivery(mood=mood)).motion for mood in ("", "neutral"))
     assert neutral.names == plain.names
     assert np.array_equal(neutral.values, plain.values)
