@@ -77,25 +77,23 @@ def test_hours_lose_no_precision():
     assert score == pytest.approx(30_000 * -79.75 - 29_999 * 0.5, rel=1e-6)
 
 
-def both(monkeypatch, log_emission: np.ndarray, arrays: dict, beam: float | None = None) -> list:
+def both(monkeypatch, log_emission: np.ndarray, arrays: dict) -> list:
     """Return the paths and scores of NumPy and of the compiled form."""
     found = []
     for compiled in (False, True):
         load_numba(monkeypatch, compiled)
-        found.append(paths.best_path(*asked(log_emission), NetworkArrays(**arrays), beam=beam))
+        found.append(paths.best_path(*asked(log_emission), NetworkArrays(**arrays)))
     return found
 
 
-@pytest.mark.parametrize("beam", [None, 2.0, 20.0])
 @pytest.mark.parametrize("seed", range(2))
-def test_both_forms_find_the_same_to_the_bit(seed, beam, monkeypatch):
+def test_both_forms_find_the_same_to_the_bit(seed, monkeypatch):
     arrays, _ = phone_loop(seed) if seed % 2 else random_network(seed, states=9, densities=4, density_of_arcs=0.4)
     log_emission = random_emission(seed, 90, len(arrays["emission"]))
-    (plain, score), (fast, same_score) = both(monkeypatch, log_emission, arrays, beam)
+    (plain, score), (fast, same_score) = both(monkeypatch, log_emission, arrays)
     assert score == same_score
-    assert np.isfinite(score) or beam is not None
-    if np.isfinite(score):
-        assert np.array_equal(plain, fast)
+    assert np.isfinite(score)
+    assert np.array_equal(plain, fast)
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -107,30 +105,17 @@ def test_ties_are_broken_alike(seed, monkeypatch):
     assert np.array_equal(plain, fast)
 
 
-def test_a_wide_beam_drops_nothing_and_a_narrow_one_the_better_late_path():
-    chain = left_to_right(2)
-    chain["log_initial"] = chain["log_final"] = np.zeros(2, np.float32)
-    chain["arc_from"] = chain["arc_start"] = np.arange(2)  # two loops, no arc between them
-    chain["arc_log"] = np.zeros(2, np.float32)
-    log_emission = np.array([[0, -10], [0, 0], [-30, 0]], np.float32)
-    assert paths.best_path(*asked(log_emission), NetworkArrays(**chain))[0].tolist() == [1, 1, 1]
-    assert paths.best_path(*asked(log_emission), NetworkArrays(**chain), beam=50.0)[0].tolist() == [1, 1, 1]
-    path, score = paths.best_path(*asked(log_emission), NetworkArrays(**chain), beam=5.0)
-    assert path.tolist() == [0, 0, 0]
-    assert score == -30
-
-
 def test_wide_windows_change_nothing_and_narrow_ones_are_kept():
     states, frames = 60, 900
     log_emission, chain = random_emission(3, frames, 7), NetworkArrays(**left_to_right(states, 7))
     everywhere = Windows(np.zeros(states, np.intp), np.full(states, frames))
     free, score = paths.best_path(*asked(log_emission), chain)
-    path, same = paths.best_path(*asked(log_emission), chain, None, everywhere, 37)
+    path, same = paths.best_path(*asked(log_emission), chain, everywhere, 37)
     assert np.array_equal(path, free)
     assert same == pytest.approx(score, abs=0.1)
     middles = np.linspace(0, frames, states).astype(np.intp)
     windows = Windows(np.maximum(middles - 40, 0), np.minimum(middles + 40, frames))
-    path, less = paths.best_path(*asked(log_emission), chain, None, windows, 37)
+    path, less = paths.best_path(*asked(log_emission), chain, windows, 37)
     assert less <= score + 0.1
     assert np.all(windows.first[path] <= np.arange(frames))
     assert np.all(np.arange(frames) < windows.end[path])
@@ -147,7 +132,7 @@ def test_what_is_in_memory_does_not_grow_with_the_recording():
 
     middles = np.linspace(0, frames, states).astype(np.intp)
     windows = Windows(np.maximum(middles - 60, 0), np.minimum(middles + 60, frames))
-    path, score = paths.best_path(log_emission, frames, NetworkArrays(**left_to_right(states, 7)), windows=windows)
+    path, score = paths.best_path(log_emission, frames, NetworkArrays(**left_to_right(states, 7)), windows)
     assert np.isfinite(score)
     assert (path[0], path[-1]) == (0, states - 1)
     assert max(seen) <= paths.WINDOW_BLOCK + 1

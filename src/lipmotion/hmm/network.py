@@ -90,16 +90,11 @@ class Network(NetworkArrays):
     """States joined by arcs, in which the best path can be searched."""
 
     def best_path(
-        self,
-        log_likelihoods: LogLikelihoods,
-        chosen: NDArray[np.intp] | None = None,
-        beam: float | None = None,
-        windows: Windows | None = None,
+        self, log_likelihoods: LogLikelihoods, chosen: NDArray[np.intp] | None = None, windows: Windows | None = None
     ) -> NDArray[np.intp]:
         """Return the states of the best path [shape=(T,)].
 
         chosen  : the densities that ``emission`` numbers; None: all
-        beam    : states with a score lower than the best of the frame by more than this are dropped; None: exact
         windows : the frames that each state may have; None: any
         Raises AlignmentError: no path reaches the end.
         """
@@ -109,7 +104,7 @@ class Network(NetworkArrays):
         def log_emission(first: int, end: int) -> NDArray[np.float32]:
             return log_likelihoods.log_density(first, end, chosen) if cached is None else cached[first:end]
 
-        path, score = best_path(log_emission, frames, self, beam, windows)
+        path, score = best_path(log_emission, frames, self, windows)
         if not np.isfinite(score):
             raise AlignmentError(
                 f"no path through {len(self.emission)} states in {frames} frames of 10 ms: "
