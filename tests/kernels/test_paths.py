@@ -77,31 +77,21 @@ def test_hours_lose_no_precision():
     assert score == pytest.approx(30_000 * -79.75 - 29_999 * 0.5, rel=1e-6)
 
 
-def both(monkeypatch, log_emission: np.ndarray, arrays: dict) -> list:
-    """Return the paths and scores of NumPy and of the compiled form."""
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("is_tied", [False, True])
+def test_both_forms_find_the_same_to_the_bit_and_break_ties_alike(seed, is_tied, monkeypatch):
+    is_loop = is_tied or seed % 2
+    arrays, _ = phone_loop(seed) if is_loop else random_network(seed, states=9, densities=4, density_of_arcs=0.4)
+    log_emission = random_emission(seed, 90, len(arrays["emission"]))
+    if is_tied:
+        arrays["arc_log"], log_emission = np.round(arrays["arc_log"]), np.round(log_emission / 4)
     found = []
     for compiled in (False, True):
         load_numba(monkeypatch, compiled)
         found.append(paths.best_path(*asked(log_emission), NetworkArrays(**arrays)))
-    return found
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_both_forms_find_the_same_to_the_bit(seed, monkeypatch):
-    arrays, _ = phone_loop(seed) if seed % 2 else random_network(seed, states=9, densities=4, density_of_arcs=0.4)
-    log_emission = random_emission(seed, 90, len(arrays["emission"]))
-    (plain, score), (fast, same_score) = both(monkeypatch, log_emission, arrays)
+    (plain, score), (fast, same_score) = found
     assert score == same_score
     assert np.isfinite(score)
-    assert np.array_equal(plain, fast)
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_ties_are_broken_alike(seed, monkeypatch):
-    arrays, _ = phone_loop(seed)
-    arrays["arc_log"] = np.round(arrays["arc_log"])
-    log_emission = np.round(random_emission(seed, 60, len(arrays["emission"])) / 4)
-    (plain, _), (fast, _) = both(monkeypatch, log_emission, arrays)
     assert np.array_equal(plain, fast)
 
 
