@@ -20,6 +20,7 @@ from lipmotion.engines.coupled.conversion import (
     UPDATES,
     RegressionInputs,
     VisualRegression,
+    group_index,
     sum_precisions,
 )
 from lipmotion.motion.articulation import ArticulationPrior
@@ -196,7 +197,7 @@ class CoupledModel:
         """The limits of the means of all densities."""
         low, high = np.zeros(self.space.dimensions), np.zeros(self.space.dimensions)
         for number, stream in enumerate(self.visual, start=1):
-            group = next(group for group in self.chains.groups if number in group.streams)
+            group = self.chains.groups[group_index(self.chains, number)]
             means = group.stream_mixtures(number).means.astype(float)
             flat = means.reshape(-1, means.shape[2])
             poses = stream.unstandardised(flat, np.ones_like(flat))[0][:, 0]
@@ -220,10 +221,8 @@ class CoupledModel:
                 mean = weighted / np.maximum(precision, 1e-300)
             else:
                 posterior = inference.posteriors.chains[self.chains.structure.chain_of(number + 1)]
-                mean, precision = (
-                    regressions[number].means(inputs, posterior),
-                    regressions[number].precisions(posterior),
-                )
+                regression = regressions[number]
+                mean, precision = regression.means(inputs, posterior), regression.precisions(posterior)
             means[:, :, stream.columns], precisions[:, :, stream.columns] = stream.unstandardised(mean, precision)
         away = self.is_away_from_speech(inference.posteriors.chains[0])
         means[away] = 0

@@ -205,12 +205,8 @@ class Product:
     @cached_property
     def lead(self) -> Index:
         """The asynchrony: how many states each chain is ahead of the first in each joint state [shape=(C, S)]."""
-        count = self.structure.states
-        progress = [
-            [state + count * ahead for state, ahead in zip(joint.states, joint.ahead, strict=True)]
-            for joint in self.joint_states
-        ]
-        positions = np.array(progress).T
+        _, states, ahead = (np.array(part, np.intp).T for part in zip(*self.joint_states, strict=True))
+        positions = states + self.structure.states * ahead
         return positions - positions[0]
 
 
@@ -220,13 +216,10 @@ def find_reachable(structure: Structure, grammar: Grammar) -> Product:
     All chains go through corresponding units; those without a limit of asynchrony are not listed, but ``lattice``'s.
     """
     chains = range(len(structure.chains))
-    none_ahead, first_states = (False,) * len(chains), (0,) * len(chains)
-    initial_states = {
-        JointState(tuple(structure.corresponding_units[c][unit] for c in chains), first_states, none_ahead): float(
-            probability
-        )
-        for unit, probability in enumerate(grammar.initial[0])
-    }
+    initial_states = {}
+    for unit, probability in enumerate(grammar.initial[0].tolist()):
+        units = tuple(structure.corresponding_units[c][unit] for c in chains)
+        initial_states[JointState(units, (0,) * len(chains), (False,) * len(chains))] = probability
     reached: dict[JointState, list[_Successor]] = {}
     waiting = deque(initial_states)
     while waiting:
