@@ -30,7 +30,7 @@ def sample(mean_of, frames=20, seed=0):
 
 def grown(values, questions=QUESTIONS, contexts=CONTEXTS, sums=None, likelihood=score_gaussian, **options):
     statistics = (sums or statistics_of)(values)
-    options = {"parameters": 4, "factor": 1.0, "least": 10.0} | options
+    options = {"parameters": 4, "factor": 1.0, "min_frames": 10.0} | options
     return grow_tree(contexts, statistics, questions, likelihood, **options)
 
 
@@ -57,7 +57,7 @@ def test_pure_noise_is_not_split():
 
 def test_no_leaf_has_fewer_frames_than_asked_for():
     values = sample(lambda context: float(UNITS.index(context[0]) * 4 + UNITS.index(context[1])))
-    tree = grown(values, least=100.0)
+    tree = grown(values, min_frames=100.0)
     assert len(tree.leaves) > 1
     assert tree.frames[tree.leaves].min() >= 100
 

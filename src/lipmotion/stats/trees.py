@@ -110,24 +110,24 @@ POSITIONS = ("left", "unit", "right")
 _STORED_POSITIONS = [str(position) for position in range(len(POSITIONS))]
 
 
-def score_gaussian(statistics: Array, least_variance: float = MIN_VARIANCE) -> Array:
+def score_gaussian(statistics: Array, min_variance: float = MIN_VARIANCE) -> Array:
     """Return the log likelihood of frames under their maximum-likelihood diagonal Gaussian [shape=(N,)].
 
     statistics     : [shape=(N, 1 + 2·D)]: number of frames, sums, sums of squares
-    least_variance : of the Gaussian; without it the likelihood of a few equal frames has no limit
+    min_variance : of the Gaussian; without it the likelihood of a few equal frames has no limit
     """
     count = np.maximum(statistics[:, :1], 1e-12)
     sums, squares = np.split(statistics[:, 1:] / count, 2, axis=1)
     spread = np.maximum(squares - sums * sums, 0.0)
-    variance = np.maximum(spread, least_variance)
+    variance = np.maximum(spread, min_variance)
     return -0.5 * count[:, 0] * (np.log(2 * np.pi * variance) + spread / variance).sum(axis=1)
 
 
-def score_multispace(statistics: Array, least_variance: float = MIN_VARIANCE) -> Array:
+def score_multispace(statistics: Array, min_variance: float = MIN_VARIANCE) -> Array:
     """Return the log likelihood of frames, some without a value, under their maximum-likelihood density [shape=(N,)].
 
     statistics : [shape=(N, 2 + 2·D)]: number of frames, of frames with a value, and their sums and sums of squares
-    least_variance : as in ``score_gaussian``
+    min_variance : as in ``score_gaussian``
     The density is a Gaussian for frames with a value and a point mass for those without one.
     """
     count, voiced = statistics[:, 0], statistics[:, 1]
@@ -135,7 +135,7 @@ def score_multispace(statistics: Array, least_variance: float = MIN_VARIANCE) ->
     likelihood = np.zeros(len(count))
     for part in (np.maximum(voiced, 0.0), np.maximum(count - voiced, 0.0)):
         likelihood += part * np.log(np.where(part > 0, part, total) / total)
-    return likelihood + np.where(voiced > 0, score_gaussian(statistics[:, 1:], least_variance), 0.0)
+    return likelihood + np.where(voiced > 0, score_gaussian(statistics[:, 1:], min_variance), 0.0)
 
 
 def grow_tree(
@@ -146,7 +146,7 @@ def grow_tree(
     *,
     parameters: int,
     factor: float,
-    least: float,
+    min_frames: float,
 ) -> Tree:
     """Return the tree in which every split raises the log likelihood by more than its description length.
 
@@ -154,7 +154,7 @@ def grow_tree(
     statistics : of each context [shape=(C, K)], additive, the number of frames first
     log_likelihood : function of statistics
     parameters : number of parameters of a density; a split adds as many, of price ``factor`` · ½ log(frames) each
-    least      : frames that a leaf must have
+    min_frames : frames that a leaf must have
     Source: Shinoda & Watanabe 2000 (minimum description length).
     """
     questions = tuple(questions)
@@ -168,7 +168,7 @@ def grow_tree(
         """Return the number of the question with the largest gain; -1: no gain exceeds the price."""
         total = statistics[members].sum(axis=0)
         yes = answers[:, members] @ statistics[members]
-        allowed = np.nonzero((yes[:, 0] >= least) & (total[0] - yes[:, 0] >= least))[0]
+        allowed = np.nonzero((yes[:, 0] >= min_frames) & (total[0] - yes[:, 0] >= min_frames))[0]
         if not len(allowed):
             return -1
         unsplit = log_likelihood(total[None])

@@ -35,7 +35,7 @@ def test_motion_that_is_not_stored_is_a_line_between_its_edges() -> None:
     units = recorded(timeline("s aa"), timeline("iy s"))
     assert len(units.values) == 82
     motion = np.arange(20.0)[:, None]
-    cut = replace(units, kept=np.array([[5, 15], [31, 36], [60, 65]]), motion=motion)
+    cut = replace(units, stored_ranges=np.array([[5, 15], [31, 36], [60, 65]]), motion=motion)
     assert cut.values[:6, 0] == pytest.approx([0] * 6)
     assert cut.values[14:32, 0] == pytest.approx(np.linspace(9, 10, 18))
     assert cut.values[35:41, 0] == pytest.approx([14] * 6)

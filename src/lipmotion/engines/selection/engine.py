@@ -158,7 +158,7 @@ class SelectionEngine(Engine[SelectionModel]):
                     "give the corpus that the model learned"
                 )
         sound = np.concatenate([np.asarray(features[name], float) for name in inventory.names])
-        inventory = replace(inventory, kept=np.array([[0, len(sound)]]), motion=sound, predicted=None)
+        inventory = replace(inventory, stored_ranges=np.array([[0, len(sound)]]), motion=sound, predicted=None)
         costs = Costs(inventory, replace(self.config, **SOUND), 1 / np.maximum(sound.std(axis=0), 1e-9))
         target = costs.target(list_windows([units]), None, None)
         chosen = select(costs, target)[0]

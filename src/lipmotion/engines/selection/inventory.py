@@ -229,7 +229,7 @@ class RecordedUnits:
     windows   : the units, recording by recording; times are seconds in their recording
     usable    : whether the motion of each unit was measured throughout [shape=(U,)]
     first     : the row of ``values`` at which each recording begins; the last number is that of all rows [shape=(R+1,)]
-    kept      : the first row and the one after the last of each range whose motion is stored, in order [shape=(K, 2)]
+    stored_ranges : the first row and the one after the last of each range of stored motion, in order [shape=(K, 2)]
     motion    : there, in the motion space, 100 rows a second; stored in half precision [shape=(N, Q)]
     predicted : what the guide predicts at ``POINTS`` of each unit, reduced [shape=(U, POINTS, D)]; None: no guide
     """
@@ -238,14 +238,14 @@ class RecordedUnits:
     windows: PhoneWindows
     usable: NDArray[np.bool_]
     first: NDArray[np.intp]
-    kept: NDArray[np.intp]
+    stored_ranges: NDArray[np.intp]
     motion: NDArray[np.floating[Any]]
     predicted: NDArray[np.float16] | None
 
     @cached_property
     def values(self) -> Array:
         """The motion of all recordings [shape=(F, Q)]; silence that is not stored is a line."""
-        stored = np.concatenate([np.arange(first, stop) for first, stop in self.kept.tolist()])
+        stored = np.concatenate([np.arange(first, stop) for first, stop in self.stored_ranges.tolist()])
         rows, frames = self.motion.astype(float), np.arange(self.first[-1])
         if len(rows) == len(frames):
             return rows

@@ -281,7 +281,7 @@ def _fit_emission(clips: Sequence[TrainingClip], options: TrajectoryConfig, layo
             score_gaussian,
             parameters=2 * overall.size,
             factor=options.tree_factor,
-            least=options.least_frames,
+            min_frames=options.least_frames,
         )
         for name, contexts in grouped.items()
     }

@@ -255,10 +255,10 @@ def grow_forest(
             list(index) or [("", "", "")],
             pooled,
             [q if q.position in asked else q._replace(members=frozenset()) for q in questions],  # always no
-            partial(likelihood, least_variance=config.variance_floor),
+            partial(likelihood, min_variance=config.variance_floor),
             parameters=values.shape[1] - 1,
             factor=config.tree_factor,
-            least=config.least_frames,
+            min_frames=config.least_frames,
         )
     return Forest(inventory, {name: Tree(questions, tree.asked, tree.no, tree.frames) for name, tree in trees.items()})
 
