@@ -1,7 +1,7 @@
 """Known unit models, and utterances drawn from them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,7 +34,7 @@ def random_hmm(
             if table.side(unit, state)
         }
     )
-    table = table.extend(tuple(draw.permutation(possible)[:contexts].tolist()))
+    table = replace(table, names=(*table.names, *draw.permutation(possible)[:contexts].tolist()))
     shape = (len(table.names), 2, 2)
     mixtures = Mixtures(
         np.log(draw.dirichlet((2, 2), shape[0])).astype(np.float32),

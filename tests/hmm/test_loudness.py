@@ -83,7 +83,7 @@ def test_loud_frames_are_neither_aligned_with_silence_nor_chosen_as_pauses():
     hmm, features, edges, loud = stranger()
     units, words = (SILENCE, "a", "b", SILENCE), ((("a",),), (("b",),))
     free = network.compute_log_likelihoods(hmm, features)
-    bound = network.penalise_silence(hmm, free, loud)
+    bound = network.penalise(hmm, free, loud, silent=True)
     without, bounds = align.align_units(hmm, free, units), align.align_units(hmm, bound, units)
     assert without[3] - without[1] < 8
     assert (bounds[1], bounds[3]) == (edges[1], edges[3])
@@ -106,7 +106,8 @@ def test_quiet_frames_are_silence_whatever_they_sound_like():
     hmm, features, _, _loud = stranger()
     quiet = np.zeros(len(features), bool)
     quiet[:4] = True
-    values = network.penalise_speech(hmm, network.compute_log_likelihoods(hmm, features), quiet).log_density(2, 6, None)
+    free_of_speech = network.penalise(hmm, network.compute_log_likelihoods(hmm, features), quiet, silent=False)
+    values = free_of_speech.log_density(2, 6, None)
     free = [hmm.table.density(SILENCE, 0), hmm.table.density(PAUSE, 0)]
     assert set(values[:2].argmax(axis=1)) <= {hmm.table.density(SILENCE, k) for k in range(3)} | set(free)
     plain = network.compute_log_likelihoods(hmm, features).log_density(2, 6, None)

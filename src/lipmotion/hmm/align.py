@@ -138,13 +138,12 @@ def place_words(
         ends: list[tuple[int, float]] = []
         for choice in choices:
             if slot == 0:
-                builder.initial(len(nodes))
+                builder.initial[len(nodes)] = 0.0
             ends += _append_units(builder, hmm, choice.units, open_ends, pause if choice.word >= 0 else "")
             counts = [hmm.table.count(unit) for unit in choice.units]
             nodes += [(choice, slot, place) for place, count in enumerate(counts) for _ in range(count)]
         open_ends = ends
-    for state, move in open_ends:
-        builder.final(state, move)
+    builder.final.update(open_ends)
     plain = np.arange(len(hmm.log_stay), dtype=np.intp)
     slot_of = np.array([slot for _, slot, _ in nodes])
     of_states = None

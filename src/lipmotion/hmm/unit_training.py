@@ -440,6 +440,6 @@ def add_contexts(hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: S
             chain, path = align_states(hmm, compute_log_likelihoods(hmm, x), sequence)
             frames.update(chain.names[position] for position in path)
     frequent = {name for name, count in frames.items() if count >= hmm.config.context_frames}
-    table = hmm.table.extend(tuple(sorted(frequent - set(hmm.table.names))))
+    table = replace(hmm.table, names=(*hmm.table.names, *sorted(frequent - set(hmm.table.names))))
     new = hmm.mixtures.select(table.parents()[len(hmm.log_stay) :])
     return replace(hmm, table=table, mixtures=hmm.mixtures.concatenate(new))

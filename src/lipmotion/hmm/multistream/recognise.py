@@ -154,10 +154,10 @@ def _join_units(
             for source in last.numbers[:, last.right[place[following]]].tolist():
                 for target in entered.numbers[entered.left[place[unit]]].tolist():
                     builder.arc(source, target, score)
-        for node in first.numbers[first.left[place[silence]]].tolist():
-            builder.initial(node, hmm.config.insertion if unit == silence else _language_score(hmm, silence, unit))
-        for node in last.numbers[:, last.right[place[silence]]].tolist():
-            builder.final(node, leave + (0.0 if unit == silence else _language_score(hmm, unit, silence)))
+        begin = hmm.config.insertion if unit == silence else _language_score(hmm, silence, unit)
+        builder.initial.update(dict.fromkeys(first.numbers[first.left[place[silence]]].tolist(), begin))
+        end = leave + (0.0 if unit == silence else _language_score(hmm, unit, silence))
+        builder.final.update(dict.fromkeys(last.numbers[:, last.right[place[silence]]].tolist(), end))
 
 
 def _language_score(hmm: JointHmm, unit: str, following: str) -> float:

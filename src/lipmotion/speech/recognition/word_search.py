@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, MissingDependencyError
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.hmm.network import LogLikelihoods, UnitLoop, decode_path, penalise_silence, wrap_log_likelihoods
+from lipmotion.hmm.network import LogLikelihoods, UnitLoop, decode_path, penalise, wrap_log_likelihoods
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.speech.recognition.general import NOISES
 from lipmotion.speech.recognition.network.beam_search import decode_words, load_english, score_stretch
@@ -281,7 +281,8 @@ def _align(
 ) -> AlignedWords | None:
     """Return words as they are aligned with the log likelihoods of a stretch; None: there is not room for them all."""
     try:
-        return align_recognised_words(hmm, penalise_silence(hmm, wrap_log_likelihoods(values), loud), words, lexicon)
+        log_likelihoods = penalise(hmm, wrap_log_likelihoods(values), loud, silent=True)
+        return align_recognised_words(hmm, log_likelihoods, words, lexicon)
     except AlignmentError:
         return None
 
