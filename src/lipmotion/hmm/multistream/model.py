@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
 
@@ -185,7 +185,6 @@ class JointConfig:
     variance_floor : least variance, as a share of a dimension's overall variance
     bigram_weight, insertion : scale of the log bigram, and log insertion penalty of every unit, in recognition
     training, recognition, synthesis : weights of the streams in each
-    Raises InputError: a number out of its range.
     """
 
     states: int = 3
@@ -202,18 +201,6 @@ class JointConfig:
     training: StreamWeights = field(default=StreamWeights())
     recognition: StreamWeights = field(default=ACOUSTIC_ONLY)
     synthesis: StreamWeights = field(default=MOTION_ONLY)
-
-    def __post_init__(self) -> None:
-        for each in fields(self):
-            value = getattr(self, each.name)
-            if each.type == "int" and (not isinstance(value, int) or value < 1):
-                raise InputError(f"{each.name} is {value!r}, required a whole number from 1")
-            if each.type == "float" and not np.isfinite(value):
-                raise InputError(f"{each.name} is {value}, required a finite number")
-        if min(self.tree_factor, self.least_frames, self.variance_floor) <= 0:
-            raise InputError("tree_factor, least_frames and variance_floor must be more than 0")
-        if not self.training.active:
-            raise InputError("all streams are switched off in training; give at least one a weight")
 
 
 def grow_forest(
