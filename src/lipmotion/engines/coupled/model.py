@@ -47,7 +47,7 @@ class CoupledConfig(Configuration):
     asynchrony : number of states that chains may be apart; -1: no limit, of two factorial chains
     cross_units : let chains leave a unit at different times
     start_asynchrony, unseen_loss : of factorial chains without a limit: how far apart the chains may be while the first
-                 densities are learned, and the nats that rare joint states lose (``chains.structures.Structure``)
+                 densities are learned, and the nats that rare joint states lose (``chains.product.Structure``)
     moves_together : coupled chains may move on in the same frame more often than by chance; the paper's may not
     mixtures, visual_mixtures : Gaussians per state, of the speech stream and of visual streams (powers of two); the
                  structure ``hmm`` uses the first for both
@@ -58,7 +58,7 @@ class CoupledConfig(Configuration):
                  and of eigenlips
     conversion : ``trajectory``: parameter generation from expected precisions and means of static values, Δ and Δ²;
                  ``em``: the paper's, frame by frame;  ``viterbi``: means along the best path
-    start, update, steps : of EM conversion (``conversion.em_conversion.convert``); ``trajectory`` takes no
+    start, update, steps : of EM conversion (``conversion.convert``); ``trajectory`` takes no
                  steps after its soft start unless asked to
     acoustic_regression : regress visual means on the acoustic features and state posteriors around the frame
                  (``trajectory`` only)

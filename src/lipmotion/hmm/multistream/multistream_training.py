@@ -290,7 +290,7 @@ def grow_joint(
     Raises InputError: an unknown unit, or no stream that is active in training.
     Source: Hofer 2008, §4 and §6; tying by minimum description length as in ``stats.trees``.  Deviations: utterances
     with ``bounds`` start from these, not flat; trees of acoustic streams ask about one neighbour, unless
-    ``both_neighbours`` is set (``forest.choose_positions``).
+    ``both_neighbours`` is set (``model.choose_positions``).
     """
     hmm, prepared = _start(utterances, inventory, config)
     splits = [count.bit_length() - 1 for count in (config.mixtures, config.motion_mixtures)]

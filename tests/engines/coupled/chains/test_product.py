@@ -145,7 +145,6 @@ def test_probabilities_out_of_every_state_sum_to_one(kind):
 
 def test_structures_that_do_not_fit_together():
     for kind, sets, limit, message in (
-        ("ring", (THREE,), 1, "ring"),
         (MULTISTREAM, (THREE, TWO), 1, "2 chains"),
         (COUPLED, (THREE,), 1, "1 chains"),
         (COUPLED, (THREE, TWO), 2, "required 0 to 1"),
