@@ -70,7 +70,7 @@ def chain_posteriors(
     log_stay, log_move : [shape=(U, S)], of transitions to the same and to the next state
     frames, states     : [shape=(U,)], of each utterance without padding
     Returns the posterior of each state [shape=(T, U, S)], 0 in the padding; the expected number of transitions of each
-    state to itself [shape=(U, S)]; and the log likelihood [shape=(U,)]. Where it is <= IMPOSSIBLE / 2 there is
+    state to itself [shape=(U, S)]; and the log likelihood [shape=(U,)]. Where it is <= LOG_ZERO / 2 there is
     no path (fewer frames than states), and the other two are 0.
     Cost: O(T·U·S).
     """
