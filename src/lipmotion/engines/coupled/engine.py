@@ -258,9 +258,6 @@ class CoupledEngine(Engine[CoupledModel]):
     ) -> Fit[CoupledModel]:
         return deque(grow_models(examples, self.config, monitor, checkpoint), maxlen=1)[0]()
 
-    def without_closures(self) -> CoupledEngine:  # noqa: D102
-        return replace(self, config=replace(self.config, closures=False))
-
     def generate(self, model: CoupledModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         frames = len(speech.features.values)
         path = np.empty(frames, np.intp)

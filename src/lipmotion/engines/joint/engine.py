@@ -273,9 +273,6 @@ class JointEngine(Engine[JointModel]):
         modulation = learn_filter(self.config.modulation_filter, compared, examples, values)
         return replace(model, scaling=VarianceScaling(factors, rest), modulation=modulation)
 
-    def without_closures(self) -> JointEngine:  # noqa: D102
-        return replace(self, config=replace(self.config, closures=False))
-
     def generate(self, model: JointModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         observations, duration_s = self._observations(speech), speech.features.duration_s
 

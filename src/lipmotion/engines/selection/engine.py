@@ -117,9 +117,6 @@ class SelectionEngine(Engine[SelectionModel]):
     def recognise(self, model: SelectionModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
         return model.phone_recogniser.phones(speech) if model.phone_recogniser is not None else None
 
-    def without_closures(self) -> SelectionEngine:  # noqa: D102
-        return replace(self, config=replace(self.config, closures=False))
-
     def generate(self, model: SelectionModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         costs = model.costs(self.config)
         target = build_target(model, costs, speech)
