@@ -27,7 +27,7 @@ from lipmotion.motion.arrays import (
     scaling_from_arrays,
     scaling_to_arrays,
 )
-from lipmotion.motion.articulation import ArticulationPrior, Statistics, fit_articulation_prior
+from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import Closure, fit_closure
 from lipmotion.motion.frame_labels import with_unit_names
 from lipmotion.motion.generation import LearnedMotion, VarianceScaling, fit_scaling_factors
@@ -290,12 +290,8 @@ class JointEngine(Engine[JointModel]):
                 units = _align_times(model, observations, units, duration_s)
             path = _align(model, observations, units)
         means, precisions = merge_gaussians(select_densities(model.hmm, path))
-
-        def statistics(frames: slice) -> Statistics:
-            return means[frames], precisions[frames]
-
         motion, variance = model.motion.for_voice(speech.voice).generate(
-            statistics,
+            lambda frames: (means[frames], precisions[frames]),
             len(speech.features.values),
             units,
             constraints,
