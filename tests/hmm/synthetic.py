@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lipmotion.hmm import network, unit_training
-from lipmotion.hmm.align import align_units, choose_pronunciations
+from lipmotion.hmm.align import align_units, place_words
 from lipmotion.hmm.model import HmmConfig, UnitHmm, make_plain_states
 from lipmotion.stats.bigram import Bigram, estimate_bigram
 from lipmotion.stats.mixture import Mixtures
@@ -112,7 +112,8 @@ def decode(hmm: UnitHmm, features: np.ndarray, inventory: Sequence[str]) -> tupl
 
 
 def choose(hmm: UnitHmm, features: np.ndarray, words: Sequence[Sequence[Sequence[str]]]):
-    return choose_pronunciations(hmm, network.compute_log_likelihoods(hmm, features), words, PAUSE)
+    placed = place_words(hmm, network.compute_log_likelihoods(hmm, features), words, PAUSE)
+    return [item.spoken for item in placed]
 
 
 def chosen_units(hmm: UnitHmm, features: np.ndarray, words: Sequence[Sequence[Sequence[str]]]) -> tuple[str, ...]:

@@ -88,7 +88,7 @@ def test_loud_frames_are_neither_aligned_with_silence_nor_chosen_as_pauses():
     assert without[3] - without[1] < 8
     assert (bounds[1], bounds[3]) == (edges[1], edges[3])
     for densities, pauses in ((free, True), (bound, False)):
-        parts = align.choose_pronunciations(hmm, densities, words, PAUSE)
+        parts = [item.spoken for item in align.place_words(hmm, densities, words, PAUSE)]
         assert (PAUSE in [unit for part in parts for unit in part.units]) == pauses
 
 

@@ -97,19 +97,6 @@ class PlacedWord(NamedTuple):
     fit: float
 
 
-def choose_pronunciations(
-    hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: Sequence[Sequence[Sequence[str]]], pause: str
-) -> list[SpokenWord]:
-    """Return the most probable pronunciation of each word, with silence and the pauses between words, in order.
-
-    words : for each word, its possible pronunciations; a pause inside of one may be left out
-    pause : the unit that may stand between words; silence (the first free unit) surrounds them all
-    Only states without context are used: then the states of a pronunciation do not depend on the words beside it.
-    Raises AlignmentError: the words do not fit into the frames.
-    """
-    return [item.spoken for item in place_words(hmm, log_likelihoods, words, pause)]
-
-
 def place_words(
     hmm: UnitHmm,
     log_likelihoods: LogLikelihoods,
@@ -117,10 +104,13 @@ def place_words(
     pause: str,
     windows: Windows | None = None,
 ) -> list[PlacedWord]:
-    """Return what ``choose_pronunciations`` does, each with its place.
+    """Return the most probable pronunciation of each word, with silence and the pauses between words, in order.
 
+    words   : for each word, its possible pronunciations; a pause inside of one may be left out
+    pause   : the unit that may stand between words; silence (the first free unit) surrounds them all
     windows : of the words: the frames that each may have; a pause may have those of both words beside it; with windows
               the fit is computed
+    Only states without context are used: then the states of a pronunciation do not depend on the words beside it.
     Raises AlignmentError: the words do not fit into the frames, or into their windows.
     """
     _check_room(hmm, log_likelihoods.frames, words)

@@ -59,7 +59,7 @@ def test_words_begin_and_end_where_the_word_changes_and_suppressed_phones_are_on
     one, two = phones_of("b iy", "be"), phones_of("g aa", "go")
     both = Timeline((*one.spans, *two.shifted(0.2).spans))
     assert list_windows([both]).words.tolist() == [[True, False], [False, True], [True, False], [False, True]]
-    symbols = list_windows([phones_of("t d k sp")]).symbols({"t", "d"})
+    symbols = list_windows([phones_of("t d k sp")]).contexts({"t", "d"}, 0)[:, 0]
     assert symbols.tolist() == [INVISIBLE_SYMBOL, INVISIBLE_SYMBOL, PHONE_NUMBER["k"], SILENT]
     with pytest.raises(InputError, match="unknown phone 'xx' at 0"):
         list_windows([phones_of("xx")])

@@ -106,16 +106,14 @@ class PhoneWindows:
         """The duration of every phone [shape=(U,)]."""
         return self.times_s[:, 1] - self.times_s[:, 0]
 
-    def symbols(self, invisible: Collection[str]) -> NDArray[np.intp]:
-        """Return the symbol of every phone [shape=(U,)]: pauses are silence, suppressed phones are one symbol."""
+    def contexts(self, invisible: Collection[str], reach: int) -> NDArray[np.intp]:
+        """Return the symbols around every phone [shape=(U, 2·reach + 1)]; beyond a recording there is silence.
+
+        Pauses are silence; suppressed phones are one symbol.
+        """
         table = np.array([SILENT if is_silent(p) else INVISIBLE_SYMBOL if p in invisible else n
                           for n, p in enumerate(PHONES)], np.intp)  # fmt: skip
-        return table[self.phones]
-
-    def contexts(self, invisible: Collection[str], reach: int) -> NDArray[np.intp]:
-        """Return the symbols around every phone [shape=(U, 2·reach + 1)]; beyond a recording there is silence."""
-        symbols = self.symbols(invisible)
-        numbers = np.arange(len(self))
+        symbols, numbers = table[self.phones], np.arange(len(self))
         columns = []
         for offset in range(-reach, reach + 1):
             there = np.clip(numbers + offset, 0, len(self) - 1)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.align import align_states, choose_pronunciations
+from lipmotion.hmm.align import align_states, place_words
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import LogLikelihoods
 from lipmotion.speech.features.analysed_audio import SILENT_ENERGY, Passage
@@ -77,7 +77,8 @@ def align_recognised_words(
         word: [tuple(find_similar_phone(phone, modelled) for phone in variant) for variant in of_word]
         for word, of_word in variants.items()
     }
-    spoken = choose_pronunciations(hmm, log_likelihoods, [units[word] for word in words], PAUSE)
+    placed = place_words(hmm, log_likelihoods, [units[word] for word in words], PAUSE)
+    spoken = [item.spoken for item in placed]
     sequence = [unit for item in spoken for unit in item.units]
     states, path = align_states(hmm, log_likelihoods, sequence)
     phones = [(phone, item.word) for item in spoken for phone in (
