@@ -7,7 +7,6 @@ from hmm.multistream.synthetic import CLASSES, config, inventory, observed, rand
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.hmm.multistream.densities import (
     MOTION,
-    SPEECH,
     STREAMS,
     GaussianStatistics,
     ObservedStream,
@@ -19,7 +18,7 @@ from lipmotion.hmm.multistream.densities import (
     make_standard_normals,
     stream_observations,
 )
-from lipmotion.hmm.multistream.model import ACOUSTIC_ONLY, joint_from_arrays, joint_to_arrays
+from lipmotion.hmm.multistream.model import joint_from_arrays, joint_to_arrays
 from lipmotion.hmm.multistream.multistream_training import train_joint
 from lipmotion.hmm.multistream.recognise import (
     FrameDensities,
@@ -275,11 +274,3 @@ def test_what_was_learned_comes_back():
         motion, path = each.observed.streams[MOTION], align(hmm, each.observed, each.units, each.bounds)
         off = solve_trajectory(select_densities(hmm, path))[0] - motion.values[:, :2]
         assert np.sqrt((off[motion.known] ** 2).mean(axis=0)) == pytest.approx([0.06, 0.03], abs=0.05)
-
-
-def test_what_cannot_be_generated():
-    deaf, hmm = random_joint(7, streams=(SPEECH,)), random_joint(8, synthesis=ACOUSTIC_ONLY)
-    data = observed(np.random.default_rng(9), 9)
-    for model in (deaf, hmm):
-        with pytest.raises(InputError, match="no motion, or it is switched off"):
-            select_densities(model, align(model, data, ("a",)))

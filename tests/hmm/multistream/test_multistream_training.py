@@ -24,6 +24,7 @@ from oracles import joint as slow
 from oracles import paths
 
 TRAIN, HELD_OUT = utterances(30), utterances(8, seed=1)
+MOTION_ONLY = StreamWeights(0, 0, 0, 0, 1)
 
 
 def trained(data=TRAIN, **changes):
@@ -53,11 +54,10 @@ DEAF = [replace(utterance, observed=only(utterance.observed, "speech")) for utte
 
 
 @pytest.mark.parametrize(
-    "weights",
-    [StreamWeights(), model.MOTION_ONLY, pytest.param(StreamWeights(0.3, 0.5, 0, 0.1, 2), marks=pytest.mark.long)],
+    "weights", [StreamWeights(), MOTION_ONLY, pytest.param(StreamWeights(0.3, 0.5, 0, 0.1, 2), marks=pytest.mark.long)]
 )
 def test_the_likelihood_never_falls_within_a_stage(weights):
-    data = TRAIN[:10] if weights is model.MOTION_ONLY else [replace(utterance, bounds=None) for utterance in TRAIN[:10]]
+    data = TRAIN[:10] if weights is MOTION_ONLY else [replace(utterance, bounds=None) for utterance in TRAIN[:10]]
     _, events = trained(data, training=weights, mixtures=4, motion_mixtures=2, plain_iterations=8, iterations=6)
     found = stages(events)
     assert len(found) >= 4
@@ -137,8 +137,8 @@ def test_streams_and_units_that_are_missing_here_and_there():
 
 def test_nothing_that_is_switched_on_was_observed():
     with pytest.raises(errors.InputError, match="switched on are motion"):
-        trained(DEAF, training=model.MOTION_ONLY)
-    hmm, _ = trained([*TRAIN[:6], DEAF[0]], training=model.MOTION_ONLY)  # utterances without motion change nothing
+        trained(DEAF, training=MOTION_ONLY)
+    hmm, _ = trained([*TRAIN[:6], DEAF[0]], training=MOTION_ONLY)  # utterances without motion change nothing
     assert np.isfinite(hmm.durations).all()
 
 

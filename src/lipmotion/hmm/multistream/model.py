@@ -168,10 +168,6 @@ def choose_positions(
     return {-1: (0, 1), 0: (1,), 1: (1, 2)}[inventory.side(unit, state)]
 
 
-ACOUSTIC_ONLY = StreamWeights(motion=0.0)
-MOTION_ONLY = StreamWeights(0.0, 0.0, 0.0, 0.0, 1.0)
-
-
 @dataclass(frozen=True)
 class JointConfig:
     """How a joint model is built, trained and used.
@@ -184,7 +180,7 @@ class JointConfig:
     least_frames : frames that a leaf must have
     variance_floor : least variance, as a share of a dimension's overall variance
     bigram_weight, insertion : scale of the log bigram, and log insertion penalty of every unit, in recognition
-    training, recognition, synthesis : weights of the streams in each
+    training, recognition : weights of the streams in each
     """
 
     states: int = 3
@@ -199,8 +195,7 @@ class JointConfig:
     bigram_weight: float = 4.0
     insertion: float = -4.0
     training: StreamWeights = field(default=StreamWeights())
-    recognition: StreamWeights = field(default=ACOUSTIC_ONLY)
-    synthesis: StreamWeights = field(default=MOTION_ONLY)
+    recognition: StreamWeights = field(default=StreamWeights(motion=0.0))
 
 
 def grow_forest(

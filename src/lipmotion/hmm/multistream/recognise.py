@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import AlignmentError, InputError
+from lipmotion.errors import AlignmentError
 from lipmotion.hmm.multistream.densities import ACOUSTIC_STREAMS, MOTION, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.unit_states import RecognisedUnit, TriphoneStates, expand_triphones
@@ -240,15 +240,12 @@ class FrameDensities:
 
 
 def select_densities(hmm: JointHmm, path: StatePath) -> FrameDensities:
-    """Return the densities of motion along a path of states. Raises InputError: no motion, or its weight is 0."""
-    weight = hmm.config.synthesis.motion
-    if MOTION not in hmm.models or not weight:
-        raise InputError("the model has no motion, or it is switched off in synthesis; train on recordings with a face")
+    """Return the densities of motion along a path of states."""
     model = hmm.models[MOTION]
     mixtures, deviation = model.tied.mixtures, model.scale.deviation
     G, M, D = mixtures.size
     means = (mixtures.means * deviation + model.scale.mean).reshape(G, M, 3, D // 3)
-    precisions = (weight / (mixtures.variances * deviation**2)).reshape(G, M, 3, D // 3)
+    precisions = (1 / (mixtures.variances * deviation**2)).reshape(G, M, 3, D // 3)
     chosen = model.forest.leaves(path.states.triphones)[path.frames]
     precisions = precisions[chosen]
     precisions[[0, -1], :, 1:] = 0  # Δ and Δ² of the first and last frame count for nothing
