@@ -147,10 +147,10 @@ class Hearing:
     @classmethod
     def fit(cls, recordings: Sequence[Speech]) -> Hearing:
         """Return that of a training."""
-        said = [limit_logarithms(each.posteriors) for each in recordings if each.posteriors is not None]
-        heard = [np.asarray(each.encoding, np.float32) for each in recordings if each.encoding is not None]
-        mean, basis = fit_components(said) if len(said) == len(recordings) else (None, None)
-        scale = float(np.concatenate(heard).std()) if len(heard) == len(recordings) else None
+        posteriors = [limit_logarithms(each.posteriors) for each in recordings if each.posteriors is not None]
+        encodings = [np.asarray(each.encoding, np.float32) for each in recordings if each.encoding is not None]
+        mean, basis = fit_components(posteriors) if len(posteriors) == len(recordings) else (None, None)
+        scale = float(np.concatenate(encodings).std()) if len(encodings) == len(recordings) else None
         return cls(mean, basis, scale)
 
     def stack_steps(self, speech: Speech) -> Float32Array:

@@ -13,7 +13,7 @@ from kernels.conftest import load_numba
 from kernels.networks import network_posteriors, phone_loop
 from lipmotion.kernels import banded, compiler, factorial, factorial_loops, forward_backward
 from lipmotion.kernels.compiler import limit_threads, list_blas_kernels
-from lipmotion_faces.kernels import affine, normals, painting, raster, shading
+from lipmotion_faces.kernels import affine, painting, raster, shading
 from lipmotion_faces.kernels.textured import CLEAR, SOLID, TexturedTriangles, draw_textured
 
 TESTS = Path(__file__).parents[1]
@@ -82,7 +82,7 @@ def pictures() -> list[np.ndarray]:
     stacked = np.zeros((12, 16, 4), np.uint16)
     painting.stack(layer, layer, np.dstack([layer, layer[..., 0]]) / 255, target, stacked)
     drawn = [light, plain, textured, opacity, frame, layer, target, moved, stacked]
-    return [*drawn, affine.resample(plain[None], to_source, (5, 6)), normals.sum_normals(points, triangles)]
+    return [*drawn, affine.resample(plain[None], to_source, (5, 6)), shading.sum_normals(points, triangles)]
 
 
 @pytest.mark.long

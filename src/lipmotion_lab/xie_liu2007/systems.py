@@ -177,11 +177,6 @@ class ComparedSystem:
     second_stage: bool = False
     when_named: bool = False
 
-    @property
-    def is_trained_here(self) -> bool:
-        """Whether it is coupled chains of its own."""
-        return self.make is None and not self.same_model_as
-
 
 def _find_engine(name: str, **options: Any) -> Callable[[], Animator[Any]]:
     return lambda: engine_named(name, options)

@@ -42,7 +42,6 @@ from lipmotion.motion.frame_labels import (
     rate_phones,
     with_unit_names,
 )
-from lipmotion.motion.general_motion import hear_articulators
 from lipmotion.motion.generation import LearnedMotion, VarianceScaling
 from lipmotion.motion.modulation_filter import (
     MODULATION,
@@ -51,6 +50,7 @@ from lipmotion.motion.modulation_filter import (
     filter_from_arrays,
     filter_to_arrays,
 )
+from lipmotion.motion.network_steps import hear_articulators
 from lipmotion.motion.predictors import (
     ADDED,
     AUTOMATIC,
