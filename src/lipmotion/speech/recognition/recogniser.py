@@ -14,14 +14,7 @@ from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.align import PlacedWord, SpokenWord, align_units, place_words, spread_windows
 from lipmotion.hmm.loudness import find_loud_frames, find_quiet_frames
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.hmm.network import (
-    LogLikelihoods,
-    UnitLoop,
-    build_unit_loop,
-    compute_log_likelihoods,
-    penalise_silence,
-    penalise_speech,
-)
+from lipmotion.hmm.network import LogLikelihoods, UnitLoop, build_unit_loop, compute_log_likelihoods, penalise
 from lipmotion.kernels.paths import Windows
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.speaker_similarity import (
@@ -202,7 +195,7 @@ class Recogniser:
         """
         audio = analysed(audio, features)
         hmm, log_likelihoods = self._log_likelihoods(audio, aligning=True)
-        log_likelihoods = penalise_silence(hmm, log_likelihoods, find_loud_frames(audio.log_energy))
+        log_likelihoods = penalise(hmm, log_likelihoods, find_loud_frames(audio.log_energy), silent=True)
         forms_of = {word: lexicon.spoken_forms(word) for word in set(words)}
         modelled = {PAUSE, *(unit for unit in hmm.table.units if not is_silent(unit))}
         units_of = {
@@ -280,7 +273,7 @@ class Recogniser:
             general = audio.general_features if self.adaptation is None else self.adaptation.general_features(audio)
             hmm, log_likelihoods = self.combined.hmm, combine_likelihoods(self.combined, own, weight, general)
         audio.forget_warps()
-        return hmm, penalise_speech(hmm, log_likelihoods, find_quiet_frames(audio.log_energy))
+        return hmm, penalise(hmm, log_likelihoods, find_quiet_frames(audio.log_energy), silent=False)
 
 
 def _aligned(
