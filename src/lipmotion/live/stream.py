@@ -289,9 +289,9 @@ class Stream:
         )
         motion, face, visemes = (each.resampled(1 / STEP_S) for each in (result.motion, *curves))
         frames = []
-        for pose, row, said in zip(motion.values, face.values, visemes.values, strict=False):
+        for pose, row, viseme_row in zip(motion.values, face.values, visemes.values, strict=False):
             mouth, living = np.split(row, [len(ARKIT_MOUTH)])
-            frame = self._frame((pose, np.concatenate([mouth, said])), end_s)
+            frame = self._frame((pose, np.concatenate([mouth, viseme_row])), end_s)
             named = dict(zip(face.names[len(ARKIT_MOUTH) :], living.tolist(), strict=True))
             frames.append(replace(frame, weights=frame.weights | named))
         self._first = self._next

@@ -142,24 +142,24 @@ def find_voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, 
     audio : at 16 kHz
     Raises InputError: as ``speech.features.mfcc`` says.
     """
-    found, judged = list[VoiceEvent](), list[tuple[float, float, tuple[float, float, float]]]()
+    detected, judged = list[VoiceEvent](), list[tuple[float, float, tuple[float, float, float]]]()
     for first, sound in analysed(audio).between_silences:
         at_s = first / FRAME_RATE_HZ
-        said = units.between(at_s, at_s + sound.duration_s)
+        phones = units.between(at_s, at_s + sound.duration_s)
         level_db = _smooth(analysed(sound).log_energy.astype(np.float64) * DB)
         pitch = log_f0(sound).astype(np.float64) * 12 / np.log(2)  # semitones
         voiced = np.isfinite(pitch)
-        laughs = tuple(_laughs(sound, level_db, voiced, said))
+        laughs = tuple(_laughs(sound, level_db, voiced, phones))
         phrases = [
             phrase
-            for phrase in _phrases(said)
+            for phrase in _phrases(phones)
             if not any(_find_overlap(phrase, (laugh.start_s, laugh.end_s)) > 0 for laugh in laughs)
         ]
-        events = *laughs, *_breaths(sound, level_db, voiced, said), *_whispers(level_db, voiced, phrases)
-        found += [event.shifted(at_s) for event in events]
+        events = *laughs, *_breaths(sound, level_db, voiced, phones), *_whispers(level_db, voiced, phrases)
+        detected += [event.shifted(at_s) for event in events]
         efforts = _efforts(sound, level_db, pitch, phrases)
         judged += [(start_s + at_s, end_s + at_s, effort) for (start_s, end_s), effort in efforts]
-    return tuple(sorted([*found, *_shouts(judged)], key=lambda event: event.start_s))
+    return tuple(sorted([*detected, *_shouts(judged)], key=lambda event: event.start_s))
 
 
 def silence_units(units: Timeline[Unit], others: Sequence[tuple[float, float]]) -> Timeline[Unit]:
@@ -208,25 +208,25 @@ def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeli
 
 def _phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
     """Return start and end, in seconds, of the phrases that are long enough to be judged."""
-    found: list[tuple[float, float, float, int]] = []
+    phrases: list[tuple[float, float, float, int]] = []
     for span in units:
         if is_silent(span.label.phone):
             continue
         vowel = int(span.label.phone in VOWELS)
-        if found and span.start_s - found[-1][1] < PHRASE_PAUSE_S:
-            start_s, _, said_s, vowels = found[-1]
-            found[-1] = start_s, span.end_s, said_s + span.duration_s, vowels + vowel
+        if phrases and span.start_s - phrases[-1][1] < PHRASE_PAUSE_S:
+            start_s, _, said_s, vowels = phrases[-1]
+            phrases[-1] = start_s, span.end_s, said_s + span.duration_s, vowels + vowel
         else:
-            found.append((span.start_s, span.end_s, span.duration_s, vowel))
-    return [each[:2] for each in found if each[2] >= MIN_PHRASE_S and each[3] >= MIN_VOWELS]
+            phrases.append((span.start_s, span.end_s, span.duration_s, vowel))
+    return [each[:2] for each in phrases if each[2] >= MIN_PHRASE_S and each[3] >= MIN_VOWELS]
 
 
 def _whispers(level_db: Curve, voiced: Voiced, phrases: Sequence[tuple[float, float]]) -> Iterator[VoiceEvent]:
-    quiet_db, most_db = np.percentile(_select_heard(level_db), (10, 99))
+    quiet_db, loud_db = np.percentile(_select_heard(level_db), (10, 99))
     for start_s, end_s in phrases:
         frames = _frames(start_s, end_s)
         middle_db, loudest_db = np.percentile(level_db[frames], (50, 95)) if len(level_db[frames]) else (quiet_db,) * 2
-        if loudest_db - quiet_db < MIN_SNR_DB or middle_db - most_db < -BELOW_LOUDEST_DB:
+        if loudest_db - quiet_db < MIN_SNR_DB or middle_db - loud_db < -BELOW_LOUDEST_DB:
             continue
         share = float(voiced[frames][level_db[frames] > loudest_db - LOUD_DB].mean())
         strength = _risen(-share, (-WHISPERED_SHARES[1], -WHISPERED_SHARES[0]))
@@ -295,8 +295,8 @@ def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, i
     centres, starts = find_centres(), range(0, len(bands), BLOCK_FRAMES)
     low, middle, high, bright = (
         np.concatenate([np.exp(bands[n : n + BLOCK_FRAMES, inside].astype(np.float64)).mean(axis=1) for n in starts])
-        for least, most in ((0, 1000), (1000, 3500), (3500, 7600), (1000, np.inf))
-        for inside in [(centres >= least) & (centres < most)]
+        for lowest_hz, highest_hz in ((0, 1000), (1000, 3500), (3500, 7600), (1000, np.inf))
+        for inside in [(centres >= lowest_hz) & (centres < highest_hz)]
     )
     level = _smooth(DB * np.log(bright))
     reach = round(QUIET_REACH_S * FRAME_RATE_HZ)

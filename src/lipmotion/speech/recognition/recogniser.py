@@ -136,9 +136,9 @@ class Recogniser:
         )
         network = None if known else find_network(self.kind)
         if network is not None:
-            found = find_stretches(network, audio, each)
-            if mean_posterior(found) >= WORD_POSTERIORS[0] or not english:
-                return self._network_recognition(audio, similarity, found, english=english)
+            stretches = find_stretches(network, audio, each)
+            if mean_posterior(stretches) >= WORD_POSTERIORS[0] or not english:
+                return self._network_recognition(audio, similarity, stretches, english=english)
         with_words = self.kind in USING_WORDS and not known
         spoken = begin_decoding(audio, each) if with_words else None
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
@@ -158,7 +158,7 @@ class Recogniser:
         self,
         audio: AnalysedAudio,
         similarity: SpeakerSimilarity | None,
-        found: Sequence[PosteriorStretch],
+        stretches: Sequence[PosteriorStretch],
         *,
         english: bool,
     ) -> Recognition:
@@ -167,12 +167,12 @@ class Recogniser:
         loud = find_loud_frames(audio.log_energy)
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity, aligning=english)
         if english:
-            parts, recognised = decode_network(hmm, log_likelihoods, loud, found)
+            parts, recognised = decode_network(hmm, log_likelihoods, loud, stretches)
         else:
-            parts, recognised = list_wordless(hmm, self._loop, log_likelihoods, found), []
+            parts, recognised = list_wordless(hmm, self._loop, log_likelihoods, stretches), []
         labels = splice([LabelledFrames(0, SILENCE)], parts, len(loud))
         recognition = build_recognition(labels, recognised, len(loud), features.duration_s, similarity)
-        return replace(recognition, posterior=mean_posterior(found))
+        return replace(recognition, posterior=mean_posterior(stretches))
 
     def _free_labels(self, audio: AnalysedAudio, features: Features, path: NDArray[np.intp]) -> list[LabelledFrames]:
         """Return the phones of a recording as they are recognised without words, of their best path."""
@@ -212,10 +212,10 @@ class Recogniser:
         spoken, bounds = _aligned(hmm, log_likelihoods, [units_of[word] for word in words], anchors)
         labels: list[tuple[str, str]] = []
         for item in spoken:
-            said = len(labels)
+            count_before = len(labels)
             form = forms_of[words[item.word]][item.variant] if item.word >= 0 else [(unit, "") for unit in item.units]
             for phone, word in form:
-                if phone != PAUSE or item.units[len(labels) - said] == PAUSE:  # else it was not made
+                if phone != PAUSE or item.units[len(labels) - count_before] == PAUSE:  # else it was not made
                     labels.append((phone, word))
         return time_phones(labels, bounds, features.duration_s)
 

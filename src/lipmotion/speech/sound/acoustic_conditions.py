@@ -43,13 +43,13 @@ def remove_hum(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     steady, loud = np.quantile(np.abs(np.fft.rfft(judged * window)), (0.2, 0.9), axis=0)
     lines = steady > np.maximum(HUM_RATIO * median_filter(steady, HUM_WIDTH), HUM_SHARE * loud.max())
     # hum sounds in every tenth of a second; a voice on one note pauses for consonants
-    least = np.quantile(np.abs(np.fft.rfft(judged.reshape(-1, part) * np.hanning(part + 1)[:-1])), 0.05, axis=0)
-    lines &= 10 * least[np.rint(np.arange(len(lines)) / 10).astype(int)] > steady / 2
+    faintest = np.quantile(np.abs(np.fft.rfft(judged.reshape(-1, part) * np.hanning(part + 1)[:-1])), 0.05, axis=0)
+    lines &= 10 * faintest[np.rint(np.arange(len(lines)) / 10).astype(int)] > steady / 2
     if not lines.any():
         return samples
-    kept, clean = ~binary_dilation(lines, iterations=3), np.zeros(len(padded), np.float32)
+    rest, clean = ~binary_dilation(lines, iterations=3), np.zeros(len(padded), np.float32)
     for number, block in enumerate(blocks):
-        clean[number * HUM // 4 :][:HUM] += np.fft.irfft(np.fft.rfft(block * window) * kept).astype(np.float32) / 2
+        clean[number * HUM // 4 :][:HUM] += np.fft.irfft(np.fft.rfft(block * window) * rest).astype(np.float32) / 2
     clean = clean[HUM // 2 :][: len(samples)]
     within, before = (sound[HUM // 2 : -HUM // 2] for sound in (clean, samples))  # hum may be left at the ends
     voiced = np.square(within).sum() > HUM_REST * np.square(before).sum() and find_passages(log_energy(within))

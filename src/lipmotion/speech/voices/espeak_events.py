@@ -125,9 +125,9 @@ def main() -> None:
         sys.exit("espeak-ng finds no data; apt install espeak-ng-data")
     if "voice" not in task:
         library.espeak_Info.restype = ctypes.c_char_p
-        found = ctypes.c_char_p()
-        version = library.espeak_Info(ctypes.byref(found))
-        json.dump({"version": version.decode(), "data": os.path.realpath((found.value or b"").decode())}, sys.stdout)
+        path = ctypes.c_char_p()
+        version = library.espeak_Info(ctypes.byref(path))
+        json.dump({"version": version.decode(), "data": os.path.realpath((path.value or b"").decode())}, sys.stdout)
         return
     voice = task["voice"].encode()
     properties = ctypes.byref(_Voice(languages=voice))

@@ -183,8 +183,8 @@ def find_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> 
     return audio.cached(key, compute)
 
 
-def _place_stretches(found: Sequence[PosteriorStretch], passage: Passage) -> Iterator[PosteriorStretch]:
-    for (first, end), posteriors in found:
+def _place_stretches(stretches: Sequence[PosteriorStretch], passage: Passage) -> Iterator[PosteriorStretch]:
+    for (first, end), posteriors in stretches:
         start, stop = max(passage.first + first, passage.own.start), min(passage.first + end, passage.own.stop)
         skipped = -(-(start - passage.first - first) // POSTERIOR_STEP)
         values = posteriors.values[skipped : skipped + -(-(stop - start) // POSTERIOR_STEP)]
@@ -192,10 +192,10 @@ def _place_stretches(found: Sequence[PosteriorStretch], passage: Passage) -> Ite
             yield PosteriorStretch(Stretch(start, stop), PhonePosteriors(values, posteriors.tokens))
 
 
-def mean_posterior(found: Sequence[PosteriorStretch]) -> float:
+def mean_posterior(stretches: Sequence[PosteriorStretch]) -> float:
     """Return the mean posterior of all phones that are found in some stretches, 0 to 1; 0 where there are none."""
-    counts = [sum(each.token != WORD_BOUNDARY for each in posteriors.best_tokens) for _, posteriors in found]
-    means = [posteriors.mean_posterior(0, len(posteriors.values)) for _, posteriors in found]
+    counts = [sum(each.token != WORD_BOUNDARY for each in posteriors.best_tokens) for _, posteriors in stretches]
+    means = [posteriors.mean_posterior(0, len(posteriors.values)) for _, posteriors in stretches]
     return float(np.dot(counts, means) / max(sum(counts), 1))
 
 
