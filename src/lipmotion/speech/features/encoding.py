@@ -40,11 +40,10 @@ class WindowedEncoding:
 
     read    : returns the samples of the recording from one to before another, at the level of all passages
     samples : their number
-    encoder : the network; None: that of the package
     """
 
-    def __init__(self, read: Callable[[int, int], Array], samples: int, encoder: Encoder | None = None) -> None:
-        self._read, self._samples, self._encoder = read, samples, encoder or load_encoder()
+    def __init__(self, read: Callable[[int, int], Array], samples: int) -> None:
+        self._read, self._samples, self._encoder = read, samples, load_encoder()
         self._windows: dict[int, Array] = {}
 
     def rows(self, first: int, stop: int) -> NDArray[np.float16]:

@@ -22,14 +22,12 @@ from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.types import Audio, Prosody
 
 LOWEST_HZ, HIGHEST_HZ = 60.0, 400.0
-"""The range of F0 that is searched."""
 BLOCK = 1024
 """Frames searched at a time: memory stays bounded for any length."""
 
 UNVOICED_COST = 0.52
 """Cost of an unvoiced frame; a voiced one costs 1 − its correlation, weighted."""
 VOICING_CHANGE_COST = 0.25
-"""Cost of a change from voiced to unvoiced, or back."""
 JUMP_COST = 0.4
 """Cost of a change of F0 by a factor of e; an octave costs 0.28."""
 LONG_LAG_SHARE = 0.2
@@ -40,8 +38,7 @@ FRICATION_SHARE = 1e-3
 """Share of the power of the full signal's slope that is added too: the low frequencies of an s may seem periodic."""
 ROUNDING_POWER = 1e-10
 """Power that is added too, as a share of that of the highest sample: a constant's rounding error has a period."""
-CANDIDATES = 4
-"""Lags considered in a frame."""
+CANDIDATES = 4  # lags considered in a frame
 
 _STEP = 4  # samples at 16 kHz for one of the low-passed signal
 _RATE_HZ = SPEECH_RATE_HZ // _STEP

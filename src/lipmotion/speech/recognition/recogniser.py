@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import groupby
 
@@ -77,6 +77,7 @@ alone then. With 20 clips of GRID that raises ACC of opening on the validation l
 from 0.806 to 0.841 (transcripts)."""
 
 
+@dataclass(frozen=True, eq=False)
 class Recogniser:
     """Forced alignment and recognition with a model's own phone models and those of many voices.
 
@@ -86,12 +87,13 @@ class Recogniser:
     Raises InputError: another kind.
     """
 
-    def __init__(self, own: UnitHmm, kind: str = "auto", adaptation: Adaptation | None = None):
-        if kind not in RECOGNISER_KINDS:
-            raise InputError(f"unknown recogniser {kind!r}; required one of: {', '.join(RECOGNISER_KINDS)}")
-        self.own = own
-        self.kind = kind
-        self.adaptation = adaptation
+    own: UnitHmm
+    kind: str = "auto"
+    adaptation: Adaptation | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in RECOGNISER_KINDS:
+            raise InputError(f"unknown recogniser {self.kind!r}; required one of: {', '.join(RECOGNISER_KINDS)}")
 
     def recognise(self, audio: Audio, features: Features) -> Timeline[Unit]:
         """Return the most probable phones of a recording in time: Viterbi with a back-off bigram.

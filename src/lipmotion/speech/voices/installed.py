@@ -212,11 +212,8 @@ def choose_voice() -> SyntheticVoice:
 
     Raises MissingDependencyError: no synthesiser is installed.
     """
-    for maker, name in DEFAULT_VOICES:
-        voice = next((voice for voice in SYNTHESISERS[maker].voices() if voice.name == name), None)
-        if voice is not None:
-            return voice
-    voice = next(iter(list_voices()), None)
+    voices = ((voice, name) for maker, name in DEFAULT_VOICES for voice in SYNTHESISERS[maker].voices())
+    voice = next((voice for voice, name in voices if voice.name == name), None) or next(iter(list_voices()), None)
     if voice is None:
         raise explain_missing()
     return voice
