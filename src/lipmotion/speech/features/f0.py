@@ -60,7 +60,13 @@ def log_f0(audio: Audio) -> Floats:
     Raises InputError: as ``speech.features.mfcc`` says.
     """
     samples = check_samples(audio)
-    silence = SILENCE_POWER * _loudness(samples) + ROUNDING_POWER * float(max(samples.max(), -samples.min())) ** 2
+    power, square = 0.0, 0.0  # of frames, each weighted by itself: pauses count little, a click does not count much
+    for start in range(0, len(samples) // HOP + 1, BLOCK):
+        low = _filter_low(samples, start * HOP, min(BLOCK, len(samples) // HOP + 1 - start))
+        powers = np.square(low).reshape(-1, _HOP).mean(axis=1).astype(np.float64)
+        power, square = power + powers.sum(), square + np.square(powers).sum()
+    silence = SILENCE_POWER * (square / power if power else 0.0)
+    silence += ROUNDING_POWER * float(max(samples.max(), -samples.min())) ** 2
     frames = frame_count(samples)
     pitch = np.empty((CANDIDATES + 1, frames), np.float32)
     pointers = np.empty((frames, CANDIDATES + 1), np.uint8)
@@ -131,16 +137,6 @@ def candidates(correlation: Floats) -> tuple[Floats, Floats]:
 def _weigh_lag(lag: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the weight of the correlation at a lag (``LONG_LAG_SHARE``)."""
     return 1 - LONG_LAG_SHARE * lag * LOWEST_HZ / _RATE_HZ
-
-
-def _loudness(samples: Floats) -> float:
-    """Return the mean power of frames, each weighted by its power: pauses count little, a click does not count much."""
-    power, square = 0.0, 0.0
-    for start in range(0, len(samples) // HOP + 1, BLOCK):
-        low = _filter_low(samples, start * HOP, min(BLOCK, len(samples) // HOP + 1 - start))
-        frames = np.square(low).reshape(-1, _HOP).mean(axis=1).astype(np.float64)
-        power, square = power + frames.sum(), square + np.square(frames).sum()
-    return square / power if power else 0.0
 
 
 def _filter_low(samples: Floats, first: int, hops: int) -> Floats:

@@ -37,7 +37,8 @@ EDGE_FRAMES = 5
 VOICED_SHARES = (0.15, 0.75)
 """Share of the frames of a bout that is voiced; with less it is a cough, or clicks of tongue or teeth."""
 WEIGHTS = (14.8, 0.122, -7.09, -2.93, 3.85, -16.5)
-"""The log odds of laughter: the sum of these times likeness, depth, voiced share, voiced gaps, log calls, and 1."""
+"""The log odds of laughter: the sum of these times the mean correlation of the spectra of successive calls, how far the
+level falls between them, the voiced share, that of the quietest frames between them, the log number of calls, and 1."""
 MIN_PROBABILITY = 0.7
 
 
@@ -70,26 +71,6 @@ def _find_fall(heights: Curve, lowest: Curve) -> Curve:
         falls.append(fall)
         higher.append((height, fall))
     return np.array(falls)
-
-
-def _rate_laughter(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, calls: list[int], run: slice) -> float:
-    """Return the probability that a run of calls is laughter; 0: its voiced share is not that of laughter.
-
-    ``WEIGHTS`` weigh the mean correlation of the spectra of successive calls; how far the level falls between them, in
-    decibels; the voiced share; that of the gaps where they are quietest; the log number of calls.
-    """
-    share = float(voiced[run].mean())
-    if not VOICED_SHARES[0] <= share <= VOICED_SHARES[1]:
-        return 0.0
-    quietest = [before + int(level_db[before:after].argmin()) for before, after in pairwise(calls)]
-    peaks = level_db[calls]
-    depth = np.mean(np.minimum(peaks[1:], peaks[:-1]) - level_db[quietest])
-    spectra = _bands(audio, run)[np.array(calls) - run.start].astype(np.float64)
-    spectra -= spectra.mean(axis=1, keepdims=True)
-    spectra /= np.maximum(np.linalg.norm(spectra, axis=1, keepdims=True), 1e-9)
-    likeness = (spectra[1:] * spectra[:-1]).sum(axis=1).mean()
-    figures = [likeness, depth, share, voiced[quietest].mean(), np.log(len(calls)), 1.0]
-    return float(1 / (1 + np.exp(-np.dot(WEIGHTS, figures))))
 
 
 SMOOTHING_FRAMES = 2.0
@@ -197,11 +178,21 @@ def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeli
         if len(calls) < MIN_CALLS:
             continue
         first, end = max(int(calls[0]) - EDGE_FRAMES, 0), min(int(calls[-1]) + EDGE_FRAMES + 1, len(level_db))
-        probability = _rate_laughter(audio, level_db, voiced, calls.tolist(), slice(first, end))
+        share, levels = float(voiced[first:end].mean()), level_db[calls]
+        if not VOICED_SHARES[0] <= share <= VOICED_SHARES[1]:
+            continue
+        quietest = [before + int(level_db[before:after].argmin()) for before, after in pairwise(calls.tolist())]
+        depth_db = np.mean(np.minimum(levels[1:], levels[:-1]) - level_db[quietest])
+        spectra = _bands(audio, slice(first, end))[calls - first].astype(np.float64)
+        spectra -= spectra.mean(axis=1, keepdims=True)
+        spectra /= np.maximum(np.linalg.norm(spectra, axis=1, keepdims=True), 1e-9)
+        likeness = (spectra[1:] * spectra[:-1]).sum(axis=1).mean()
+        figures = [likeness, depth_db, share, voiced[quietest].mean(), np.log(len(calls)), 1.0]
+        probability = float(1 / (1 + np.exp(-np.dot(WEIGHTS, figures))))
         start_s, end_s = first / FRAME_RATE_HZ, end / FRAME_RATE_HZ
         word_s = sum(_find_overlap((span.start_s, span.end_s), (start_s, end_s)) for span in words)
         if probability >= MIN_PROBABILITY and word_s <= MAX_WORD_SHARE * (end_s - start_s):
-            loudness = 2 ** ((level_db[calls] - level_db[calls].max()) / 10)
+            loudness = 2 ** ((levels - levels.max()) / 10)
             timed_calls = zip((calls / FRAME_RATE_HZ).tolist(), loudness.tolist(), strict=True)
             yield VoiceEvent(start_s, end_s, LAUGHTER, probability, tuple(timed_calls))
 

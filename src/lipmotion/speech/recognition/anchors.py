@@ -277,9 +277,3 @@ def _average_neighbours(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean of each value and those beside it."""
     count = np.convolve(np.ones(len(values)), np.ones(3))[1:-1]
     return np.convolve(values, np.ones(3))[1:-1] / count
-
-
-def count_min_frames(words: Sequence[Sequence[Sequence[str]]], counts: dict[str, int]) -> NDArray[np.intp]:
-    """Return the fewest frames of each word, given its pronunciations: the states of the shortest."""
-    of_words = {id(word): min(sum(counts[unit] for unit in variant) for variant in word) for word in words}
-    return np.array([of_words[id(word)] for word in words], np.intp)

@@ -31,7 +31,7 @@ from lipmotion.speech.features.speaker_similarity import (
     speaker_similarity,
 )
 from lipmotion.speech.recognition.adaptation import Adaptation
-from lipmotion.speech.recognition.anchors import Anchors, align_within, count_min_frames
+from lipmotion.speech.recognition.anchors import Anchors, align_within
 from lipmotion.speech.recognition.general import CombinedPhones, combine_likelihoods, combine_phones
 from lipmotion.speech.recognition.network.posteriors import (
     PosteriorStretch,
@@ -299,7 +299,9 @@ def _aligned(
     else:
         counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
         edge, frames = counts[hmm.table.free[0]], log_likelihoods.frames
-        placed, windows = align_within(anchors, count_min_frames(words, counts), edge, frames, search)
+        shortest = {id(word): min(sum(counts[unit] for unit in variant) for variant in word) for word in words}
+        min_frames = np.array([shortest[id(word)] for word in words], np.intp)
+        placed, windows = align_within(anchors, min_frames, edge, frames, search)
         spoken = [item.spoken for item in placed]
         of_units = spread_windows(spoken, windows, frames)
     return spoken, align_units(hmm, log_likelihoods, [unit for item in spoken for unit in item.units], of_units)
@@ -310,10 +312,8 @@ def find_network(kind: str) -> str | None:
     return find_installed_recogniser() if kind == "auto" else None
 
 
-@lru_cache(maxsize=4)
-def open_recogniser(own: UnitHmm, kind: str = "auto", adaptation: Adaptation | None = None) -> Recogniser:
-    """Return the recogniser of some models; the last four are kept, with the networks that they search."""
-    return Recogniser(own, kind, adaptation)
+open_recogniser = lru_cache(maxsize=4)(Recogniser)
+"""Returns the recogniser of some models; the last four are cached, with the networks that they search."""
 
 
 def weigh_own_model(score: float) -> float:
