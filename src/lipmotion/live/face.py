@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.contact import MIN_GAP, opening_to_gap
 from lipmotion.errors import InputError
 from lipmotion.extensions import load_provided
-from lipmotion.live.network import LAGS, STEP_S, answer_silence, live_network
+from lipmotion.live.network import STEP_S, hear_silence, live_network
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
 from lipmotion.meshes.fitting.shape_weights import (
     NEAREST_VOWEL,
@@ -98,7 +98,7 @@ class ModelFace:
     @cached_property
     def resting(self) -> tuple[Array, Array]:
         """Pose and weights of the mouth at rest."""
-        articulators = answer_silence().reshape(len(LAGS), -1)[-1, : len(ARTICULATORS)].astype(float)
+        articulators = hear_silence()[1][-1, : len(ARTICULATORS)].astype(float)
         visemes = np.eye(len(VISEMES_15))[VISEMES_15.index("sil")]
         return self.pose(articulators, visemes, 1.0)
 

@@ -23,10 +23,9 @@ from lipmotion.live.network import (
     LiveNetwork,
     Resampler,
     SoundFeatures,
-    answer_silence,
+    hear_silence,
     live_network,
     mono_samples,
-    silent_steps,
 )
 from lipmotion.live.timings import TimedPhones
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VISEMES_15
@@ -217,7 +216,7 @@ class Stream:
         """Begin to hear, as after silence; how loud and how coloured the sound is stays known."""
         self._resampler = Resampler(self.sample_rate)
         self._features.restart()
-        self._steps = copy.deepcopy(silent_steps())
+        self._steps = copy.deepcopy(hear_silence()[0])
         self._rows: list[NDArray[np.float32]] = []
         self._answers = deque([self._smoother.silent] * ANSWER_STEPS, ANSWER_STEPS)
         self._heard = 0  # steps
@@ -321,7 +320,7 @@ class _Smoother:
             first = np.linalg.solve(normal, np.eye(count)[0])
             self._of_answers[:, column] = first * trust[:, column]
             self._of_before[:, column] = -first @ (unknown.T @ known) / variance
-        self.silent = answer_silence().reshape(len(LAGS), -1)
+        self.silent = hear_silence()[1]
         self.rest = self.silent[-1, : len(ARTICULATORS)].astype(float)
 
     def solve(self, answers: deque[NDArray[np.float32]], before: list[Array]) -> tuple[Array, Array]:

@@ -114,13 +114,6 @@ class PhonePosteriors:
     values: NDArray[np.floating[Any]]
     tokens: tuple[str, ...]
 
-    @property
-    def word_boundary(self) -> NDArray[np.float32]:
-        """Logarithms of the posteriors of the boundary of words [shape=(N,)]; −∞ where the network has none."""
-        if WORD_BOUNDARY not in self.tokens:
-            return np.full(len(self.values), -np.inf, np.float32)
-        return self.values[:, self.tokens.index(WORD_BOUNDARY)]
-
     @cached_property
     def of_phones(self) -> NDArray[np.float32]:
         """Logarithms of the posteriors of ``PHONES``, and last of none of them [shape=(N, 48)]."""
