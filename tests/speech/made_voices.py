@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, lfilter, sosfilt
 
 from lipmotion.types import Audio, Span, Timeline, Unit
+from testing.toy import toy_sentences
 
 RATE_HZ = 16_000
 Samples = NDArray[np.float64]
@@ -13,6 +14,18 @@ Samples = NDArray[np.float64]
 def noise(duration_s: float, low_hz: float = 500, high_hz: float = 6000) -> Samples:
     sections = butter(2, [low_hz, high_hz], "band", fs=RATE_HZ, output="sos")
     return sosfilt(sections, np.random.default_rng(3).standard_normal(round(duration_s * RATE_HZ)))
+
+
+def hiss(seconds: float, units: float = 0.0) -> NDArray[np.float32]:
+    """Return noise of so many units of 16 bits; 0: digital silence."""
+    values = np.random.default_rng(0).uniform(-units, units, round(seconds * RATE_HZ))
+    return (values / 32768).astype(np.float32)
+
+
+def spoken(number: int) -> NDArray[np.float32]:
+    """Return a sentence of the toy corpus, in whole frames."""
+    samples = toy_sentences(12)[number].audio.samples
+    return samples[: len(samples) // 160 * 160]
 
 
 def vowels(source: Samples, tilt: float = 0.0) -> Samples:
