@@ -94,9 +94,7 @@ def _speak(library: Any, rate_hz: int, text: str, path: Path) -> list[tuple[str,
         sys.exit(f"the text {text[:40]!r} was not spoken")
     library.espeak_Synchronize()
     with wave.open(str(path), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(rate_hz)
+        file.setparams((1, 2, rate_hz, 0, "NONE", ""))
         file.writeframes(bytes(sound))
     return starts
 

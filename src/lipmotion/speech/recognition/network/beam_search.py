@@ -197,7 +197,6 @@ NEVER = -1e9
 
 Scores = NDArray[np.float64]
 Indices = NDArray[np.int64]
-WordEnds = dict[tuple[int, ...], tuple[float, int, int]]
 
 
 class DecodedWord(NamedTuple):
@@ -329,7 +328,7 @@ class _BeamSearch:
         ending = np.flatnonzero(tree.is_end[paths.node] & (paths.sound > limit))
         if len(ending) > MAX_ENDS:
             ending = ending[np.argsort(-paths.sound[ending], kind="stable")[:MAX_ENDS]]
-        ended: WordEnds = {}
+        ended: dict[tuple[int, ...], tuple[float, int, int]] = {}
         for place in ending.tolist():
             node, before = int(paths.node[place]), self.named[int(paths.context[place])]
             base, origin = float(paths.sound[place] - tree.score[node]), int(paths.origin[place])
