@@ -16,7 +16,7 @@ from lipmotion.motion.network_steps import STEP, cut_random_piece, interpolate_s
 from lipmotion.motion.posterior_network import ROWS, fit_components, limit_logarithms
 from lipmotion.motion.space import MotionSpace, fit_reduced_motion
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
-from lipmotion.stats.recurrence import RecurrentNetwork, make_recurrent_network
+from lipmotion.stats.networks import RecurrentNetwork, make_recurrent_network
 from lipmotion.stats.trees import create_statistics, ridge
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
@@ -147,10 +147,10 @@ class Hearing:
     @classmethod
     def fit(cls, recordings: Sequence[Speech]) -> Hearing:
         """Return that of a training."""
-        said = [limit_logarithms(each.posteriors) for each in recordings if each.posteriors is not None]
-        heard = [np.asarray(each.encoding, np.float32) for each in recordings if each.encoding is not None]
-        mean, basis = fit_components(said) if len(said) == len(recordings) else (None, None)
-        scale = float(np.concatenate(heard).std()) if len(heard) == len(recordings) else None
+        posteriors = [limit_logarithms(each.posteriors) for each in recordings if each.posteriors is not None]
+        encodings = [np.asarray(each.encoding, np.float32) for each in recordings if each.encoding is not None]
+        mean, basis = fit_components(posteriors) if len(posteriors) == len(recordings) else (None, None)
+        scale = float(np.concatenate(encodings).std()) if len(encodings) == len(recordings) else None
         return cls(mean, basis, scale)
 
     def stack_steps(self, speech: Speech) -> Float32Array:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.formats.markers import MILLIMETRES
+from lipmotion.formats.c3d import MILLIMETRES
 from lipmotion.measures import curves
 from lipmotion.measures.closures import find_threshold, measure_closures
 from lipmotion.measures.curves import measure_modulation_distance
@@ -87,8 +87,15 @@ def _compare_pair(reference: _Side, other: _Side) -> dict[str, Any]:
     """Return the figures of one pair. Raises InputError: as ``compare``."""
     names, notes = _match_channels(reference, other)
     rate_hz = min(reference.motion.rate_hz, other.motion.rate_hz, HIGHEST_RATE_HZ)
-    time_s, time_notes = _match_times(reference, other, rate_hz)
-    notes += time_notes
+    for name, side in (("the reference", reference), ("the other", other)):
+        if side.motion.rate_hz != rate_hz:
+            notes.append(f"{name} is resampled from {side.motion.rate_hz:g} to {rate_hz:g} frames a second")
+    first_s, second_s = ((len(side.motion.values) - 1) / side.motion.rate_hz for side in (reference, other))
+    last_s = min(first_s, second_s)
+    if abs(first_s - second_s) * rate_hz >= 1:
+        lasting = f"the reference lasts {first_s:.2f} s, the other {second_s:.2f} s"
+        notes.append(f"{lasting}: the first {last_s:.2f} s are compared")
+    time_s = np.arange(int(np.floor(last_s * rate_hz + 1e-6)) + 1) / rate_hz
     measured = np.ones(len(time_s), bool)
     for side in (reference, other):  # the frame next to each time
         nearest = np.floor(time_s * side.motion.rate_hz + 0.5).astype(int)
@@ -148,22 +155,6 @@ def _match_channels(reference: _Side, other: _Side) -> tuple[list[str], list[str
     missing = [name for name in reference.motion.names if name not in same]
     notes = [f"left out, for the other has no such channel in the same unit: {', '.join(missing)}"] if missing else []
     return same, notes
-
-
-def _match_times(reference: _Side, other: _Side, rate_hz: float) -> tuple[Array, list[str]]:
-    """Return the times of the frames that both have, and notes on what is resampled and left out."""
-    lengths = [(len(side.motion.values) - 1) / side.motion.rate_hz for side in (reference, other)]
-    notes = [
-        f"{name} is resampled from {side.motion.rate_hz:g} to {rate_hz:g} frames a second"
-        for name, side in (("the reference", reference), ("the other", other))
-        if side.motion.rate_hz != rate_hz
-    ]
-    if abs(lengths[0] - lengths[1]) * rate_hz >= 1:
-        notes.append(
-            f"the reference lasts {lengths[0]:.2f} s, the other {lengths[1]:.2f} s: the first {min(lengths):.2f} s are "
-            "compared"
-        )
-    return np.arange(int(np.floor(min(lengths) * rate_hz + 1e-6)) + 1) / rate_hz, notes
 
 
 def _select_values(motion: Motion, names: Sequence[str]) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -30,18 +30,12 @@ CHECKED = ("corpus", "split", "minutes")
 """What the header of a model says of its training, and must say of this corpus's training list."""
 
 
-@dataclass(frozen=True, eq=False)
-class EngineModel:
-    """A model of one engine, and the seconds of its training in this run (None: it was there already)."""
-
-    model: Model
-    seconds: float | None
-
-
 def train_engines(
     corpus: Corpus, folder: Path | None, settings: runner.ExperimentSettings, names: Sequence[str] = ENGINES_COMPARED
-) -> dict[str, EngineModel]:
-    """Return models of the corpus's training list, each engine by its defaults.
+) -> dict[str, tuple[Model, float | None]]:
+    """Return models of the corpus's training list, and the seconds of their training (None: it was there already).
+
+    Every engine has its defaults.
 
     folder : holds the models; what is not there yet is trained and put there. None: all are trained and not kept
     A run that was stopped goes on where it was.
@@ -50,17 +44,17 @@ def train_engines(
     Raises ExportError: the folder cannot be written to, or holds the corpus.
     """
     training = corpus.required("train")
-    models: dict[str, EngineModel] = {}
+    models: dict[str, tuple[Model, float | None]] = {}
     if folder is not None:
         check_apart((), [Source(corpus.path, "corpus")], folders=[folder])
         make_folder(folder)
         paths = {name: folder / f"{name}{SUFFIX}" for name in names}
-        models = {name: EngineModel(load_model(path), None) for name, path in paths.items() if path.is_file()}
+        models = {name: (load_model(path), None) for name, path in paths.items() if path.is_file()}
         if models:
             utterances = [corpus.utterance(name) for name in training]
             required = describe_training(corpus, utterances, TRAINING_LIST, len(training))
-            for name, trained in models.items():
-                _check_model(paths[name], name, trained.model, required)
+            for name, (model, _) in models.items():
+                _check_model(paths[name], name, model, required)
     missing = [name for name in names if name not in models]
     for name, here in zip(missing, runner.share_out(settings, missing), strict=True):
         start_s, engine = perf_counter(), engine_named(name, {})
@@ -70,7 +64,7 @@ def train_engines(
             with keep_unfinished(paths[name]) as work:
                 save_model(train_engine(corpus, engine, here, work), paths[name])
             model = load_model(paths[name])  # as the next run finds it
-        models[name] = EngineModel(model, perf_counter() - start_s)
+        models[name] = model, perf_counter() - start_s
     return {name: models[name] for name in names}
 
 
@@ -125,14 +119,14 @@ def compare_engines(
     check_training_names(corpus, corpus.required("train"), held_out)
     channels = runner.check_opening(corpus, held_out)
     trained = train_engines(corpus, models, settings.narrow(0, 0.6))
-    phones = trained[REFERENCE_ENGINE].model.phones
+    phones = trained[REFERENCE_ENGINE][0].phones
     recordings = runner.recognise_held_out(corpus, phones, held_out, settings.narrow(0.6, 0.7), channels=channels)
     steps = [(condition, name) for condition in recordings.conditions for name in trained]
     made: dict[str, dict[str, tuple[Sequence[ComparedClip], Sequence[ComparedClip]]]] = {
         condition: {} for condition in recordings.conditions
     }
     for condition, name in with_progress(steps, "comparing", sub_monitor(settings.monitor, 0.7, 1)):
-        system = trained[name].model
+        system = trained[name][0]
         known = replace(recordings, speakers=system.speakers)
         speech = make_speech(known, condition, system.engine, system.learned)
         clips = generate_compared(known, speech, system.engine, system.learned)
@@ -143,13 +137,10 @@ def compare_engines(
     about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed}
     about |= {"closed_under": recordings.closed_under, "reference": REFERENCE_ENGINE}
     about["models"] = {
-        name: {
-            "configuration": each.model.engine.config.as_mapping(),
-            "utterances": each.model.about["utterances"],
-            "minutes": each.model.about["minutes"],
-            "seconds": each.seconds,
-        }
-        for name, each in trained.items()
+        name: {"configuration": model.engine.config.as_mapping()}
+        | {key: model.about[key] for key in ("utterances", "minutes")}
+        | {"seconds": seconds}
+        for name, (model, seconds) in trained.items()
     }
     conditions = {name: {"systems": _make_rows(recordings, systems, settings.seed)} for name, systems in made.items()}
     return replace_nan(about | {"conditions": conditions})

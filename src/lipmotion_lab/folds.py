@@ -83,7 +83,7 @@ def cross_validate(
     names = corpus.required("train")
     groups: list[tuple[str, ...]] = [(name,) for name in names]  # never divided between parts
     if by_speaker:  # those without a speaker are one more
-        groups = [found for speaker in corpus.speakers if (found := corpus.names("train", [speaker]))]
+        groups = [listed for speaker in corpus.speakers if (listed := corpus.names("train", [speaker]))]
     count = count if count is not None else len(groups) if by_speaker else FOLDS
     if not 2 <= count <= len(groups):
         what = "speakers" if by_speaker else "utterances"
@@ -115,8 +115,7 @@ def cross_validate(
 def _make_row(results: Sequence[_GeneratedFold], condition: str, seed: int, *, by_speaker: bool) -> dict[str, Any]:
     """Return the figures of the clips of all folds in one condition, and the correlation of each speaker's opening."""
     pooled = [clip for result in results for clip in result.clips[condition]]
-    figures = measure_clips(pooled, results[0], seed)
-    row = runner.make_opening_row(figures)
+    row = runner.make_opening_row(measure_clips(pooled, results[0], seed))
     if not by_speaker:
         return row
     clips: dict[str, list[ComparedClip]] = {}
@@ -167,8 +166,7 @@ def cross_validate_blocks(
             validation = blocks[(number + 1) % count]
             training = [name for name in names if name not in {*test, *validation}]
             lists = {"train": training, "val": validation, "test": test}
-            block = _run_block(experiment, corpus, lists, part)
-            arrays = replace(block, closed_under=threshold).as_arrays()
+            arrays = _run_block(experiment, corpus, lists, threshold, part).as_arrays()
             checkpoint.save(f"block-{number}", arrays)
         results.append(_fold_from_arrays(arrays))
     conditions: dict[str, dict[str, list[ComparedClip]]] = {}
@@ -188,6 +186,7 @@ def _run_block(
     experiment: Callable[..., dict[str, Any]],
     corpus: Corpus,
     lists: Mapping[str, Sequence[str]],
+    threshold: float | None,
     settings: runner.ExperimentSettings,
 ) -> _GeneratedFold:
     """Return what an experiment's systems generate for the list ``test``, by condition and system."""
@@ -199,7 +198,7 @@ def _run_block(
             compared.append(recordings.channels)
 
     experiment(corpus.divided(lists), settings=replace(settings, receive=receive))
-    return _GeneratedFold(made, [], len(lists["train"]), None, compared[0])
+    return _GeneratedFold(made, [], len(lists["train"]), threshold, compared[0])
 
 
 def _make_rows(

@@ -53,13 +53,8 @@ class PhoneticTableOptions:
 FULL, QUICK = PhoneticTableOptions(), PhoneticTableOptions(states=(5,), mixtures=(1, 2), motion_mixtures=(1, 2))
 
 
-@dataclass(frozen=True, eq=False)
-class _System:
-    """A trained system of one unit set, and the ACC on ``val`` by its Gaussians a state: for speech, for motion."""
-
-    engine: JointEngine
-    model: JointModel
-    acc: dict[tuple[int, int], float]
+ValidationAcc = Mapping[tuple[int, int], float]
+"""The ACC on ``val`` by the Gaussians a state: for speech, for motion."""
 
 
 @limit_threads()
@@ -81,26 +76,27 @@ def run_hofer2008(
     """
     runner.check_opening(corpus, compared := corpus.required(split))  # before the long work
     validation, names = corpus.required("val"), tuple(sorted(corpus.required("train")))
-    key = runner.PartKey(_create_engine(channels=options.channels), (*names, *validation, *compared))
+    preset = JointEngineConfig(**{**JointEngineConfig.presets[PRESET], "channels": options.channels})
+    key = runner.PartKey(JointEngine(preset), (*names, *validation, *compared))
     checkpoint, utterances = runner.open_parts(work, corpus, settings, key), [corpus.utterance(name) for name in names]
     phones, examples = runner.train_phones(utterances, settings.narrow(0, 0.1), checkpoint)
     read = partial(runner.recognise_held_out, corpus, phones, channels=(OPENING,))
     choosing = read(names=validation, settings=settings.narrow(0.1, 0.12))
     recordings = read(names=compared, settings=settings.narrow(0.12, 0.15))
     cells = [(states, units) for states in options.states for units in PAPER_SCORES]
-    made: dict[tuple[int, str, str], dict[str, tuple[_System, Sequence[ComparedClip]]]] = {
+    made: dict[tuple[int, str, str], dict[str, tuple[ValidationAcc, Sequence[ComparedClip]]]] = {
         case: {} for case in product(options.states, recordings.conditions, PINS)
     }
     parts = runner.share_out(settings, [f"{units}, {states} states" for states, units in cells], 0.15)
     for (states, units), part in zip(cells, parts, strict=True):
-        engine = _create_engine(units=units, states=states, channels=options.channels)
-        system = _train_system(engine, options, examples, choosing, checkpoint, part.monitor)
+        engine = JointEngine(replace(preset, units=units, states=states))
+        model, acc = _train_system(engine, options, examples, choosing, checkpoint, part.monitor)
         for condition in recordings.conditions:
-            speech = held_out.make_speech(recordings, condition, system.engine, system.model)
+            speech = held_out.make_speech(recordings, condition, engine, model)
             for pins, closures in PINS.items():
-                pinned = JointEngine(replace(system.engine.config, closures=closures))
-                clips = held_out.generate_compared(recordings, speech, pinned, system.model)
-                made[states, condition, pins][units] = system, clips
+                pinned = JointEngine(replace(engine.config, closures=closures))
+                clips = held_out.generate_compared(recordings, speech, pinned, model)
+                made[states, condition, pins][units] = acc, clips
                 if not closures:
                     settings.receive(f"{units}, {states} states", condition, recordings, clips)
     about = {"split": split or "all", "clips": len(recordings.utterances), "trained_on": len(examples)}
@@ -113,10 +109,6 @@ def run_hofer2008(
     return replace_nan(about | {"tables": tables})
 
 
-def _create_engine(**options: Any) -> JointEngine:
-    return JointEngine(JointEngineConfig(**{**JointEngineConfig.presets[PRESET], **options}))
-
-
 def _train_system(
     engine: JointEngine,
     options: PhoneticTableOptions,
@@ -124,7 +116,7 @@ def _train_system(
     choosing: HeldOutRecordings,
     checkpoint: Checkpoint,
     monitor: Monitor,
-) -> _System:
+) -> tuple[JointModel, ValidationAcc]:
     """Return a system with the numbers of Gaussians of the highest ACC: for speech, and with that number for motion.
 
     A number is doubled until twice in a row that does not help. Raises InputError: training ends before any number.
@@ -155,17 +147,16 @@ def _train_system(
         stored = arrays | {_COUNTS: np.array(list(tried)), _ACC: np.array(list(tried.values()))}
         checkpoint.save(stage, stored)
     acc = dict(zip(map(tuple, stored[_COUNTS].tolist()), stored[_ACC].tolist(), strict=True))
-    model = engine.from_arrays({name: array for name, array in stored.items() if name not in (_ACC, _COUNTS)})
-    return _System(engine, model, acc)
+    return engine.from_arrays({name: array for name, array in stored.items() if name not in (_ACC, _COUNTS)}), acc
 
 
-def _find_best_count(acc: Mapping[tuple[int, int], float]) -> tuple[int, int]:
+def _find_best_count(acc: ValidationAcc) -> tuple[int, int]:
     """Return the numbers of Gaussians with the highest correlation; among equals the smallest."""
     return max(acc, key=lambda counts: (acc[counts], -counts[0], -counts[1]))
 
 
 def _make_table(
-    recordings: HeldOutRecordings, made: Mapping[str, tuple[_System, Sequence[ComparedClip]]], seed: int
+    recordings: HeldOutRecordings, made: Mapping[str, tuple[ValidationAcc, Sequence[ComparedClip]]], seed: int
 ) -> dict[str, Any]:
     """Return the figures of all sets in one condition, and the intervals of the differences of every two of them."""
     openings = {units: evaluate.pair_curves(recordings, clips) for units, (_, clips) in made.items()}
@@ -173,13 +164,13 @@ def _make_table(
     scores = {units: evaluate.sum_closings(*pair, threshold) for units, pair in openings.items()}
     acc = {units: evaluate.sum_correlations(*pair) for units, pair in openings.items()}
     rows = {}
-    for units, (system, clips) in made.items():
+    for units, (on_val, clips) in made.items():
         figures = evaluate.measure_clips(clips, recordings, seed)
         rows[units] = runner.make_opening_row(figures) | {
             "units": UNIT_SETS[units].count,
             "paper": PAPER_SCORES[units],
-            **dict(zip(("gaussians", "motion_gaussians"), _find_best_count(system.acc), strict=True)),
-            "acc_on_val": {f"{speech}, {motion}": value for (speech, motion), value in system.acc.items()},
+            **dict(zip(("gaussians", "motion_gaussians"), _find_best_count(on_val), strict=True)),
+            "acc_on_val": {f"{speech}, {motion}": value for (speech, motion), value in on_val.items()},
             "jerk": figures["channels"][OPENING]["jerk"],
             "score_95": scores[units].compute_interval(seed),
             "score_gain_95": scores[units].compute_gain(scores[REFERENCE_SET], seed),

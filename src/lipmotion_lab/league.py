@@ -78,14 +78,6 @@ class Rival:
     ours: bool = False
     settings: Mapping[str, Sequence[Any]] = field(default_factory=dict)
 
-    def build_command(self, folder: Path) -> list[str]:
-        """Return the command, whose files are in a folder."""
-        program, *files = self.run
-        if program.startswith("{"):
-            variable, _, default = program.strip("{}").partition(":")
-            program = os.environ.get(variable) or (sys.executable if default == "python" else default)
-        return [program, *(str(folder / file) for file in files)]
-
     def list_settings(self) -> list[dict[str, Any]]:
         """Return all settings that are tried. Raises MissingDependencyError: a variable in them is not set."""
         tried = []
@@ -140,8 +132,9 @@ def load_recordings(corpus: Corpus, names: Sequence[str], work: Path, monitor: M
     make_folder(work / "sound")
     for utterance in with_progress([corpus.utterance(name) for name in names], "recordings", monitor):
         motion, seen = utterance.track.motion, np.asarray(utterance.track.seen)
-        if missing := [name for name in CHANNELS if name not in motion.names] or seen.sum() < 2 * REACH:
-            what = f"no {', '.join(missing)}" if isinstance(missing, list) else f"a face in {seen.sum()} frames"
+        missing = [name for name in CHANNELS if name not in motion.names]
+        if missing or seen.sum() < 2 * REACH:
+            what = f"no {', '.join(missing)}" if missing else f"a face in {seen.sum()} frames"
             raise CorpusError(
                 f"{corpus.path}: {utterance.name} has {what}, required the lips of a filmed face; prepare videos, or "
                 "leave the recording out"
@@ -183,9 +176,13 @@ def ask(
     limit_s : seconds after which the job is ended
     Raises MissingDependencyError: it is not installed. Raises RivalError: it crashed, or answered nonsense.
     """
-    command, settings = rival.build_command(adapters), rival.list_settings()
-    scripts = [Path(word).read_bytes() for word in command if Path(word).parent == adapters]
-    key = hashlib.sha256(b"".join([*scripts, json.dumps(settings, sort_keys=True).encode()])).hexdigest()[:8]
+    program, *scripts = rival.run
+    if program.startswith("{"):
+        variable, _, default = program.strip("{}").partition(":")
+        program = os.environ.get(variable) or (sys.executable if default == "python" else default)
+    command, settings = [program, *(str(adapters / script) for script in scripts)], rival.list_settings()
+    contents = [Path(word).read_bytes() for word in command if Path(word).parent == adapters]
+    key = hashlib.sha256(b"".join([*contents, json.dumps(settings, sort_keys=True).encode()])).hexdigest()[:8]
     folder = work / "answers" / f"{rival.name}-{key}"
     make_folder(folder)
     files = [folder / f"{each.sound.stem}.json" for each in recordings]
@@ -242,30 +239,29 @@ def _run(
 def read_answers(rival: Rival, recording: Recording, content: Any) -> list[RivalAnswer]:
     """Return the answers to a recording by settings, checked. Raises RivalError."""
     about, count = f"{rival.title}, {recording.utterance.name}", len(rival.list_settings())
+    answers, needed_s = [], recording.utterance.audio.duration_s
     if not isinstance(content, list) or len(content) != count:
         raise RivalError(f"{about}: no list of {count} answers, one for each settings")
-    return [_read_answer(about, each, recording.utterance.audio.duration_s) for each in content]
-
-
-def _read_answer(about: str, content: Any, needed_s: float) -> RivalAnswer:
-    try:
-        time_s, names = np.array(content["times"], float), tuple(sorted(content["weights"]))
-        weights = np.stack([np.array(content["weights"][name], float) for name in names], axis=1)
-        seconds = float(content.get("seconds", np.nan))
-    except (TypeError, KeyError, ValueError, AttributeError) as error:
-        raise RivalError(
-            f"{about}: not an answer ({type(error).__name__}: {error}); required times, weights"
-        ) from error
-    if len(time_s) != len(weights) or len(time_s) < 2:
-        raise RivalError(f"{about}: {len(time_s)} times and {len(weights)} values, required as many, two or more")
-    if not (np.isfinite(time_s).all() and np.isfinite(weights).all()):
-        raise RivalError(f"{about}: values that are not finite, required numbers")
-    first_s, last_s = float(time_s[0]), float(time_s[-1])
-    if (np.diff(time_s) < 0).any() or not -1 <= first_s <= needed_s / 2 <= last_s <= needed_s + 1:
-        required = f"required rising from about 0 to {needed_s:.2f} s"
-        raise RivalError(f"{about}: times from {first_s:.2f} to {last_s:.2f} s, {required}")
-    at_s = np.arange(int(needed_s * GRID_HZ) + 1) / GRID_HZ
-    return RivalAnswer(names, np.stack([np.interp(at_s, time_s, column) for column in weights.T], axis=1), seconds)
+    for each in content:
+        try:
+            time_s, names = np.array(each["times"], float), tuple(sorted(each["weights"]))
+            weights = np.stack([np.array(each["weights"][name], float) for name in names], axis=1)
+            seconds = float(each.get("seconds", np.nan))
+        except (TypeError, KeyError, ValueError, AttributeError) as error:
+            reason = f"{type(error).__name__}: {error}"
+            raise RivalError(f"{about}: not an answer ({reason}); required times, weights") from error
+        if len(time_s) != len(weights) or len(time_s) < 2:
+            raise RivalError(f"{about}: {len(time_s)} times and {len(weights)} values, required as many, two or more")
+        if not (np.isfinite(time_s).all() and np.isfinite(weights).all()):
+            raise RivalError(f"{about}: values that are not finite, required numbers")
+        first_s, last_s = float(time_s[0]), float(time_s[-1])
+        if (np.diff(time_s) < 0).any() or not -1 <= first_s <= needed_s / 2 <= last_s <= needed_s + 1:
+            required = f"required rising from about 0 to {needed_s:.2f} s"
+            raise RivalError(f"{about}: times from {first_s:.2f} to {last_s:.2f} s, {required}")
+        at_s = np.arange(int(needed_s * GRID_HZ) + 1) / GRID_HZ
+        values = np.stack([np.interp(at_s, time_s, column) for column in weights.T], axis=1)
+        answers.append(RivalAnswer(names, values, seconds))
+    return answers
 
 
 @dataclass(frozen=True, eq=False)
@@ -378,8 +374,8 @@ def _compute_f1(counts: Array) -> float:
 
 def measure_onsets(recording: Recording, made: Array, shut: float) -> Array:
     """Return the sum of errors, in ms, with which movements of the mouth begin, and their number [shape=(2,)]."""
-    own, frame_s = find_threshold([recording.original[:, 0]]), float(np.median(np.diff(recording.time_s)))
-    original = find_closings(-recording.original[:, 0], -own)  # the first open frame after a closed one
+    threshold, frame_s = find_threshold([recording.original[:, 0]]), float(np.median(np.diff(recording.time_s)))
+    original = find_closings(-recording.original[:, 0], -threshold)  # the first open frame after a closed one
     generated = find_closings(-made[:, 0], -shut)
     pairs = match_closings(generated, original, round(ONSET_REACH_S / frame_s))
     errors = sum(abs(recording.time_s[g] - recording.time_s[o]) for g, o in pairs)
@@ -568,11 +564,16 @@ def write_league(league: League, folder: Path) -> dict[str, Any]:
     section, motion, part = describe_league(league), _choose_excerpt(league), folder / PART
     names = [each.utterance.name for each in league.recordings]
     accs = {each.rival.title: [acc for acc, _ in each.figures["acc"].sums] for each in league.standings}
-    figures: dict[str, Any] = {"about": league.about, "best_rival": section.table.reference or None}
-    figures |= {"rivals": section.table.rows, "absent": league.absent, "failed": league.failed}
-    figures["chosen"] = {each.rival.title: each.chosen for each in league.standings}
-    figures["each"] = {title: dict(zip(names, of, strict=True)) for title, of in accs.items()}
-    figures = replace_nan(figures)
+    content = {
+        "about": league.about,
+        "best_rival": section.table.reference or None,
+        "rivals": section.table.rows,
+        "absent": league.absent,
+        "failed": league.failed,
+        "chosen": {each.rival.title: each.chosen for each in league.standings},
+        "each": {title: dict(zip(names, of, strict=True)) for title, of in accs.items()},
+    }
+    figures: dict[str, Any] = replace_nan(content)
     section.write_tables(part / "tables")
     write_text(part / "figures.json", as_json(figures) + "\n")
     record = {"pictures": list(_draw_mouths(motion, part)) if motion else [], "videos": [], "stamp": league.about}
@@ -588,15 +589,13 @@ def _choose_excerpt(league: League) -> dict[str, Any]:
     """Return what systems do in the seconds that have most p, b and m, as the page of a report shows it."""
     if not league.standings:
         return {}
-
-    def count_lips(n: int, start_s: float) -> int:
-        spans = league.recordings[n].list_spans(lips=True)
-        return sum(start_s <= start and end <= start_s + SHOWN_S for start, end in spans)
-
-    begins = [
-        (n, s) for n, r in enumerate(league.recordings) for s in [0.0, *(span[0] for span in r.list_spans(lips=True))]
-    ]
-    number, begin_s = max(begins, key=lambda each: count_lips(*each))
+    max_count, number, begin_s = -1, 0, 0.0
+    for n, each in enumerate(league.recordings):
+        lips = each.list_spans(lips=True)
+        for start_s in (0.0, *(start for start, _ in lips)):
+            count = sum(start_s <= start and end <= start_s + SHOWN_S for start, end in lips)
+            if count > max_count:
+                max_count, number, begin_s = count, n, start_s
     recording = league.recordings[number]
     seen = (recording.time_s >= begin_s) & (recording.time_s < begin_s + SHOWN_S)
     spoken = [s for s in recording.phones if s[2] and s[1] > begin_s and s[0] < begin_s + SHOWN_S]

@@ -81,8 +81,8 @@ def choose_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:
         raise InputError("the list of utterances to train on is empty; give one name a line")
     steps = sorted(set(sizes)) if sizes is not None else [*(n for n in SIZES if n < listed), listed]
     if not steps or not 1 <= steps[0] <= steps[-1] <= listed:
-        given = ", ".join(map(str, steps)) or "none"
-        raise InputError(f"sizes {given}; required: from 1 to {listed}, which is how many names the list has")
+        named = ", ".join(map(str, steps)) or "none"
+        raise InputError(f"sizes {named}; required: from 1 to {listed}, which is how many names the list has")
     return steps
 
 
@@ -105,8 +105,7 @@ def _make_row(corpus: Corpus, result: runner.HeldOutResult, seed: int) -> dict[s
     conditions = {}
     for name, clips in result.clips.items():
         figures = measure_clips(clips, result.recordings, seed)
-        channels = figures["channels"]
-        accs = {f"acc_{other}": channels[other]["acc"] if other in channels else None for other in OTHERS}
+        accs = {f"acc_{other}": figures["channels"].get(other, {}).get("acc") for other in OTHERS}
         conditions[name] = runner.make_opening_row(figures) | accs
     return {
         "used": len(result.used),

@@ -37,7 +37,7 @@ from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import replace_nan
 from lipmotion.types import FRAME_RATE_HZ, Speech, Utterance, sub_monitor, with_progress
 from lipmotion_lab import runner
-from lipmotion_lab.engine_comparison import EngineModel, train_engine, train_engines
+from lipmotion_lab.engine_comparison import train_engine, train_engines
 from lipmotion_lab.evaluation.evaluate import measure_clips, pair_curves, sum_correlations, sum_distances
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, OPENING, generate_compared, make_speech
 from lipmotion_lab.learning_curve import check_training_names
@@ -85,7 +85,7 @@ def select_pieces(engine: SelectionEngine, model: SelectionModel, speech: Speech
     """Return the costs of a system, the phones of some speech, and the pieces that it chooses for them."""
     costs = model.costs(engine.config)
     target = build_target(model, costs, speech)
-    return costs, target, to_pieces(costs, target, select(costs, target).units)
+    return costs, target, to_pieces(costs, target, select(costs, target)[0])
 
 
 def list_overlaps(costs: Costs, target: Target, pieces: Sequence[Piece]) -> Array:
@@ -175,25 +175,24 @@ def run_minnis2000(
     for held_out in lists.values():
         check_training_names(corpus, corpus.required("train"), held_out)
     training = settings.narrow(0, 0.6)
-    kept_in = models or (work and work / "model")
     if quick or not guided:
         options = ({} if guided else {"guide": 0.0, "joint_recogniser": False}) | ({"epochs": 20} if quick else {})
         start_s, engine = perf_counter(), engine_named(ENGINE, options)
         model = train_engine(corpus, engine, training, work)
-        trained = EngineModel(model, perf_counter() - start_s)
+        seconds: float | None = perf_counter() - start_s
     else:
-        trained = train_engines(corpus, kept_in, training, [ENGINE])[ENGINE]
-    figures = {}
+        model, seconds = train_engines(corpus, models or (work and work / "model"), training, [ENGINE])[ENGINE]
+    figures, systems = {}, list_rows(guided=guided)
     for (split, names), part in zip(lists.items(), runner.share_out(settings, [*lists], 0.6), strict=True):
-        key = runner.PartKey(trained.model.engine, names, model=trained.model, others=str(list_rows(guided=guided)))
+        key = runner.PartKey(model.engine, names, model=model, others=str(systems))
         checkpoint = runner.open_parts(work and work / split, corpus, settings, key)
-        figures[split] = _measure_list(corpus, names, trained.model, list_rows(guided=guided), checkpoint, part)
-    about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
-    about |= {key: trained.model.about[key] for key in ("utterances", "minutes")}
+        figures[split] = _measure_list(corpus, names, model, systems, checkpoint, part)
+    about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": seconds}
+    about |= {key: model.about[key] for key in ("utterances", "minutes")}
     printed = vars(SelectionConfig.parsed(MINNIS_2000))
     about["rows"] = {
         name: {key: value for key, value in vars(config).items() if value != printed[key]}
-        for name, config in list_rows(guided=guided).items()
+        for name, config in systems.items()
     }
     return replace_nan(about | {"lists": figures})
 

@@ -10,6 +10,7 @@ import shlex
 import shutil
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 from importlib import metadata
@@ -273,17 +274,14 @@ def digest_engine(name: str) -> str:
 
 
 def _describe_machine() -> dict[str, Any]:
-    try:
+    lines: list[str] = []
+    with suppress(OSError):
         lines = CPU_INFO.read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
     named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    versions: dict[str, str | None] = {"Python": platform.python_version()}
+    versions: dict[str, str | None] = {"Python": platform.python_version(), **dict.fromkeys(PACKAGES)}
     for package in PACKAGES:
-        try:
+        with suppress(metadata.PackageNotFoundError):
             versions[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            versions[package] = None
     machine = {
         "cores": os.cpu_count(),
         "processor": named[0] if named else platform.processor() or platform.machine(),

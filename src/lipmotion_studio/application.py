@@ -6,8 +6,12 @@ looked up by number or name among those that there are, and what is dropped gets
 
 from __future__ import annotations
 
+import hmac
+from dataclasses import dataclass
 from functools import partial
+from hashlib import sha256
 from importlib.resources import files
+from urllib.parse import parse_qs
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -17,12 +21,13 @@ from starlette.routing import Route
 
 from lipmotion_studio.folder import RevisionError
 from lipmotion_studio.page_replies import ProjectReplies, RecordingReplies
-from lipmotion_studio.recording import OpenRecording
-from lipmotion_studio.requests import Access
 from lipmotion_studio.studio import Studio
 from lipmotion_studio.web.listening import read_page
-from lipmotion_studio.web.replies import ERRORS, FRESH, HEADERS, Guard, SecurityHeaders, reply_failed
+from lipmotion_studio.web.replies import ERRORS, FRESH, HEADERS, Guard, SecurityHeaders, refuse_foreign, reply_failed
 
+TOKEN_HEADER = "x-lipmotion-token"  # noqa: S105 # its name
+API = "/api"
+KEY_DIGITS = 32
 FIRST = "studio.html"
 """The page itself, whose address is empty."""
 PAGE_POLICY = HEADERS["content-security-policy"] + (
@@ -31,9 +36,33 @@ PAGE_POLICY = HEADERS["content-security-policy"] + (
 """Pictures, sounds and textures of models become objects of the page, whose addresses begin with ``blob:``."""
 
 
+@dataclass(frozen=True)
+class Access:
+    """What a request must bring: the token of this run, and a host (name with port, lower case) of this server."""
+
+    token: str
+    hosts: frozenset[str]
+
+    def make_key(self, path: str) -> str:
+        """Return the key that allows to load one address: for elements of a page, which bring no headers."""
+        return hmac.new(self.token.encode(), path.encode(), sha256).hexdigest()[:KEY_DIGITS]
+
+    def find_refusal(self, method: str, path: str, query: bytes, headers: dict[str, str]) -> tuple[int, str] | None:
+        """Return why a request is refused, with a status; None: it is not."""
+        foreign = refuse_foreign(path, headers, self.hosts.__contains__)
+        if foreign or (path != API and not path.startswith(f"{API}/")):
+            return foreign
+        if hmac.compare_digest(headers.get(TOKEN_HEADER, "").encode(), self.token.encode()):
+            return None
+        key = parse_qs(query.decode("latin-1")).get("key", [""])[0] if method in ("GET", "HEAD") else ""
+        if hmac.compare_digest(key.encode(), self.make_key(path).encode()):
+            return None
+        return 401, "the token is missing, or that of an earlier run; open the address that lipmotion studio printed"
+
+
 def create_application(studio: Studio, access: Access) -> Starlette:
     """Return the application; access: the token, and the addresses that the server has."""
-    recordings, project = RecordingReplies(studio, access), ProjectReplies(studio)
+    recordings, project = RecordingReplies(studio, access.make_key), ProjectReplies(studio)
     page = dict(read_page(files("lipmotion_studio") / "page"))
 
     async def send_packaged(request: Request) -> Response:
@@ -50,15 +79,9 @@ def create_application(studio: Studio, access: Access) -> Starlette:
         post("/api/understand", project.analyse),
         post("/api/lines", project.receive_recording),
         Route(one, recordings.open_recording),
-        post(f"{one}/edits", recordings.edit),
-        post(f"{one}/undo", recordings.step_with(OpenRecording.undo)),
-        post(f"{one}/redo", recordings.step_with(OpenRecording.redo)),
-        post(f"{one}/settle", recordings.settle),
+        *(post(f"{one}/{name}", handler) for name, handler in recordings.list_changes().items()),
         post(f"{one}/transcript", recordings.change_words),
         post(f"{one}/restore", recordings.restore),
-        post(f"{one}/versions", recordings.keep),
-        post(f"{one}/versions/forget", recordings.forget),
-        post(f"{one}/versions/back", recordings.go_back),
         post(f"{one}/mark", project.mark),
         post(f"{one}/remove", project.remove),
         post(f"{one}/export", project.export_one),

@@ -46,7 +46,7 @@ from lipmotion_studio.project import (
     digest_edits,
     parse_project,
 )
-from lipmotion_studio.votes import Vote, format_votes, read_votes
+from lipmotion_studio.votes import Vote, read_votes, write_votes
 
 LOG = logging.getLogger("lipmotion")
 PROJECT, SOUNDS, EDITS, EXPORTS, LEXICON = "project.json", "sounds", "edits", "exports", "lexicon.txt"
@@ -92,10 +92,10 @@ def summarise_edits(file: EditFile) -> EditsSummary:
 def compute_revision(recording: ProjectRecording, edits: EditsSummary) -> int:
     """Return the revision of a recording: another number after every change that somebody can make of it."""
     versions = [[version.number, *version.steps] for version in recording.versions]
-    return _revision([recording.transcript, recording.mark, versions, edits.state])
+    return _digest_revision([recording.transcript, recording.mark, versions, edits.state])
 
 
-def _revision(content: Any) -> int:
+def _digest_revision(content: Any) -> int:
     return int(sha256(as_json(content).encode()).hexdigest()[:8], 16) >> 1
 
 
@@ -303,11 +303,12 @@ class ProjectFolder:
             listed = read_lines(source, (EDITS_SUFFIX,)) if source.is_dir() or not is_recording(source) else []
             sources = [(Path(each.recording), each.name, each.transcript) for each in listed]
             known = {os.path.realpath(self.locate_sound(each)) for each in self.project.lines.values()}
-            taken, file = self._list_taken(), self.path.absolute() / PROJECT
+            taken = {file_key(each.name) for each in self.project.lines.values()}
             added: list[ProjectRecording] = []
             for sound, name, transcript in sources or [(source, make_portable(source.stem), "")]:
                 if os.path.realpath(sound) not in known:
-                    number, reference = self.project.next_number + len(added), sound_reference(sound.absolute(), file)
+                    number = self.project.next_number + len(added)
+                    reference = sound_reference(sound.absolute(), self.path.absolute() / PROJECT)
                     recording = ProjectRecording(number, name, reference, hash_file(sound), transcript)
                     added.append(self._choose_name(recording, taken))
             project = self.project.with_recordings(added)
@@ -327,7 +328,8 @@ class ProjectFolder:
         with self.lock:
             folder = self.path / SOUNDS
             make_folder(folder)
-            taken = self._list_taken() | {file_key(each.stem) for each in folder.iterdir()}  # also of what was removed
+            taken = {file_key(each.name) for each in self.project.lines.values()}
+            taken |= {file_key(each.stem) for each in folder.iterdir()}  # also of what was removed
             number = self.project.next_number
             recording = ProjectRecording(number, clean_name(Path(name).stem), "", digest, transcript)
             recording = self._choose_name(recording, taken)
@@ -337,9 +339,6 @@ class ProjectFolder:
                 content.replace(temporary)
             self.change(lambda project: project.with_recordings([recording]))
             return number
-
-    def _list_taken(self) -> set[str]:
-        return {file_key(recording.name) for recording in self.project.lines.values()}
 
     def _choose_name(self, recording: ProjectRecording, taken: set[str]) -> ProjectRecording:
         """Return a new recording with a name that is free, and take it; a number is added if needed."""
@@ -387,18 +386,17 @@ class ProjectFolder:
         """Write a vote behind those that were cast before; return all. Raises InputError, ExportError: not possible."""
         with self.lock:
             votes = (*read_votes(self.path / VOTES), vote)
-            with atomic_file(self.path / VOTES) as temporary:
-                temporary.write_text(format_votes(votes), encoding="utf-8")
+            write_votes(self.path / VOTES, votes)
             return votes
 
     @property
     def voice_revision(self) -> int:
         """The revision of the voice that moves the recordings, as ``compute_revision`` is that of a recording."""
-        return _revision(self.project.model)
+        return _digest_revision(self.project.model)
 
     def compute_word_revision(self, word: str) -> int:
         """Return the revision of the project's pronunciations of a word, as ``compute_revision``."""
-        return _revision([word, self.load_lexicon().user.get(word, ())])
+        return _digest_revision([word, self.load_lexicon().user.get(word, ())])
 
     def add_pronunciation(self, word: str, phones: tuple[str, ...], revision: int) -> None:
         """Write a pronunciation into the lexicon, ahead of earlier ones. Raises RevisionError, ExportError."""

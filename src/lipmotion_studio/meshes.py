@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lipmotion.articulation.expression import is_mood, with_moods
+from lipmotion.articulation.expression import with_moods
 from lipmotion.errors import InputError, shorten
 from lipmotion.pipeline.outputs.output import OutputSettings, ShownFace
 from lipmotion.storage.locks import open_temporary
@@ -15,7 +15,6 @@ from lipmotion.types import FRAME_RATE_HZ, Channel, Generation, Motion, StateTra
 from lipmotion.types.delivery import MOODS, MoodKey
 from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.characters.file_limits import Budget
-from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.filmed.face import SUFFIX
 from lipmotion_faces.mesh import MeshFace
 from lipmotion_faces.outputs.scenes import KEPT, build_head_scene, write_scene
@@ -32,13 +31,13 @@ class Faces:
     """The faces of a project by name: built in, its own characters, and filmed faces, also those made here."""
 
     def __init__(self, characters: Mapping[str, Path], made: Callable[[], Mapping[str, Path]] = dict) -> None:
-        self._given, self._made = characters, made
+        self._chosen, self._made = characters, made
         self._shown: dict[str, ShownFace] = {}
         self._meshes: dict[str, bytes] = {}
 
     @property
     def _characters(self) -> dict[str, Path]:
-        return {**self._made(), **self._given}
+        return {**self._made(), **self._chosen}
 
     @property
     def names(self) -> dict[str, bool]:
@@ -61,10 +60,6 @@ class Faces:
             self._shown[name] = shown_face(face)
         return self._shown[name]
 
-    def name_mesh(self, name: str, motion: Motion) -> str:
-        """Return the name of the mesh that a motion's weights are of."""
-        return HEAD_OF_MOODS if name == HEAD and any(map(is_mood, motion.names)) else name
-
     def load_mesh(self, name: str) -> bytes:
         """Return the ``.glb`` of a face at rest. Raises InputError: there is none of that name, or it is no mesh."""
         if name in self._meshes:
@@ -75,31 +70,18 @@ class Faces:
         if path is not None and path.suffix.lower() in KEPT:
             self._meshes[name] = Budget().read_bytes(path, "character")
             return self._meshes[name]
-        if path is not None:
-            scene = self.open_face(name).build_scene(_create_still(), OutputSettings(self.open_face(name)), None)
-        elif name in (HEAD, HEAD_OF_MOODS):
-            scene = build_head_scene(_create_still(*((MoodKey(0.0, MOODS[0]),) if name == HEAD_OF_MOODS else ())))
-        else:
+        if path is None and name not in (HEAD, HEAD_OF_MOODS):
             raise InputError(f"no mesh {shorten(repr(name))}; required one of: {HEAD}, {HEAD_OF_MOODS}")
+        motion = Motion(np.zeros((1, 1)), FRAME_RATE_HZ, (Channel("opening"),))  # a frame of a closed mouth
+        if name == HEAD_OF_MOODS and path is None:
+            motion = with_moods(motion, [MoodKey(0.0, MOODS[0])])
+        trace = StateTrace(("",), np.zeros(1, np.intp))
+        still = Generation(motion, np.zeros(motion.values.shape), Timeline(()), trace)
+        if path is None:
+            scene = build_head_scene(still)
+        else:
+            scene = self.open_face(name).build_scene(still, OutputSettings(self.open_face(name)), None)
         with open_temporary() as folder:
             write_scene(folder / "face.glb", scene)
             self._meshes[name] = (folder / "face.glb").read_bytes()
         return self._meshes[name]
-
-
-def _create_still(*keys: MoodKey) -> Generation:
-    """Return a frame of a closed mouth, with the channels of moods."""
-    closed = Motion(np.zeros((1, 1)), FRAME_RATE_HZ, (Channel("opening"),))
-    motion = with_moods(closed, keys) if keys else closed
-    return Generation(motion, np.zeros(motion.values.shape), Timeline(()), StateTrace(("",), np.zeros(1, np.intp)))
-
-
-def with_turn(scene: Scene) -> Motion:
-    """Return the weights of a scene, and the quaternion of its head, where it turns."""
-    weights = scene.weights
-    if weights is None:
-        raise InputError("the face has no morph targets; choose the head, or a character with blendshapes")
-    if scene.turn is None:
-        return weights
-    values = np.concatenate([weights.values, scene.turn.rotations], axis=1)
-    return Motion(values, weights.rate_hz, weights.channels + tuple(map(Channel, TURN)))

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import io
+import math
+from asyncio import to_thread
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import fields, replace
+from functools import partial
 from typing import Any
 from urllib.parse import quote, unquote
 from uuid import uuid4
@@ -14,49 +17,105 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
+from lipmotion.articulation.expression import is_mood
 from lipmotion.errors import InputError, shorten
 from lipmotion.storage.files import TEMPORARY, remove
 from lipmotion.storage.json_text import as_json
 from lipmotion.storage.locks import open_temporary
 from lipmotion.types import Motion, values
 from lipmotion.types.configuration import kind_of
-from lipmotion.types.values import items
+from lipmotion.types.values import Schema, any_members, items, number_or_text, parse_number, parse_whole, require
 from lipmotion.units import PHONES, split_words
 from lipmotion_faces.outputs.shown_faces import ShownPerson
 from lipmotion_studio.folder import RevisionError
-from lipmotion_studio.project import APPROVED, MAX_RECORDINGS, ProjectRecording, find_preset
-from lipmotion_studio.recording import OpenRecording
-from lipmotion_studio.requests import (
-    Access,
-    read_content,
-    take,
-    take_int,
-    take_objects,
-    take_stretch,
-    take_text,
-    take_texts,
-    take_time,
-)
+from lipmotion_studio.meshes import HEAD, HEAD_OF_MOODS
+from lipmotion_studio.project import APPROVED, MAX_RECORDINGS, find_preset
+from lipmotion_studio.recording import OpenRecording, list_doubts
 from lipmotion_studio.studio import Studio
 from lipmotion_studio.trainer import MAX_LISTED
-from lipmotion_studio.training import FACE, VOICE, VoiceOptions, check_options
+from lipmotion_studio.training import FACE, VOICE, VoiceOptions
 from lipmotion_studio.votes import Vote, tally
-from lipmotion_studio.web.replies import FRESH, reply_json, write_body
+from lipmotion_studio.web.replies import FRESH, read_json, reply_json, write_body
 from lipmotion_studio.workspace import READY, WORKING
 
+MAX_JSON_BYTES = 1 << 20
+LATEST_S = 1e6
 MAX_STEPS = 1000
 MAX_TRANSCRIPT = 100_000
 MAX_NAMES = 20_000
 BEGINNING = "bytes=0-"
 NUMBERS = ("motion", "delivered", "deviation", "confidence")
 Changed = dict[str, Any]
+Change = Callable[[OpenRecording, int], Changed]
+"""Changes a recording at a revision; returns what moved."""
+Handler = Callable[[Request], Awaitable[Response]]
+
+
+async def read_content(request: Request) -> dict[str, Any]:
+    """Return the object of JSON that a request brings. Raises HTTPException, InputError: it brings something else."""
+    content = await read_json(request, MAX_JSON_BYTES)
+    if not isinstance(content, dict):
+        raise InputError("required an object of JSON")
+    return content
+
+
+def take(content: Mapping[str, Any], name: str, default: Any, schema: Schema) -> Any:
+    """Return a member of a request, checked. Raises InputError: there is none, and no default; or another one."""
+    return require(schema, content.get(name, default), name)
+
+
+def take_int(
+    content: Mapping[str, Any], name: str, default: int | None = None, *, low: int = 0, high: int = 1 << 31
+) -> int:
+    """Return a whole number of a request, also from its text in an address. Raises as ``take``."""
+    schema = number_or_text(partial(parse_whole, what=f"{name} is"), values.whole(low, high))
+    return int(take(content, name, default, schema))
+
+
+def take_time(content: Mapping[str, Any], name: str, default: float | None = None) -> float:
+    """Return a time of a request in seconds, also from its text in an address. Raises as ``take``."""
+    schema = number_or_text(partial(parse_number, what=f"{name} is"), values.number(0, LATEST_S))
+    return float(take(content, name, default, schema))
+
+
+def take_stretch(content: Mapping[str, Any], rate_hz: float, frames: int) -> slice:
+    """Return the frames from ``start_s`` to ``end_s`` of a request, or all. Raises InputError: no such times."""
+    last_s = (frames - 1) / rate_hz
+    start_s, end_s = take_time(content, "start_s", 0.0), min(take_time(content, "end_s", last_s), last_s)
+    first, last = math.ceil(start_s * rate_hz - 1e-6), math.floor(end_s * rate_hz + 1e-6)
+    if first > last:
+        raise InputError(f"{start_s} to {end_s} s holds no frame, required a part of 0 to {last_s:.2f} s")
+    return slice(first, last + 1)
+
+
+def take_text(content: Mapping[str, Any], name: str, default: str | None = None, *, longest: int = 200) -> str:
+    """Return a text of a request. Raises as ``take``."""
+    return str(take(content, name, default, values.text(longest)))
+
+
+def take_texts(content: Mapping[str, Any], name: str, *, most: int, longest: int = 2000) -> tuple[str, ...]:
+    """Return a list of texts of a request. Raises as ``take``."""
+    return tuple(take(content, name, None, items(values.text(longest), most=most)))
+
+
+def find_number(studio: Studio, request: Request) -> int:
+    """Return the number of a recording in an address. Raises HTTPException: there is no such recording."""
+    text = str(request.path_params["number"])
+    number = int(text) if text.isascii() and text.isdecimal() and len(text) < 10 else 0
+    if number not in studio.folder.project.lines:
+        raise HTTPException(404, "no such recording")
+    return number
 
 
 class RecordingReplies:
-    """Replies to requests for one recording; what it does is done in its own thread."""
+    """Replies to requests for one recording; what it does is done in its own thread.
 
-    def __init__(self, studio: Studio, access: Access) -> None:
-        self._studio, self._access, self._workspace = studio, access, studio.workspace
+    make_key : returns the key that allows to load one address
+    """
+
+    def __init__(self, studio: Studio, make_key: Callable[[str], str]) -> None:
+        self._studio, self._make_key, self._workspace = studio, make_key, studio.workspace
+        self._find_number = partial(find_number, studio)
 
     async def open_recording(self, request: Request) -> Response:
         """Open a recording, analyse it if it is new, and reply its state."""
@@ -65,27 +124,36 @@ class RecordingReplies:
             return self._reply_waiting(number)
         return await self._reply_after(number, lambda _: {})
 
-    async def edit(self, request: Request) -> Response:
-        """Make edits."""
-        number, content, revision = await self._read_change(request)
-        steps, instead = take_texts(content, "steps", most=MAX_STEPS), take_int(content, "instead", 0)
-        commands = self._studio.add_phones(steps)
-        return await self._reply_after(number, lambda recording: recording.edit(revision, commands, instead))
+    def list_changes(self) -> dict[str, Handler]:
+        """Return the handlers of changes of an open recording, by the last part of their addresses."""
 
-    def step_with(self, step: Callable[[OpenRecording, int, int], Changed]) -> Callable[[Request], Awaitable[Response]]:
-        """Return a handler that takes back, or makes again, a number of edits."""
+        def handle(take_change: Callable[[dict[str, Any]], Change]) -> Handler:
+            async def reply(request: Request) -> Response:
+                number, content, revision = await self._read_change(request)
+                change = take_change(content)
+                return await self._reply_after(number, lambda recording: change(recording, revision))
 
-        async def reply(request: Request) -> Response:
-            number, content, revision = await self._read_change(request)
-            count = take_int(content, "count", 1, least=1)
-            return await self._reply_after(number, lambda recording: step(recording, revision, count))
+            return reply
 
-        return reply
+        def take_edits(content: dict[str, Any]) -> Change:
+            steps, instead = take_texts(content, "steps", most=MAX_STEPS), take_int(content, "instead", 0)
+            return partial(OpenRecording.edit, steps=self._studio.add_phones(steps), instead=instead)
 
-    async def settle(self, request: Request) -> Response:
-        """Make the full motion, after edits of a long recording."""
-        number, _, revision = await self._read_change(request)
-        return await self._reply_after(number, lambda recording: recording.settle(revision))
+        def take_count(step: Callable[..., Changed]) -> Callable[[dict[str, Any]], Change]:
+            return lambda content: partial(step, count=take_int(content, "count", 1, low=1))
+
+        def take_version(step: Callable[..., Changed]) -> Callable[[dict[str, Any]], Change]:
+            return lambda content: partial(step, name=take_text(content, "version"))
+
+        return {
+            "edits": handle(take_edits),
+            "undo": handle(take_count(OpenRecording.undo)),
+            "redo": handle(take_count(OpenRecording.redo)),
+            "settle": handle(lambda _: OpenRecording.settle),
+            "versions": handle(lambda _: OpenRecording.keep_version),
+            "versions/forget": handle(take_version(OpenRecording.forget_version)),
+            "versions/back": handle(take_version(OpenRecording.restore_version)),
+        }
 
     async def change_words(self, request: Request) -> Response:
         """Change the words of a recording, or of a stretch of it."""
@@ -97,7 +165,7 @@ class RecordingReplies:
         start_s, end_s = take_time(content, "start_s", 0.0), take_time(content, "end_s", 1e6)
 
         def change(recording: OpenRecording) -> Changed:
-            last_s = min(end_s, recording.last_s)
+            last_s = min(end_s, recording.generation.units[-1].end_s)
             step = f"say {' '.join(words.split())} from {start_s:.3f} to {last_s:.3f}"
             return recording.edit(revision, self._studio.add_phones([step]))
 
@@ -106,48 +174,30 @@ class RecordingReplies:
     async def send_sound(self, request: Request) -> Response:
         """Send the sound as it is played."""
         number = self._find_number(request)
-        path = await self._workspace.run_apart(lambda: self._studio.prepare_sound(number))
+        path = await to_thread(self._studio.prepare_sound, number)
         return FileResponse(path, media_type="audio/wav", headers=FRESH)
 
     async def send_recorded(self, request: Request) -> Response:
         """Send the real video, as browsers play it."""
         number, folder = self._find_number(request), self._studio.folder
         if request.headers.get("range", BEGINNING).startswith(BEGINNING):  # and not again for each part of it
-            await self._workspace.run_apart(lambda: folder.check_sound(folder.find_recording(number)))
-        path, kind = await self._workspace.run_apart(lambda: self._studio.prepare_video(number))
+            await to_thread(folder.check_sound, folder.find_recording(number))
+        path, kind = await to_thread(self._studio.prepare_video, number)
         return FileResponse(path, media_type=kind, headers=FRESH)
 
     async def vote(self, request: Request) -> Response:
         """Store which of two motions somebody found better."""
         number, content, revision = await self._read_change(request)
-        shown = [take_text(side, "by", "") for side in take_objects(content, "shown")]
-        better = None if content.get("better") is None else take_int(content, "better", most=1)
+        sides = take(content, "shown", None, items(any_members(lambda value: value), most=2))
+        shown = [take_text(side, "by", "") for side in sides]
+        better = None if content.get("better") is None else take_int(content, "better", high=1)
 
         def add() -> dict[str, Any]:
             with self._studio.folder.check_out(number, revision) as recording:
                 vote = Vote(recording.name, tuple(self._studio.find_side(number, by) for by in shown), better)
                 return tally(self._studio.folder.add_vote(vote), vote)
 
-        return reply_json(await self._workspace.run_apart(add))
-
-    async def keep(self, request: Request) -> Response:
-        """Keep the present edits as a version."""
-        number, _, revision = await self._read_change(request)
-        return await self._change_versions(
-            number, revision, lambda now, recording: now.with_version(recording.file.edits.sentences)
-        )
-
-    async def forget(self, request: Request) -> Response:
-        """Remove a version."""
-        number, content, revision = await self._read_change(request)
-        name = take_text(content, "version")
-        return await self._change_versions(number, revision, lambda now, _: now.without_version(name))
-
-    async def go_back(self, request: Request) -> Response:
-        """Go back to a version; the present edits become one, too."""
-        number, content, revision = await self._read_change(request)
-        name = take_text(content, "version")
-        return await self._reply_after(number, lambda recording: recording.restore_version(revision, name))
+        return reply_json(await to_thread(add))
 
     async def restore(self, request: Request) -> Response:
         """Restore the last good copy of damaged edits."""
@@ -186,7 +236,7 @@ class RecordingReplies:
     async def send_weights(self, request: Request) -> Response:
         """Send the weights of a face's morph targets."""
         query = request.query_params
-        name, by, number = take_text(query, "face", "head"), take_text(query, "by", ""), self._find_number(request)
+        name, by, number = take_text(query, "face", HEAD), take_text(query, "by", ""), self._find_number(request)
 
         def reply(opened: OpenRecording) -> Response:
             recording = self._studio.vary(number, opened, by)
@@ -194,7 +244,7 @@ class RecordingReplies:
             frames = take_stretch(query, styled.rate_hz, len(styled.values))
             is_part = frames.stop - frames.start < len(styled.values)
             motion = recording.compute_weights(self._studio.faces.open_face(name), frames if is_part else None)
-            mesh = self._studio.faces.name_mesh(name, styled)
+            mesh = HEAD_OF_MOODS if name == HEAD and any(map(is_mood, styled.names)) else name
             return _reply_numbers(motion, frames.start, {"x-lipmotion-mesh": quote(mesh)})
 
         return await self._workspace.run(number, reply)
@@ -241,27 +291,14 @@ class RecordingReplies:
 
     async def list_doubts(self, request: Request) -> Response:
         """List the phones, the least sure first."""
-        return reply_json(await self._workspace.run(self._find_number(request), OpenRecording.list_doubts))
-
-    def _find_number(self, request: Request) -> int:
-        """Return the number of a recording. Raises HTTPException: there is none of that number."""
-        return self._studio.find_number(str(request.path_params["number"]))
+        return reply_json(
+            await self._workspace.run(self._find_number(request), lambda opened: list_doubts(opened.generation))
+        )
 
     async def _read_change(self, request: Request) -> tuple[int, dict[str, Any], int]:
         """Return the recording that a request changes, its content, and the revision that its author saw."""
         content = await read_content(request)
         return self._find_number(request), content, take_int(content, "revision")
-
-    async def _change_versions(
-        self, number: int, revision: int, changed: Callable[[ProjectRecording, OpenRecording], ProjectRecording]
-    ) -> Response:
-        def change(recording: OpenRecording) -> Changed:
-            with self._studio.folder.check_out(number, revision) as now:
-                other = changed(now, recording)
-                self._studio.folder.change_recording(number, lambda _: other)
-            return {}
-
-        return await self._reply_after(number, change)
 
     async def _reply_after(self, number: int, do: Callable[[OpenRecording], Changed]) -> Response:
         """Do something to a recording; reply its state then, and what was returned."""
@@ -289,7 +326,8 @@ class RecordingReplies:
     def _list_media(self, number: int) -> dict[str, Any]:
         video = self._studio.find_video(number)
         parts = {"sound": "sound.wav"} | ({"video": "recorded"} if video else {})
-        addresses = {name: self._access.with_key(f"/api/lines/{number}/{path}") for name, path in parts.items()}
+        paths = {name: f"/api/lines/{number}/{part}" for name, part in parts.items()}
+        addresses = {name: f"{path}?key={self._make_key(path)}" for name, path in paths.items()}
         return addresses | ({"sound_begins_s": video[1]} if video else {})
 
 
@@ -315,14 +353,14 @@ class ProjectReplies:
     """Replies to requests for the project, its recordings together, and voices and faces that are made here."""
 
     def __init__(self, studio: Studio) -> None:
-        self._studio, self._trainer, self._run_apart = studio, studio.trainer, studio.workspace.run_apart
+        self._studio, self._trainer, self._find_number = studio, studio.trainer, partial(find_number, studio)
 
     async def list_recordings(self, request: Request) -> Response:
         """List the recordings, page by page, and what forms need."""
         query = request.query_params
-        first, count = take_int(query, "from", 0), take_int(query, "count", 200, most=2000)
-        chosen = {name: take_text(query, name, "") for name in ("order", "status", "mark")}
-        document = await self._run_apart(lambda: self._studio.list_recordings(first, count, **chosen))
+        first, count = take_int(query, "from", 0), take_int(query, "count", 200, high=2000)
+        filters = {name: take_text(query, name, "") for name in ("order", "status", "mark")}
+        document = await to_thread(self._studio.list_recordings, first, count, **filters)
         return reply_json(document | {"largest_upload_bytes": MAX_UPLOAD_BYTES})
 
     async def send_progress(self, _: Request) -> Response:
@@ -346,7 +384,7 @@ class ProjectReplies:
         try:
             with file.open("wb") as content:
                 await write_body(request, content, MAX_UPLOAD_BYTES, UPLOAD_S)
-            number = await self._run_apart(lambda: self._studio.folder.drop(name, file, transcript))
+            number = await to_thread(self._studio.folder.drop, name, file, transcript)
         finally:
             remove(file)
         self._studio.workspace.queue([number])
@@ -356,13 +394,15 @@ class ProjectReplies:
         """Mark a recording."""
         number, content = self._find_number(request), await read_content(request)
         mark, revision = take_text(content, "mark"), take_int(content, "revision")
-        return reply_json(await self._run_apart(lambda: self._studio.mark(number, revision, mark)))
+        return reply_json(await to_thread(self._studio.mark, number, revision, mark))
 
     async def remove(self, request: Request) -> Response:
         """Remove a recording from the project; its files stay."""
         number, folder = self._find_number(request), self._studio.folder
         with folder.check_out(number, take_int(await read_content(request), "revision")):
-            folder.change(lambda project: project.without_recording(number))
+            folder.change(
+                lambda now: replace(now, lines={key: each for key, each in now.lines.items() if key != number})
+            )
             self._studio.workspace.forget(number)
         return reply_json({"removed": number})
 
@@ -383,13 +423,13 @@ class ProjectReplies:
     async def _export(self, content: dict[str, object], numbers: list[int]) -> Response:
         files = take_texts(content, "files", most=20, longest=40) if "files" in content else ()
         preset, face = find_preset(take_text(content, "preset", ""), files), take_text(content, "face", "")
-        return reply_json(await self._run_apart(lambda: self._studio.export_several(numbers, preset, face)))
+        return reply_json(await to_thread(self._studio.export_several, numbers, preset, face))
 
     async def send_mesh(self, request: Request) -> Response:
         """Send the ``.glb`` of a face."""
         name = str(request.path_params["name"])
         try:
-            content = await self._run_apart(lambda: self._studio.faces.load_mesh(name))
+            content = await to_thread(self._studio.faces.load_mesh, name)
         except InputError as error:
             raise HTTPException(404, str(error)) from error
         return Response(content, headers=FRESH, media_type="model/gltf-binary")
@@ -405,7 +445,7 @@ class ProjectReplies:
         revision = take_int(content, "revision")
         if not phones or not set(phones) <= set(PHONES):
             raise InputError(f"the phones of a word are some of: {' '.join(PHONES)}")
-        await self._run_apart(lambda: self._studio.folder.add_pronunciation(word, phones, revision))
+        await to_thread(self._studio.folder.add_pronunciation, word, phones, revision)
         return self._reply_word(word)
 
     def _reply_word(self, word: str) -> Response:
@@ -415,26 +455,24 @@ class ProjectReplies:
         pronunciations = [list(phones) for phones in lexicon.pronunciations(word)]
         return reply_json(known | {"pronunciations": pronunciations, "revision": revision})
 
-    async def send_training(self, _: Request) -> Response:
-        """Tell what is being made, or was made last; what can be made, and of what."""
-        return await self._reply_training()
-
     async def begin_training(self, request: Request) -> Response:
         """Begin to make a voice or a face."""
         content = await read_content(request)
         kind, name = take_text(content, "kind"), take_text(content, "name", "")
         numbers = list(dict.fromkeys(take(content, "lines", [], items(NUMBER, most=MAX_RECORDINGS))))
-        options = check_options(content.get("options", {}))
-        await self._run_apart(lambda: self._trainer.begin(kind, name, numbers, options))
-        return await self._reply_training(201)
+        if not isinstance(options := content.get("options", {}), Mapping):
+            raise InputError("options is no object of names and values")
+        parsed = VoiceOptions.parsed(options)
+        await to_thread(self._trainer.begin, kind, name, numbers, parsed)
+        return await self.send_training(request, 201)
 
-    def train_with(self, act: Callable[[], None], status: int = 200) -> Callable[[Request], Awaitable[Response]]:
+    def train_with(self, act: Callable[[], None], status: int = 200) -> Handler:
         """Return a handler that stops, continues or restores what is being made."""
 
         async def reply(request: Request) -> Response:
             await read_content(request)
-            await self._run_apart(act)
-            return await self._reply_training(status)
+            await to_thread(act)
+            return await self.send_training(request, status)
 
         return reply
 
@@ -442,43 +480,43 @@ class ProjectReplies:
         """Change the voice that the project uses."""
         content = await read_content(request)
         name, revision = take_text(content, "voice"), take_int(content, "revision")
-        path, voice = await self._run_apart(lambda: self._studio.load_voice(name))
+        path, voice = await to_thread(self._studio.load_voice, name)
         self._studio.use_voice(path, voice, revision)
-        return await self._reply_training()
+        return await self.send_training(request)
 
-    async def _reply_training(self, status: int = 200) -> Response:
-        return reply_json(await self._run_apart(self._describe_training), status)
-
-    def _describe_training(self) -> dict[str, Any]:
+    async def send_training(self, _: Request, status: int = 200) -> Response:
+        """Tell what is being made, or was made last; what can be made, and of what."""
         folder, trainer = self._studio.folder, self._trainer
-        videos, used = trainer.list_videos(), folder.project.model
-        options = []
-        for each in fields(VoiceOptions):
-            row = {"name": each.name, "kind": kind_of(each).__name__, "usual": each.default}
-            options.append(row | {"choices": list(each.metadata["rule"].choices)})
-        return {
-            "job": trainer.describe(),
-            "damage": trainer.damage,
-            "restorable": bool(trainer.damage) and trainer.is_restorable,
-            "earlier": trainer.list_earlier(),
-            "voices": [{"name": name, "used": path == used} for name, path in self._studio.list_voices().items()],
-            "revision": folder.voice_revision,
-            "faces": [path.relative_to(folder.path).as_posix() for path in trainer.list_files(FACE).values()],
-            "videos": [{"id": v.number, "name": v.name, "duration_s": v.duration_s} for v in videos[:MAX_LISTED]],
-            "count": len(videos),
-            "recordings": folder.recordings.name if folder.recordings else "",
-            "kinds": [VOICE, FACE],
-            "options": options,
-        }
 
-    def _find_number(self, request: Request) -> int:
-        return self._studio.find_number(str(request.path_params["number"]))
+        def describe() -> dict[str, Any]:
+            videos, used = trainer.list_videos(), folder.project.model
+            options = [
+                {"name": each.name, "kind": kind_of(each).__name__, "usual": each.default}
+                | {"choices": list(each.metadata["rule"].choices)}
+                for each in fields(VoiceOptions)
+            ]
+            return {
+                "job": trainer.describe(),
+                "damage": trainer.damage,
+                "restorable": bool(trainer.damage) and trainer.is_restorable,
+                "earlier": trainer.list_earlier(),
+                "voices": [{"name": name, "used": path == used} for name, path in self._studio.list_voices().items()],
+                "revision": folder.voice_revision,
+                "faces": [path.relative_to(folder.path).as_posix() for path in trainer.list_files(FACE).values()],
+                "videos": [{"id": v.number, "name": v.name, "duration_s": v.duration_s} for v in videos[:MAX_LISTED]],
+                "count": len(videos),
+                "recordings": folder.recordings.name if folder.recordings else "",
+                "kinds": [VOICE, FACE],
+                "options": options,
+            }
+
+        return reply_json(await to_thread(describe), status)
 
 
 def _take_word(content: Mapping[str, Any]) -> str:
     """Return the word of a request as lexicons have it. Raises InputError: it is none, or several."""
-    given = take_text(content, "word", longest=MAX_WORD)
-    words = split_words(given)
+    text = take_text(content, "word", longest=MAX_WORD)
+    words = split_words(text)
     if len(words) != 1:
-        raise InputError(f"{given!r} is {len(words)} words, required one")
+        raise InputError(f"{text!r} is {len(words)} words, required one")
     return words[0]

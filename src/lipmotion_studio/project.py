@@ -101,11 +101,6 @@ class ProjectRecording:
         version = EditVersion(self.versions[-1].number + 1 if self.versions else 1, steps)
         return replace(self, versions=(*self.versions, version))
 
-    def without_version(self, name: str) -> ProjectRecording:
-        """Return the recording without a version. Raises InputError: as ``find_version``."""
-        removed = self.find_version(name)
-        return replace(self, versions=tuple(version for version in self.versions if version != removed))
-
     def find_version(self, name: str) -> EditVersion:
         """Return a version. Raises InputError: none of that name is kept."""
         for version in self.versions:
@@ -141,10 +136,6 @@ class Project:
         together = {**self.lines, **{recording.number: recording for recording in recordings}}
         return replace(self, lines=together, next_number=max([self.next_number, *(n.number + 1 for n in recordings)]))
 
-    def without_recording(self, number: int) -> Project:
-        """Return the project without a recording."""
-        return replace(self, lines={key: recording for key, recording in self.lines.items() if key != number})
-
 
 def check_recordings(project: Project) -> None:
     """Raise InputError or ExportError if two recordings have one name, or one lies outside the project's folder."""
@@ -155,13 +146,15 @@ def check_recordings(project: Project) -> None:
 
 def describe_project(project: Project) -> dict[str, Any]:
     """Return a project as an object of JSON."""
-    usual = {each.name: each.default for each in fields(ProjectRecording)}
-    rows = []
-    for recording in project.lines.values():
-        row = {name: getattr(recording, name) for name in usual if getattr(recording, name) != usual[name]}
-        rows.append(
-            row | {name: [asdict(each) for each in row[name]] for name in ("exports", "versions") if name in row}
-        )
+    defaults = {each.name: each.default for each in fields(ProjectRecording)}
+    rows = [
+        {
+            name: [asdict(each) for each in value] if isinstance(value, tuple) else value
+            for name, value in vars(recording).items()
+            if value != defaults[name]
+        }
+        for recording in project.lines.values()
+    ]
     settings = {each.name: getattr(project, each.name) for each in fields(project) if each.name != "lines"}
     made_by = {"lipmotion": find_version()}
     return {"format": FORMAT, "version": VERSION, "made_by": made_by, **settings, "lines": rows}
@@ -186,40 +179,30 @@ def parse_project(content: Any) -> Project:
     return project
 
 
-_TEXT, _STEPS, _NUMBERED = (
-    values.text(1000),
-    values.as_tuple(values.items(values.text(MAX_TEXT))),
-    values.whole(1, 1 << 53),
-)
+_TEXT, _NUMBERED = values.text(1000), values.whole(1, 1 << 53)
 _EXPORT = {"files": values.any_members(_TEXT)} | dict.fromkeys(("preset", "edits", "steps", "model", "version"), _TEXT)
-_VERSION = {"number": _NUMBERED, "steps": _STEPS}
+_VERSION = {"number": _NUMBERED, "steps": values.as_tuple(values.items(values.text(MAX_TEXT)))}
 _RECORDING = {
-    **{
-        "number": _NUMBERED,
-        "name": values.path,
-        "sound": values.path,
-        "sha256": values.text(64),
-        "transcript": values.text(MAX_TEXT),
-    },
-    **{
-        "duration_s": values.optional(values.number(0, 1e6)),
-        "doubt": values.optional(values.number(-1, 1)),
-        "mark": values.one_of(MARKS),
-    },
-    **{
-        "marked": values.text(64),
-        "exports": values.as_tuple(values.items(values.value_of(ExportRecord, _EXPORT, _EXPORT))),
-    },
+    "number": _NUMBERED,
+    **dict.fromkeys(("name", "sound"), values.path),
+    **dict.fromkeys(("sha256", "marked"), values.text(64)),
+    "transcript": values.text(MAX_TEXT),
+    "duration_s": values.optional(values.number(0, 1e6)),
+    "doubt": values.optional(values.number(-1, 1)),
+    "mark": values.one_of(MARKS),
+    "exports": values.as_tuple(values.items(values.value_of(ExportRecord, _EXPORT, _EXPORT))),
     "versions": values.as_tuple(values.items(values.value_of(EditVersion, _VERSION, _VERSION), most=MAX_VERSIONS)),
 }
+_RECORDINGS = values.items(
+    values.value_of(partial(ProjectRecording, sha256=""), _RECORDING, ("number", "name", "sound"))
+)
 _PROJECT = values.members(
     {
-        "lines": values.items(
-            values.value_of(partial(ProjectRecording, sha256=""), _RECORDING, ("number", "name", "sound"))
-        ),
+        "lines": _RECORDINGS,
         **dict.fromkeys(("model", "recordings", "given_model"), values.path),
         **dict.fromkeys(("language", "recogniser", "preset"), _TEXT),
-        **{"characters": values.any_members(values.path), "next_number": _NUMBERED},
+        "characters": values.any_members(values.path),
+        "next_number": _NUMBERED,
     },
     alone=True,
 )
@@ -290,5 +273,4 @@ def find_preset(name: str, files: tuple[str, ...]) -> Preset:
 
 def list_suffixes() -> tuple[str, ...]:
     """Return the suffixes of all files that can be exported."""
-    everything = list_outputs(OutputSettings(shown_face("head")))
-    return tuple(suffix for suffix in everything if _SUFFIX.fullmatch(suffix))
+    return tuple(filter(_SUFFIX.fullmatch, list_outputs(OutputSettings(shown_face("head")))))

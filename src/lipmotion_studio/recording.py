@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from copy import copy
 from dataclasses import replace
@@ -36,7 +36,7 @@ from lipmotion_faces.outputs.session_pictures import SessionPictures
 from lipmotion_faces.outputs.shown_faces import ShownPerson
 from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_studio.folder import ProjectFolder, check_revision, compute_revision, summarise_edits
-from lipmotion_studio.meshes import with_turn
+from lipmotion_studio.meshes import TURN
 from lipmotion_studio.project import ProjectRecording, digest_edits
 
 MIN_MOVE = 5e-4
@@ -110,11 +110,6 @@ class OpenRecording:
         return nullcontext() if (self.settled if settled is None else settled) else self.session.sketching()
 
     @property
-    def last_s(self) -> float:
-        """The end of the last phone, in seconds."""
-        return self.generation.units[-1].end_s
-
-    @property
     def transcript(self) -> str:
         """The words that the phones were aligned with, before the edits; empty: they were recognised, or none given."""
         outlook, units = self.file.outlook, self.file.units
@@ -140,43 +135,62 @@ class OpenRecording:
         Nothing has changed where an edit is refused.
         Raises RevisionError: the edits are no longer those of the revision. InputError: an edit is refused.
         """
-        check_revision("the recording", self.revision, revision)
-        file = self.file.undo(instead).then(*steps) if steps else self.file.undo(instead)
-        changed, lexicon = self._change(file, revision), read_lexicon(self.session.request)
+
+        def change(file: EditFile) -> EditFile:
+            return file.undo(instead).then(*steps) if steps else file.undo(instead)
+
+        changed, lexicon = self._change(revision, change), read_lexicon(self.session.request)
         guessed: dict[str, Pronunciation] = {}
         for step in map(parse_step, map(str, steps)):
             if isinstance(step, WordStep):
-                known, text = (
-                    read_pronunciations(step),
-                    step.word if isinstance(step, WordIs | WordSaid) else step.words,
-                )
+                text = step.word if isinstance(step, WordIs | WordSaid) else step.words
+                known = read_pronunciations(step)
                 guessed |= guess_pronunciations([word for word in split_words(text) if word not in known], lexicon)
         rows = [{"word": word, "phones": list(phones)} for word, phones in guessed.items()]
         return changed | {"guessed": rows}
 
-    def restore_version(self, revision: int, version: str) -> dict[str, Any]:
+    def keep_version(self, revision: int) -> dict[str, Any]:
+        """Keep the edits as a version. Raises RevisionError: as ``edit``. InputError: there are too many."""
+        with self.folder.check_out(self.number, revision) as recording:
+            kept = recording.with_version(self.file.edits.sentences)
+            self.folder.change_recording(self.number, lambda _: kept)
+        return {}
+
+    def forget_version(self, revision: int, name: str) -> dict[str, Any]:
+        """Remove a version. Raises RevisionError: as ``edit``. InputError: there is none of that name."""
+        with self.folder.check_out(self.number, revision) as recording:
+            removed = recording.find_version(name)
+            others = tuple(version for version in recording.versions if version != removed)
+            self.folder.change_recording(self.number, lambda now: replace(now, versions=others))
+        return {}
+
+    def restore_version(self, revision: int, name: str) -> dict[str, Any]:
         """Go back to a kept version; keep the edits as they are, too. Raises as ``edit``; InputError: no version."""
-        check_revision("the recording", self.revision, revision)
-        recording, now = self.folder.find_recording(self.number), self.file.edits.sentences
-        recording.with_version(now)  # refuses one too many before anything has changed
-        sentences = recording.find_version(version).steps
-        same = next((n for n, (old, new) in enumerate(zip(now, sentences, strict=False)) if old != new), len(now))
-        same = min(same, len(sentences))
-        return self._change(self.file.undo(len(now) - same).then(*sentences[same:]), revision, keep_version=True)
+
+        def change(file: EditFile) -> EditFile:
+            recording, now = self.folder.find_recording(self.number), file.edits.sentences
+            recording.with_version(now)  # refuses one too many before anything has changed
+            sentences = recording.find_version(name).steps
+            same = next((n for n, (old, new) in enumerate(zip(now, sentences, strict=False)) if old != new), len(now))
+            same = min(same, len(sentences))
+            return file.undo(len(now) - same).then(*sentences[same:])
+
+        return self._change(revision, change, keep_version=True)
 
     def undo(self, revision: int, count: int) -> dict[str, Any]:
         """Take back the last edits; return what moved. Raises as ``edit``."""
-        check_revision("the recording", self.revision, revision)
-        return self._change(self.file.undo(count), revision)
+        return self._change(revision, lambda file: file.undo(count))
 
     def redo(self, revision: int, count: int) -> dict[str, Any]:
         """Make edits again that were taken back; return what moved. Raises as ``edit``."""
-        check_revision("the recording", self.revision, revision)
-        return self._change(self.file.redo(count), revision)
+        return self._change(revision, lambda file: file.redo(count))
 
-    def _change(self, file: EditFile, revision: int, *, keep_version: bool = False) -> dict[str, Any]:
+    def _change(
+        self, revision: int, change: Callable[[EditFile], EditFile], *, keep_version: bool = False
+    ) -> dict[str, Any]:
         """Go over to other edits: compute, then write, then use them; nothing, where somebody else was first."""
-        before, settled = self._styled, self.audio.duration_s <= LONG_S
+        check_revision("the recording", self.revision, revision)
+        file, before, settled = change(self.file), self._styled, self.audio.duration_s <= LONG_S
         with self._preview(settled=settled):
             after = self.session.deliver(file.edits).motion
         is_other = file.edits.steps != self.file.edits.steps or file.undone != self.file.undone
@@ -231,8 +245,17 @@ class OpenRecording:
         return generation.motion
 
     def compute_weights(self, face: ShownFace, frames: slice | None = None) -> Motion:
-        """Return the weights of a face's morph targets, and its head's turn, as its ``.glb`` holds them."""
-        weights = with_turn(build_scene(self.prepare(face), frames))
+        """Return the weights of a face's morph targets, and its head's turn, as its ``.glb`` holds them.
+
+        Raises InputError: the face has no morph targets.
+        """
+        scene = build_scene(self.prepare(face), frames)
+        weights = scene.weights
+        if weights is None:
+            raise InputError("the face has no morph targets; choose the head, or a character with blendshapes")
+        if scene.turn is not None:
+            values = np.concatenate([weights.values, scene.turn.rotations], axis=1)
+            weights = Motion(values, weights.rate_hz, weights.channels + tuple(map(Channel, TURN)))
         if frames is None or len(weights.values) == frames.stop - frames.start:
             return weights
         return replace(weights, values=weights.values[frames])
@@ -297,10 +320,6 @@ class OpenRecording:
             "text": write_explanation(explanation),
         }
 
-    def list_doubts(self) -> list[dict[str, Any]]:
-        """Return the phones, by their confidence, the least sure first."""
-        return list_doubts(self.generation)
-
 
 def find_moved(before: Motion, after: Motion) -> dict[str, float] | None:
     """Return from when to when two motions differ in their common channels; None: nowhere."""
@@ -358,11 +377,6 @@ def average_doubt(generation: Generation) -> float:
     return 1.0 - float(np.mean([row["confidence"] for row in rows])) if rows else 1.0
 
 
-def load_sound(folder: ProjectFolder, recording: ProjectRecording) -> AnalysedAudio:
-    """Return the sound of a recording. Raises InputError: it is not there, unreadable, or another one by now."""
-    return analysed(read_audio(folder.check_sound(recording)))
-
-
 def analyse_recording(
     folder: ProjectFolder, recording: ProjectRecording, model: Model, monitor: Monitor = silent_monitor
 ) -> AnalysedAudio:
@@ -371,7 +385,7 @@ def analyse_recording(
     The project's lexicon is not named there: what it says of later words stands in the edits that say them.
     Raises InputError, AlignmentError: the sound or its words are not usable. ExportError: it cannot be written.
     """
-    audio, project = load_sound(folder, recording), folder.project
+    audio, project = analysed(read_audio(folder.check_sound(recording))), folder.project
     named = Request(
         folder.locate_sound(recording),
         model=folder.model_file,
@@ -401,7 +415,9 @@ def open_recording(
 ) -> OpenRecording:
     """Open an analysed recording; note its length and doubt. Raises InputError: unreadable. ExportError."""
     file = folder.read_edits(recording)
-    audio = audio or load_sound(folder, replace(recording, sha256=recording.sha256 or file.sha256))
+    if audio is None:
+        sound = folder.check_sound(replace(recording, sha256=recording.sha256 or file.sha256))
+        audio = analysed(read_audio(sound))
     file = folder.adopt(recording, file)
     named = replace(file.named, recording=folder.locate_sound(recording), model=folder.model_file)
     opened = OpenRecording(replace(file, named=named), folder, recording.number, model, audio)

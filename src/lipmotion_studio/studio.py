@@ -52,7 +52,7 @@ from lipmotion_studio.recording import LONGEST_VIDEO_S, OpenRecording
 from lipmotion_studio.trainer import VOICES, Trainer
 from lipmotion_studio.training import FACE, VOICE
 from lipmotion_studio.votes import Side
-from lipmotion_studio.workspace import FAILED, READY, WAITING, WORKING, NotReadyError, Work, Workspace
+from lipmotion_studio.workspace import FAILED, READY, WAITING, WORKING, NotReadyError, Workspace
 
 PLAYED = {
     ".mp4": ("video/mp4", ("h264", "av1", "dav1d")),
@@ -101,20 +101,19 @@ def find_sound_start(video: Path, sound: Path) -> float:
                 late_s = max(start_s - (container.start_time or 0) / 1e6, 0.0)
     if late_s < IN_STEP_S:
         return 0.0
-    whole, other = map(_measure_loudness, (video, sound))
-    return late_s if _correlate(whole[round(late_s * LOUDNESS_HZ) :], other) > _correlate(whole, other) else 0.0
 
+    def measure_loudness(path: Path) -> NDArray[np.float64]:
+        samples, each = np.abs(read_audio(path, warn=False).samples), SPEECH_RATE_HZ // LOUDNESS_HZ
+        return np.sqrt(samples[: len(samples) // each * each].reshape(-1, each).mean(axis=1, dtype=float))
 
-def _measure_loudness(path: Path) -> NDArray[np.float64]:
-    samples, each = np.abs(read_audio(path, warn=False).samples), SPEECH_RATE_HZ // LOUDNESS_HZ
-    return np.sqrt(samples[: len(samples) // each * each].reshape(-1, each).mean(axis=1, dtype=float))
+    def correlate(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+        count = min(len(one), len(other))  # what both have
+        one, other = one[:count] - one[:count].mean(), other[:count] - other[:count].mean()
+        return float(one @ other) / max(float(np.sqrt((one @ one) * (other @ other))), 1e-12)
 
-
-def _correlate(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-    """Return the correlation of two courses that begin together, over what both have."""
-    count = min(len(one), len(other))
-    one, other = one[:count] - one[:count].mean(), other[:count] - other[:count].mean()
-    return float(one @ other) / max(float(np.sqrt((one @ one) * (other @ other))), 1e-12)
+    of_video, of_recording = map(measure_loudness, (video, sound))
+    later = of_video[round(late_s * LOUDNESS_HZ) :]
+    return late_s if correlate(later, of_recording) > correlate(of_video, of_recording) else 0.0
 
 
 def write_playable(video: Path, sound: Path, path: Path) -> None:
@@ -138,10 +137,6 @@ class KnownModel:
     model: Model
     name: str
     digest: str
-
-    def name_beside(self, other: KnownModel) -> str:
-        """Return its name, with the beginning of its digest where another model has the same name."""
-        return self.name if self.name != other.name else f"{self.name} ({self.digest[:DIGEST_DIGITS]})"
 
 
 def load_known_model(file: Path | None) -> KnownModel:
@@ -177,13 +172,6 @@ class Studio:
         self.trainer.close()
         self.workspace.close()
         self._run.close()
-
-    def find_number(self, text: str) -> int:
-        """Return the number of a recording in an address. Raises HTTPException: there is no such recording."""
-        number = int(text) if text.isascii() and text.isdecimal() and len(text) < 10 else 0
-        if number not in self.folder.project.lines:
-            raise HTTPException(404, "no such recording")
-        return number
 
     def list_recordings(
         self, first: int, count: int, *, order: str = "", status: str = "", mark: str = ""
@@ -247,12 +235,12 @@ class Studio:
             restorable = status == FAILED and self.folder.is_restorable(recording)
             return document | {"status": status, "progress": None, "error": error, "restorable": restorable}
         status = WORKING if work.status == READY and work.recording is None else work.status
-        return document | {"status": status, "progress": _describe(work), "error": work.error}
+        return document | {"status": status, "progress": work.progress, "error": work.error}
 
     def describe_progress(self) -> dict[str, Any]:
         """Return which recordings wait, or are at work, or were until a short while ago."""
         works = self.workspace.list_current()
-        rows = [{"id": work.number, "status": work.status, **_describe(work), "error": work.error} for work in works]
+        rows = [{"id": work.number, "status": work.status, **work.progress, "error": work.error} for work in works]
         waiting = sum(work.status == WAITING for work in works)
         document = {"lines": rows, "waiting": waiting, "revision": self.folder.revision, "export": self._exporting}
         return document | {"training": self.trainer.summarise()}
@@ -293,12 +281,13 @@ class Studio:
     def _list_choices(self) -> dict[str, Any]:
         """Return what can be chosen, from the registries and configurations."""
         controls = []  # what edits can set of delivery and staging
-        for part in (Delivery, Staging):
-            for each in fields(part):
-                rule = each.metadata.get("rule", ANY)
-                control = {"name": each.name, "kind": kind_of(each).__name__, "usual": each.default}
-                control |= {"least": rule.least, "most": rule.most, "help": each.metadata.get("help", "")}
-                controls.append(control)
+        for each in (*fields(Delivery), *fields(Staging)):
+            rule = each.metadata.get("rule", ANY)
+            control = {"name": each.name, "kind": kind_of(each).__name__, "usual": each.default}
+            controls.append(control | {"least": rule.least, "most": rule.most, "help": each.metadata.get("help", "")})
+        against = self.against.name if self.against else None
+        if self.against and against == self.used.name:
+            against = f"{against} ({self.against.digest[:DIGEST_DIGITS]})"
         return {
             "phones": [{"name": phone, "silent": is_silent(phone)} for phone in PHONES],
             "moods": list(MOODS),
@@ -307,10 +296,10 @@ class Studio:
                 {"name": name, "title": name, "mesh": mesh, "filmed": self.faces.is_filmed(name)}
                 for name, mesh in self.faces.names.items()
             ],
-            "against": self.against.name_beside(self.used) if self.against else None,
+            "against": against,
             "curve_sets": list(SHAPE_SETS),
             "presets": [
-                {"name": each.name, "title": each.title, "files": list(each.files)} for each in PRESETS.values()
+                {"name": name, "title": each.title, "files": list(each.files)} for name, each in PRESETS.items()
             ],
             "preset": self.folder.project.preset,
             "suffixes": list(list_suffixes()),
@@ -482,7 +471,3 @@ class Studio:
             self._exporting = None
         self.folder.change(lambda project: replace(project, preset=preset.name or project.preset))
         return {"exported": exported, "failed": failed}
-
-
-def _describe(work: Work) -> dict[str, Any]:
-    return {"stage": work.stage, "share": round(work.share, 3)}

@@ -42,7 +42,7 @@ MAX_UNFINISHED = 0.99
 
 @dataclass(frozen=True)
 class TrainingRequest:
-    """What was asked for; without recordings' numbers (``lines``) the folder of recordings is learned from."""
+    """What is to be made; without recordings' numbers (``lines``) the folder of recordings is learned from."""
 
     kind: str
     name: str
@@ -58,7 +58,7 @@ class TrainingRequest:
 
 @dataclass(frozen=True)
 class TrainingJob:
-    """What was asked for, and how it went (by the names of the file that keeps it)."""
+    """What was requested, and its status (by the names of the file that keeps it)."""
 
     wanted: TrainingRequest
     told: dict[str, Any]
@@ -332,23 +332,17 @@ _REQUEST = {
     "options": _ANY,
 }
 _STATUS = {
-    **{
-        "state": values.one_of((WORKING, DONE, FAILED, STOPPED, INTERRUPTED)),
-        "stage": _TEXT,
-        "share": values.number(0, 1),
-    },
-    **{"warnings": values.items(_TEXT), "skipped": values.items(_ANY), "error": _TEXT, "report": values.optional(_ANY)},
+    "state": values.one_of((WORKING, DONE, FAILED, STOPPED, INTERRUPTED)),
+    "stage": _TEXT,
+    "share": values.number(0, 1),
+    "warnings": values.items(_TEXT),
+    "skipped": values.items(_ANY),
+    "error": _TEXT,
+    "report": values.optional(_ANY),
 }
 _JOB = {"wanted": values.value_of(TrainingRequest, _REQUEST, _REQUEST), "told": values.members(_STATUS, ["state"])}
-_STATE = values.members(
-    _JOB
-    | {
-        "format": values.one_of([FORMAT]),
-        "version": values.one_of([VERSION]),
-        "made": values.items(values.members(_JOB, _JOB)),
-    },
-    ("format", "version", *_JOB),
-)
+_HEAD = {"format": values.one_of([FORMAT]), "version": values.one_of([VERSION])}
+_STATE = values.members(_JOB | _HEAD | {"made": values.items(values.members(_JOB, _JOB))}, (*_HEAD, *_JOB))
 
 
 def _create_status() -> dict[str, Any]:

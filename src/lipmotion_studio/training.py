@@ -15,7 +15,7 @@ from typing import Any
 from lipmotion.corpora import Corpus, Selection
 from lipmotion.engines import ENGINES, engine_named
 from lipmotion.engines.registry import DEFAULT
-from lipmotion.errors import InputError, LipMotionError
+from lipmotion.errors import LipMotionError
 from lipmotion.extensions import load_provided
 from lipmotion.formats.label_files import find_label_files
 from lipmotion.pipeline.edit_files import check_sound
@@ -204,10 +204,3 @@ def _measure(model: Model, corpus: Corpus, names: Sequence[str], monitor: Monito
         for name, row in figures["conditions"].items()
     ]
     return {"figures": rows, "table": load_provided("format_figures")(figures)}
-
-
-def check_options(values: Mapping[str, Any]) -> VoiceOptions:
-    """Return the options that a request gives. Raises InputError: unknown, or a value that is not allowed."""
-    if not isinstance(values, Mapping):
-        raise InputError("options is no object of names and values")
-    return VoiceOptions.parsed(values)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.errors import InputError, shorten
+from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.storage.sources import read_text_file
 from lipmotion.types.values import as_tuple, items, members, optional, text, value_of, whole
@@ -67,20 +68,15 @@ class Vote:
 
 def tally(votes: Sequence[Vote], vote: Vote) -> dict[str, Any]:
     """Return how often all votes found each of the two in ``vote`` ``better``, in its order, and ``neither``."""
-    better, neither = [0, 0], 0
-    for each in votes:
-        if set(each.compared) != set(vote.compared):
-            continue
-        if each.better is None:
-            neither += 1
-        else:
-            better[vote.compared.index(each.compared[each.better])] += 1
-    return {"better": better, "neither": neither}
+    of_both = [each for each in votes if set(each.compared) == set(vote.compared)]
+    better = [each.compared[each.better] for each in of_both if each.better is not None]
+    return {"better": [better.count(side) for side in vote.compared], "neither": len(of_both) - len(better)}
 
 
-def format_votes(votes: Sequence[Vote]) -> str:
-    """Return votes as the text of their file."""
-    return as_json([asdict(vote) for vote in votes]) + "\n"
+def write_votes(path: Path, votes: Sequence[Vote]) -> None:
+    """Write votes to a file. Raises ExportError: it cannot be written."""
+    with atomic_file(path) as temporary:
+        temporary.write_text(as_json([asdict(vote) for vote in votes]) + "\n", encoding="utf-8")
 
 
 def read_votes(path: Path) -> tuple[Vote, ...]:
@@ -89,27 +85,21 @@ def read_votes(path: Path) -> tuple[Vote, ...]:
         return ()
     content = read_text_file(path, "votes")
     try:
-        return tuple(_VOTES(from_json(content)))
+        return tuple(items(_parse_vote)(from_json(content)))
     except ValueError as error:  # InputError is one
         raise InputError(f"{path}: {error}; put it right, or take it away") from error
 
 
 _TEXT = text(4096)
-_NAMES = {"line": _TEXT, "shown": items(_TEXT, 2, 2), "better": optional(_TEXT), "edits": text(64)}
-_NAMED = members(_NAMES, _NAMES)
+_OLD_VOTE = {"line": _TEXT, "shown": items(_TEXT, 2, 2), "better": optional(_TEXT), "edits": text(64)}
 _SIDE = {"name": _TEXT, "model": text(64), "edits": text(64)}
 _VOTE = {"line": _TEXT, "shown": as_tuple(items(value_of(Side, _SIDE, _SIDE), 2, 2)), "better": optional(whole(0, 1))}
-_NEW_VOTE = value_of(Vote, _VOTE, _VOTE)
 
 
-def _vote(row: Any) -> Vote:
+def _parse_vote(row: Any) -> Vote:
     """Return a vote; older files have no digests of models: two names, and one digest of the edits."""
     if not isinstance(row, dict) or "edits" not in row:
-        return _NEW_VOTE(row)
-    known = _NAMED(row)
-    names, better = known["shown"], known["better"]
-    sides = tuple(Side(name, "", known["edits"]) for name in names)
-    return Vote(known["line"], sides, names.index(better) if better else None)
-
-
-_VOTES = items(_vote)
+        return value_of(Vote, _VOTE, _VOTE)(row)
+    old = members(_OLD_VOTE, _OLD_VOTE)(row)
+    sides = tuple(Side(name, "", old["edits"]) for name in old["shown"])
+    return Vote(old["line"], sides, old["shown"].index(old["better"]) if old["better"] else None)

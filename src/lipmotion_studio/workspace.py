@@ -14,7 +14,7 @@ from collections import OrderedDict, deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from starlette.exceptions import HTTPException
 
@@ -64,6 +64,11 @@ class Work:
         self.recording: OpenRecording | None = None
         self.thread: ThreadPoolExecutor | None = None
         self.users, self.stopped = 0, False
+
+    @property
+    def progress(self) -> dict[str, Any]:
+        """What is being done, and the share of it that is done."""
+        return {"stage": self.stage, "share": round(self.share, 3)}
 
     def set_status(self, status: str, error: str = "") -> None:
         """Go over to another status."""
@@ -145,7 +150,7 @@ class Workspace:
             work.thread = ThreadPoolExecutor(1, f"line-{number}")
             if work.status == READY:
                 work.set_status(WORKING)
-            work.thread.submit(self._open, work)
+            work.thread.submit(self._run, work, self._open)
             self._close_others(work)
         return work
 
@@ -167,10 +172,6 @@ class Workspace:
         finally:
             work.users -= 1
 
-    async def run_apart(self, do: Callable[[], ResultT]) -> ResultT:
-        """Do something in another thread that needs no open recording; return the result. Raises as ``do``."""
-        return await asyncio.get_running_loop().run_in_executor(None, do)
-
     def forget(self, number: int) -> None:
         """Close a recording, and what is cached of it."""
         work = self._works.pop(number, None)
@@ -188,7 +189,7 @@ class Workspace:
                 continue
             if work.users:
                 work.recording = None
-                work.thread.submit(self._open, work)
+                work.thread.submit(self._run, work, self._open)
             else:
                 work.close()
                 del self._works[number]
@@ -202,31 +203,27 @@ class Workspace:
             work.close()
         self.folder.save()
 
-    def _close_others(self, kept: Work) -> None:
+    def _close_others(self, newest: Work) -> None:
         """Close the recordings that were used least recently, until the others are not too many."""
         works = [work for work in reversed(self._works.values()) if work.thread is not None]
         open_s = 0.0
         for place, work in enumerate(works):
             open_s += work.recording.audio.duration_s if work.recording else 0.0
             is_over = place >= MAX_OPEN or open_s > MAX_OPEN_S
-            if is_over and work is not kept and work.recording and not work.users:
+            if is_over and work is not newest and work.recording and not work.users:
                 work.close()
                 del self._works[work.number]
 
     def _analyse_next(self) -> None:
         with suppress(IndexError):  # it has been opened since, and is analysed in its own thread
-            work = self._waiting.popleft()
-            self._run(work, lambda: self._analyse(work))
+            self._run(self._waiting.popleft(), self._analyse)
 
     def _open(self, work: Work) -> None:
-        def analyse_and_open() -> None:
-            audio, recording = self._analyse(work), self.folder.find_recording(work.number)
-            model = None
-            while model is not self.model:  # another one may be used since
-                model = self.model
-                work.recording = open_recording(self.folder, recording, model, audio)
-
-        self._run(work, analyse_and_open)
+        audio, recording = self._analyse(work), self.folder.find_recording(work.number)
+        model = None
+        while model is not self.model:  # another one may be used since
+            model = self.model
+            work.recording = open_recording(self.folder, recording, model, audio)
 
     def _analyse(self, work: Work) -> AnalysedAudio | None:
         """Analyse a recording, if it is not yet, and return its sound; one at a time."""
@@ -245,11 +242,11 @@ class Workspace:
                 self.folder.save()
             return audio
 
-    def _run(self, work: Work, do: Callable[[], object]) -> None:
+    def _run(self, work: Work, do: Callable[[Work], object]) -> None:
         """Do something for a recording, and keep how it ended; nothing is raised."""
         try:
             work.set_status(WORKING if work.thread is not None else work.status)
-            do()
+            do(work)
             work.set_status(READY)
         except (LipMotionError, OSError) as error:
             work.set_status(FAILED, str(error))

@@ -41,24 +41,18 @@ def test_all_additions_together_are_the_default():
     alone = {key: getattr(everything, key) for key in options}
     assert replace(printed, **alone) == everything == SelectionConfig(closures=False)
     assert len({str(config) for config in list_rows().values()}) == len(list_rows())
+    unguided = list_rows(guided=False)  # nothing is learned from the sound
+    assert (PRINTED in unguided, EVERYTHING in unguided) == (True, False)
+    assert {(config.guide, config.joint_recogniser) for config in unguided.values()} == {(0.0, False)}
+    assert unguided.items() <= list_rows().items()
 
 
-def test_without_a_guide_nothing_is_learned_from_the_sound():
-    alone = list_rows(guided=False)
-    assert (PRINTED in alone, EVERYTHING in alone) == (True, False)
-    assert {(config.guide, config.joint_recogniser) for config in alone.values()} == {(0.0, False)}
-    assert alone.items() <= list_rows().items()
-
-
-def test_overlaps_count_where_table_1_leaves_the_middle():
+def test_overlaps_count_where_table_1_leaves_the_middle_and_a_bend_is_the_change_of_the_velocity():
     costs = costs_of(inventory("s aa f", "f aa m", levels=(0, 1)), hard=1.0)
     for text, inside in (("s aa m", [(PHONE_S, 2 * PHONE_S)]), ("m aa m", [])):
         target = target_of(costs, text)
         found = list_overlaps(costs, target, to_pieces(costs, target, np.array([0, 1, 5])))
         assert found == pytest.approx(np.reshape(inside, (-1, 2))), text
-
-
-def test_a_bend_is_the_change_of_the_velocity():
     curve = np.maximum(np.arange(30.0) - 12, 0)
     change = measure_velocity_change(curve)
     assert change[12] == pytest.approx(4)

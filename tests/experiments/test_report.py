@@ -390,12 +390,9 @@ def order(here: dict[str, float | None], signs: dict[str, int], is_error: bool =
         ((0, 0, 0), "0 held, 0 reversed, 3 open: these recordings say nothing of its order"),
     ],
 )
-def test_the_verdict_counts_pairs(signs, outcome):
+def test_the_verdict_counts_pairs_and_the_smallest_error_is_the_best(signs, outcome):
     found = order({"a": 0.3, "b": 0.2, "c": 0.1}, dict(zip(("ab", "ac", "bc"), signs, strict=True)))
     assert found.judge() == f"ACC: of the paper's 3 pairs {outcome}. Best in print: a; here: a."
-
-
-def test_the_smallest_error_is_the_best():
     found = order({"a": 0.1, "b": None, "c": 0.3}, {"ab": 1, "ac": 1, "bc": 1}, is_error=True)
     assert found.judge().endswith("Best in print: c; here: a.")
     assert found.describe()[1] == "Here: a 0.1, c 0.3."
@@ -408,7 +405,7 @@ ROWS = {
 TABLE = Table("t", "All & some", (Column("acc", "ACC", ".2f", "a note"), Column("kind", "kind")), ROWS, "c")
 
 
-def test_every_figure_has_its_interval_and_difference_in_the_files():
+def test_every_figure_has_its_interval_and_difference_in_the_files_and_on_the_page():
     first, second = csv.DictReader(io.StringIO(TABLE.as_csv()))
     assert first["system"] == "a, <b>"
     assert [float(first[key]) for key in ("acc", "acc_low", "acc_high")] == [0.5, 0.4, 0.6]
@@ -417,17 +414,11 @@ def test_every_figure_has_its_interval_and_difference_in_the_files():
     content = TABLE.as_content()
     assert content["rows"][0]["acc_difference_low"] == 0.1
     assert (content["reference"], content["columns"]["acc"]) == ("c", "a note")
-
-
-def test_the_page_shows_the_interval_and_a_star():
     html = TABLE.as_html("folder")
     assert '<th scope="row">a, &lt;b&gt;</th><td class="number">0.50* <small>0.40–0.60</small></td><td>x</td>' in html
     assert '<th scope="row">c</th><td class="number">–</td><td>–</td>' in html
     assert 'href="folder/tables/t.csv"' in html
     assert "difference from c leaves out 0" in html
-
-
-def test_a_table_without_rows():
     empty = Table("t", "none", (Column("acc", "ACC", ".2f"),), {})
     assert (empty.as_csv().strip(), empty.list_records()) == ("system", [])
 
@@ -445,19 +436,13 @@ def test_figures_intervals_and_the_papers_stand_on_one_axis():
     assert "<b> 0.7" in drawing.attrib["aria-label"]
 
 
-def test_a_curve_has_both_motions_and_what_is_marked():
+def test_a_curve_has_both_motions_and_what_is_marked_and_one_over_numbers_rises_with_them():
     time_s = np.arange(5) / 25
     made = ElementTree.fromstring(draw_curve("x", time_s, np.zeros(5), np.arange(5.0), [(-0.1, 0.04, "p")])).find("svg")  # noqa: S314 (our own)
     assert [line.attrib["class"] for line in made.findall("polyline")] == ["recorded", "generated"]
     assert float(made.find("rect").attrib["x"]) == 34
-
-
-def test_a_still_motion_is_drawn():
-    assert "polyline" in draw_curve("x", np.arange(3.0), np.zeros(3), np.zeros(3), [])
+    assert "polyline" in draw_curve("x", np.arange(3.0), np.zeros(3), np.zeros(3), [])  # still motion
     assert "nan" not in draw_dots("a", "b", [Dot("still", 0.0, (0.0, 0.0))])
-
-
-def test_a_curve_over_numbers_rises_with_them():
     lines = {"a": [(10.0, Dot("10", 0.1, (0.0, 0.2))), (100.0, Dot("100", 0.3, (0.2, 0.4)))]}
     drawing = ElementTree.fromstring(draw_rising("t", "n", lines)).find("svg")  # noqa: S314 (our own)
     (x1, y1), (x2, y2) = (map(float, p.split(",")) for p in drawing.find("polyline").attrib["points"].split())

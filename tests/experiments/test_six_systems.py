@@ -47,7 +47,12 @@ def figures(toy_corpus: Corpus, folder: Path, work: Path) -> dict[str, Any]:
 
 
 @LONG
-def test_every_size_condition_and_system(figures):
+def test_every_size_condition_and_system_also_in_the_text_and_pictures(figures, folder):
+    assert sorted(path.name for path in folder.iterdir()) == sorted(six_systems.PLOT_FILES.values())
+    assert all(path.read_bytes().startswith(PICTURE) for path in folder.iterdir())
+    section = build_xie_liu_section(figures)
+    assert [list(table.rows) for table in section.tables[:4]] == [SYSTEMS] * 4
+    assert len(section.words["Settings, the best on val"]) == 2
     assert [(row["names"], row["used"]) for row in figures["rows"]] == [(3, 3), (8, 8)]
     for row in figures["rows"]:
         assert list(row["conditions"]) == ["audio only", "with transcript"]
@@ -138,39 +143,23 @@ def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures):
 
 
 @LONG
-def test_pictures_are_written(figures, folder):
-    assert figures
-    assert sorted(path.name for path in folder.iterdir()) == sorted(six_systems.PLOT_FILES.values())
-    assert all(path.read_bytes().startswith(PICTURE) for path in folder.iterdir())
-
-
-@LONG
-def test_the_text_names_every_system(figures):
-    section = build_xie_liu_section(figures)
-    assert [list(table.rows) for table in section.tables[:4]] == [SYSTEMS] * 4
-    assert len(section.words["Settings, the best on val"]) == 2
-
-
-@LONG
-@pytest.mark.parametrize("visual", ["both"])
-def test_eigenlips(visual, toy_corpus):
-    options = ComparisonOptions(systems=["trajectory HMM"], visual=visual)
+def test_eigenlips(toy_corpus):
+    options = ComparisonOptions(systems=["trajectory HMM"], visual="both")
     received: list[tuple[str, str]] = []
     settings = replace(SETTINGS, receive=lambda *given: received.append(given[:2]))
     made = run_xieliu2007(toy_corpus, options, settings=settings)
     assert made["rows"][0]["names"] == 8
     assert received == [(name, "audio only") for name in made["rows"][0]["training"]]
-    model = train(toy_corpus, recogniser=SMALL, visual=visual)[0]
+    model = train(toy_corpus, recogniser=SMALL, visual="both")[0]
     expected_figures = evaluate(model, toy_corpus)["conditions"]["audio only"]
     row = made["rows"][0]["conditions"]["audio only"]["trajectory HMM"]
     assert (row["acc"], row["amse"]) == pytest.approx((expected_figures["acc"], expected_figures["amse"]))
-    part = "eigenlips_" if visual == "both" else ""
-    assert row[f"{part}acc"] == pytest.approx(expected_figures["eigenlips"]["acc"])
-    assert row[f"{part}amse"] == pytest.approx(expected_figures["eigenlips"]["amse"])
-    assert len(made["channels"]) == len(expected_figures["eigenlips"]["channels"]) + (3 if visual == "both" else 0)
-    assert (row["opening"] is None) == (visual == "eigenlips")
+    for key in ("acc", "amse"):
+        assert row[f"eigenlips_{key}"] == pytest.approx(expected_figures["eigenlips"][key])
+    assert len(made["channels"]) == len(expected_figures["eigenlips"]["channels"]) + 3
+    assert row["opening"] is not None
     assert json.loads(json.dumps(made, allow_nan=False))
-    assert ("ACC, eigenlips" in build_xie_liu_section(made).table.as_lines()[0]) == (visual == "both")
+    assert "ACC, eigenlips" in build_xie_liu_section(made).table.as_lines()[0]
 
 
 @LONG
@@ -187,7 +176,7 @@ def test_two_stages_beside_one(toy_corpus):
         run_xieliu2007(toy_corpus, replace(options, voices=()), settings=SETTINGS)
 
 
-def test_systems_in_the_order_of_the_table():
+def test_systems_are_in_the_order_of_the_table_and_other_engines_are_compared_when_named():
     assert systems.select_systems(["mean pose", "ph-HMM"]) == ["ph-HMM", systems.REFERENCE_SYSTEM, "mean pose"]
     assert systems.select_systems(["ph-CHMM" + systems.ALL_PATHS]) == [
         "ph-CHMM",
@@ -197,9 +186,6 @@ def test_systems_in_the_order_of_the_table():
     assert list(systems.PAPER_FIGURES) == list(systems.COMPARED_SYSTEMS)[:6]
     with pytest.raises(InputError, match="no system 'ph-RNN'; there are: ph-HMM, "):
         systems.select_systems(["ph-RNN"])
-
-
-def test_other_engines_are_compared_when_named():
     left_out = systems.COMPARED_SYSTEMS.keys() - systems.select_systems(None)
     twice = {name for name in systems.COMPARED_SYSTEMS if systems.TWO_STAGES in name}
     assert left_out - twice == {"trajectory CHMM, own means", "trajectory CHMM", "trajectory HMM", systems.BLSTM}
@@ -208,13 +194,10 @@ def test_other_engines_are_compared_when_named():
     )
 
 
-def test_without_matplotlib_there_are_no_pictures(toy_corpus, tmp_path, monkeypatch):
+def test_what_cannot_be_chosen(toy_corpus, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(MissingDependencyError, match=r'need matplotlib.*; pip install ".*\[plots\]"'):
         run_xieliu2007(toy_corpus, plots=tmp_path)
-
-
-def test_what_cannot_be_chosen(toy_corpus, tmp_path):
     with pytest.raises(InputError, match="sizes 9; required: from 1 to 8"):
         run_xieliu2007(toy_corpus, ComparisonOptions(systems=[systems.REFERENCE_SYSTEM]), sizes=[9], settings=SETTINGS)
     with pytest.raises(CorpusError, match="are in the split that is compared with"):

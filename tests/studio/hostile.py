@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from random import Random
 
-from lipmotion_studio.requests import TOKEN_HEADER
+from lipmotion_studio.application import TOKEN_HEADER
 from studio.served import Served
 from study.hostile import Hostile
 from study.served import raw_reply, send_junk

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from lipmotion import Model
-from lipmotion_studio.application import create_application
+from lipmotion_studio.application import TOKEN_HEADER, Access, create_application
 from lipmotion_studio.folder import ProjectFolder, open_folder
-from lipmotion_studio.requests import TOKEN_HEADER, Access
 from lipmotion_studio.studio import KnownModel, Studio
 from study.asgi import Application, Reply, answered, ask
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from children import LIMIT_S, LIPMOTION, Child, child
 from lipmotion.pipeline.edits import Step, parse_step
-from lipmotion_studio.requests import TOKEN_HEADER
+from lipmotion_studio.application import TOKEN_HEADER
 from study.served import NO_REPLY
 
 PATIENCE_S = 600.0

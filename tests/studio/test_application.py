@@ -18,10 +18,9 @@ pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
 from lipmotion.storage.locks import LOCK
 from lipmotion_studio import recording as recording_module
-from lipmotion_studio.application import create_application
+from lipmotion_studio.application import TOKEN_HEADER, Access, create_application
 from lipmotion_studio.folder import ProjectFolder, open_folder
 from lipmotion_studio.project import parse_project
-from lipmotion_studio.requests import TOKEN_HEADER, Access
 from lipmotion_studio.studio import Studio, load_known_model
 from lipmotion_studio.votes import read_votes
 from studio.open_studio import HOST, TOKEN, TOY_DIGEST, OpenStudio, open_studio, toy
@@ -65,6 +64,8 @@ def test_an_edit_is_made_stored_and_taken_back(studio):
     assert stored(studio)["undone"] == state["steps"]
     redone = studio.ask("/api/lines/1/redo", {"revision": undone["revision"]}).content
     assert (redone["steps"], redone["redo"]) == (["phone 3 is p"], 1)
+    dragged = studio.edit("phone 3 is m", instead=1).content  # each edit replaces the one before
+    assert (dragged["steps"], dragged["redo"]) == (["phone 3 is m"], 0)
 
 
 def test_phones_that_edits_have_touched_are_told(studio):
@@ -78,14 +79,6 @@ def test_phones_that_edits_have_touched_are_told(studio):
     assert edited(studio.edit(f"phone 5 ends {end_s - 0.01:.3f}").content) == [3, 5, 6]
     assert edited(studio.edit(f"phone 3 is {own}").content) == [5, 6]
     assert edited(studio.edit("split phone 1 at 0.02").content) == [1, 2, 6, 7]
-
-
-def test_while_something_is_dragged_each_edit_replaces_the_one_before(studio):
-    end_s = studio.ready()["phones"][2]["end_s"]
-    for way_s in (0.01, 0.02):
-        state = studio.edit(f"phone 3 ends {end_s - way_s:.3f}", instead=0 if way_s == 0.01 else 1).content
-    assert state["steps"] == [f"phone 3 ends {end_s - 0.02:.3f}"]
-    assert state["redo"] == 0
 
 
 @pytest.mark.parametrize(
@@ -125,6 +118,12 @@ def test_numbers_are_those_of_the_motion(studio):
     assert names == [channel["name"] for channel in state["channels"]]
     assert found == pytest.approx(work.recording.generation.motion.values[50:101], abs=1e-6)
     assert reply.headers["x-lipmotion-first"] == "50"
+    some = studio.ask("/api/lines/1/motion?names=width,opening&start_s=0.5&end_s=1.0")
+    assert json.loads(some.headers["x-lipmotion-names"]) == ["width", "opening"]
+    chosen = found[:, [names.index("width"), names.index("opening")]]
+    assert np.frombuffer(some.body, "<f4").reshape(-1, 2) == pytest.approx(chosen)
+    refused = studio.ask("/api/lines/1/motion?names=opening,jump")
+    assert (refused.status, "'jump'" in refused.content["error"]) == (422, True)
     sure = np.frombuffer(studio.ask("/api/lines/1/motion?of=confidence").body, "<f4")
     assert len(sure) == state["frames"]
     assert 0 <= sure.min() <= sure.max() <= 1
@@ -144,20 +143,6 @@ def test_of_a_long_line_the_whole_motion_is_made_when_it_is_asked_for(studio, mo
     whole = work.recording.session.generate(work.recording.file.edits).motion.values
     found = np.frombuffer(studio.ask("/api/lines/1/motion").body, "<f4").reshape(whole.shape)
     assert found == pytest.approx(whole, abs=1e-6)
-
-
-def test_curves_that_are_asked_for_come_alone(studio):
-    state, (all_of_it, some) = (
-        studio.ready(),
-        (studio.ask(f"/api/lines/1/motion{q}") for q in ("", "?names=width,opening")),
-    )
-    names = [channel["name"] for channel in state["channels"]]
-    whole = np.frombuffer(all_of_it.body, "<f4").reshape(-1, len(names))
-    found = np.frombuffer(some.body, "<f4").reshape(-1, 2)
-    assert json.loads(some.headers["x-lipmotion-names"]) == ["width", "opening"]
-    assert found == pytest.approx(whole[:, [names.index("width"), names.index("opening")]])
-    refused = studio.ask("/api/lines/1/motion?names=opening,jump")
-    assert (refused.status, "'jump'" in refused.content["error"]) == (422, True)
 
 
 def test_why_and_doubts(studio):
@@ -260,8 +245,8 @@ def test_only_the_page_itself_with_the_token_gets_an_answer(studio):
     assert studio.ask("/api/project", origin="http://example.org").status == 403
     assert studio.ask("/api/project", origin=f"http://{HOST}").status == 200
     assert studio.ask("/api/project", sec_fetch_site="cross-site").status == 403
-    access = Access(TOKEN, frozenset({HOST}))
-    keyed = access.with_key("/api/lines/1/sound.wav")
+    path = "/api/lines/1/sound.wav"
+    keyed = f"{path}?key={Access(TOKEN, frozenset({HOST})).make_key(path)}"
     assert studio.ask(keyed, **{TOKEN_HEADER: ""}).status == 200
     assert studio.ask(keyed.replace("sound.wav", "doubts"), **{TOKEN_HEADER: ""}).status == 401
     for path in (
@@ -284,12 +269,9 @@ def test_what_is_dropped_is_read_by_the_same_readers(studio):
     assert studio.ask("/api/project").content["count"] == 1
 
 
-def test_a_model_is_called_as_its_file(toy_model, tmp_path):
+def test_a_model_is_called_as_its_file_and_a_project_outlives_it(toy_model, tmp_path, caplog):
     save_model(replace(toy_model, about={**toy_model.about, "name": "trajectory"}), tmp_path / "Sam.lipmotion")
     assert load_known_model(tmp_path / "Sam.lipmotion").name == "Sam"
-
-
-def test_a_project_outlives_its_model(tmp_path, caplog):
     with open_folder(None, tmp_path / "project") as folder:
         folder.change(lambda project: replace(project, model="../gone.lipmotion"))
         with closing(Studio(folder)) as studio:
@@ -343,10 +325,9 @@ def test_the_weights_of_the_page_are_those_of_the_file(studio):
     assert studio.ask("/api/lines/1/picture?time=0.5").body[:4] == b"\x89PNG"
 
 
-@pytest.mark.long
-def test_a_filmed_face_the_real_video_and_another_model(
-    tmp_path, toy_speech, toy_sentence, toy_model, coupled_model, filmed_face_file
-):
+@pytest.fixture
+def compared(tmp_path, toy_speech, toy_sentence, toy_model, coupled_model, filmed_face_file) -> Iterator[OpenStudio]:
+    """A studio whose line has a real video, with a filmed face and another model of the same name."""
     sound = tmp_path / "line.wav"
     shutil.copy(toy_speech, sound)
     sound.with_suffix(".txt").write_text(" ".join(toy_sentence.words), encoding="utf-8")
@@ -355,42 +336,12 @@ def test_a_filmed_face_the_real_video_and_another_model(
     with open_folder(sound) as opened:
         opened.change(lambda now: replace(now, characters={"toy": str(filmed_face_file)}))
         with closing(Studio(opened, toy(toy_model), replace(toy(coupled_model), digest=OTHER_DIGEST))) as running:
-            studio = OpenStudio(opened, running, create_application(running, Access(TOKEN, frozenset({HOST}))))
-            _compared(studio)
-            assert _film(studio) == (11, "video/mp4")  # from 0.2 to 0.6 s, both shown
-            _exported(studio)
-            address = studio.ready()["media"]["video"]
-            part = studio.ask(address, range="bytes=4-7", **{TOKEN_HEADER: ""})
-            assert (part.status, part.body, part.headers["content-type"]) == (206, b"ftyp", "video/mp4")
-            assert studio.ask(address.partition("?")[0], **{TOKEN_HEADER: ""}).status == 401
-            sound.with_suffix(".mp4").unlink()
-            assert studio.ask(address).status == 404
+            yield OpenStudio(opened, running, create_application(running, Access(TOKEN, frozenset({HOST}))))
 
 
-def _film(studio: OpenStudio) -> tuple[int, str]:
-    refused = studio.ask("/api/lines/1/picture?time=0.5&face=toy")
-    assert (refused.status, "video" in refused.content["error"]) == (422, True)
-    assert studio.ask("/api/faces/toy.glb").status == 404
-    reply = studio.ask("/api/lines/1/video", {"start_s": 0.2, "end_s": 0.6, "face": "toy"})
-    with av.open(io.BytesIO(reply.body)) as film:
-        assert len(film.streams.audio) == 1
-        return sum(1 for _ in film.decode(video=0)), reply.headers["content-type"]
-
-
-def _exported(studio: OpenStudio) -> None:
-    """The video of a preset is that of the face, with its mark; other files do not depend on it."""
-    for wanted in ({"preset": "video", "face": "toy"}, {"files": [".csv"]}):
-        assert studio.ask("/api/lines/1/export", wanted).content["failed"] == []
-    with av.open(str(studio.folder.path / "exports" / "line.mp4")) as film:
-        assert film.metadata["comment"].startswith("synthetic:")
-    table = (studio.folder.path / "exports" / "line.csv").read_bytes()
-    assert studio.ask("/api/lines/1/export", {"files": [".csv"], "face": "toy"}).content["failed"] == []
-    assert (studio.folder.path / "exports" / "line.csv").read_bytes() == table
-    (failed,) = studio.ask("/api/lines/1/export", {"preset": "video", "face": "../x"}).content["failed"]
-    assert "no face" in failed["error"]
-
-
-def _compared(studio: OpenStudio) -> None:
+@pytest.mark.long
+def test_a_filmed_face_the_real_video_and_another_model(compared, tmp_path):
+    studio = compared
     studio.ready()
     plain, other = (studio.ask(f"/api/lines/1/motion{query}").body for query in ("", "?by=other"))
     assert (len(plain) > 0, plain == other) == (True, False)
@@ -405,7 +356,57 @@ def _compared(studio: OpenStudio) -> None:
     none = studio.ask("/api/lines/1/motion?by=other&names=jump")
     assert (none.status, none.headers["x-lipmotion-names"], none.body) == (200, "[]", b"")
     assert studio.ask("/api/lines/1/motion?by=../x").status == 422
-    _voted(studio)
+
+    assert studio.ask("/api/project").content["forms"]["against"] == f"toy ({OTHER_DIGEST[:8]})"
+
+    def vote(better: int | None, *shown: dict[str, str]) -> Reply:
+        return studio.change("votes", shown=list(shown), better=better)
+
+    (version,) = studio.change("versions").content["versions"]
+    now, other, kept = {"by": ""}, {"by": "other"}, {"by": version["name"]}
+    assert vote(0, now, kept).status == 422  # the same motion
+    assert vote(1, now, other).content == {"better": [0, 1], "neither": 0}
+    assert vote(1, other, now).content == {"better": [1, 1], "neither": 0}
+    assert studio.edit("phone 3 is p").status == 200
+    assert vote(None, now, other).content == {"better": [1, 1], "neither": 1}
+    assert vote(1, now, kept).content == {"better": [0, 1], "neither": 0}
+    votes = read_votes(studio.folder.path / "votes.json")
+    assert [each.name for each in votes[0].shown] == ["toy", "toy"]
+    assert [each.model for each in votes[1].shown] == [OTHER_DIGEST, TOY_DIGEST]
+    assert [each.edits for each in votes[3].shown] == [studio.ready()["edits_digest"], version["digest"]]
+    for wrong in ([now], [now, now], [now, {"by": "another"}], [now, {"by": "version-2"}], [now, "other"]):
+        assert studio.change("votes", shown=wrong, better=0).status == 422
+    for better in (2, "toy", -1):
+        assert studio.change("votes", shown=[now, other], better=better).status == 422
+    assert len(read_votes(studio.folder.path / "votes.json")) == 4
+
+    refused = studio.ask("/api/lines/1/picture?time=0.5&face=toy")
+    assert (refused.status, "video" in refused.content["error"]) == (422, True)
+    assert studio.ask("/api/faces/toy.glb").status == 404
+    reply = studio.ask("/api/lines/1/video", {"start_s": 0.2, "end_s": 0.6, "face": "toy"})
+    assert reply.headers["content-type"] == "video/mp4"
+    with av.open(io.BytesIO(reply.body)) as film:
+        assert len(film.streams.audio) == 1
+        assert sum(1 for _ in film.decode(video=0)) == 11  # from 0.2 to 0.6 s, both shown
+
+    # the video of a preset is that of the face, with its mark; other files do not depend on it
+    for wanted in ({"preset": "video", "face": "toy"}, {"files": [".csv"]}):
+        assert studio.ask("/api/lines/1/export", wanted).content["failed"] == []
+    exports = studio.folder.path / "exports"
+    with av.open(str(exports / "line.mp4")) as film:
+        assert film.metadata["comment"].startswith("synthetic:")
+    table = (exports / "line.csv").read_bytes()
+    assert studio.ask("/api/lines/1/export", {"files": [".csv"], "face": "toy"}).content["failed"] == []
+    assert (exports / "line.csv").read_bytes() == table
+    (failed,) = studio.ask("/api/lines/1/export", {"preset": "video", "face": "../x"}).content["failed"]
+    assert "no face" in failed["error"]
+
+    address = studio.ready()["media"]["video"]
+    part = studio.ask(address, range="bytes=4-7", **{TOKEN_HEADER: ""})
+    assert (part.status, part.body, part.headers["content-type"]) == (206, b"ftyp", "video/mp4")
+    assert studio.ask(address.partition("?")[0], **{TOKEN_HEADER: ""}).status == 401
+    (tmp_path / "line.mp4").unlink()
+    assert studio.ask(address).status == 404
 
 
 def test_versions_are_kept_shown_and_gone_back_to(studio):
@@ -435,29 +436,3 @@ def test_versions_are_kept_shown_and_gone_back_to(studio):
         assert studio.change("versions/forget", version=wrong).status == 422
     old = {"revision": studio.ready()["revision"] - 1, "version": "version-1"}
     assert studio.ask("/api/lines/1/versions/back", old).status == 409
-
-
-def _voted(studio: OpenStudio) -> None:
-    """Both models have the same name."""
-    assert studio.ask("/api/project").content["forms"]["against"] == f"toy ({OTHER_DIGEST[:8]})"
-
-    def vote(better: int | None, *shown: dict[str, str]) -> Reply:
-        return studio.change("votes", shown=list(shown), better=better)
-
-    (version,) = studio.change("versions").content["versions"]
-    now, other, kept = {"by": ""}, {"by": "other"}, {"by": version["name"]}
-    assert vote(0, now, kept).status == 422  # the same motion
-    assert vote(1, now, other).content == {"better": [0, 1], "neither": 0}
-    assert vote(1, other, now).content == {"better": [1, 1], "neither": 0}
-    assert studio.edit("phone 3 is p").status == 200
-    assert vote(None, now, other).content == {"better": [1, 1], "neither": 1}
-    assert vote(1, now, kept).content == {"better": [0, 1], "neither": 0}
-    votes = read_votes(studio.folder.path / "votes.json")
-    assert [each.name for each in votes[0].shown] == ["toy", "toy"]
-    assert [each.model for each in votes[1].shown] == [OTHER_DIGEST, TOY_DIGEST]
-    assert [each.edits for each in votes[3].shown] == [studio.ready()["edits_digest"], version["digest"]]
-    for wrong in ([now], [now, now], [now, {"by": "another"}], [now, {"by": "version-2"}], [now, "other"]):
-        assert studio.change("votes", shown=wrong, better=0).status == 422
-    for better in (2, "toy", -1):
-        assert studio.change("votes", shown=[now, other], better=better).status == 422
-    assert len(read_votes(studio.folder.path / "votes.json")) == 4

@@ -9,7 +9,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.storage.files import make_portable
 from lipmotion_studio.folder import PROJECT, ProjectFolder, RevisionError, find_project_path, open_folder
 from lipmotion_studio.project import ExportRecord, Project, ProjectRecording, describe_project, parse_project
-from lipmotion_studio.votes import Side, Vote, format_votes, read_votes, tally
+from lipmotion_studio.votes import Side, Vote, read_votes, tally, write_votes
 from pipeline.made import write_sound
 from testing.toy import ToySentence
 
@@ -46,15 +46,12 @@ def test_a_project_is_there_again(lines):
         assert again.project == project
         assert again.load_lexicon().user == {"tear": (("t", "ih", "r"), ("t", "eh", "r"))}
         assert again.find_recording(number + 1).sound == "sounds/a-2.wav"
-    with open_folder(lines) as once_more:  # nothing is added twice
-        assert once_more.project == project
+    with open_folder(lines) as once_more:
+        assert once_more.project == project  # nothing is added twice
+        with pytest.raises(ExportError, match="another lipmotion"), open_folder(lines):
+            pass
     document = json.loads((folder.path / PROJECT).read_text(encoding="utf-8"))
     assert document["lines"][0]["sound"] == "../lines/a.wav"
-
-
-def test_a_second_one_is_told(lines):
-    with open_folder(lines), pytest.raises(ExportError, match="another lipmotion"), open_folder(lines):
-        pass
 
 
 def test_the_folder_of_a_project(tmp_path, lines):
@@ -136,13 +133,10 @@ OLD = [
 ]
 
 
-def test_models_of_one_name_have_tallies_of_their_own():
+def test_models_of_one_name_have_tallies_of_their_own_and_edits_count_where_they_differ():
     votes = [Vote("one", (A, C), 0), Vote("two", (C, A), 0), Vote("one", (B, C), 1), Vote("one", (A, C))]
     assert tally(votes, Vote("three", (A, C))) == {"better": [1, 1], "neither": 1}
     assert tally(votes, Vote("three", (C, B))) == {"better": [1, 0], "neither": 0}
-
-
-def test_edits_count_where_they_differ_and_names_do_not():
     renamed = Side("renamed", A.model, "d" * 64)
     votes = [Vote("one", (A, C), 0), Vote("one", (A, KEPT), 1)]
     assert tally(votes, Vote("two", (renamed, Side("other", C.model, "d" * 64)))) == {"better": [1, 0], "neither": 0}
@@ -158,7 +152,7 @@ def test_votes_are_read_as_they_were_written_and_old_ones_by_their_names(tmp_pat
     assert [vote.better for vote in old] == [0, None]
     assert tally(old, old[0]) == {"better": [1, 0], "neither": 1}
     votes = (*old, Vote("one", (A, KEPT), 1))
-    path.write_text(format_votes(votes), encoding="utf-8")
+    write_votes(path, votes)
     assert read_votes(path) == votes
 
 

@@ -18,10 +18,9 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule, run_state_machine_as_test
 
 from lipmotion import Model
-from lipmotion_studio.application import create_application
+from lipmotion_studio.application import Access, create_application
 from lipmotion_studio.folder import open_folder
 from lipmotion_studio.project import digest_edits
-from lipmotion_studio.requests import Access
 from lipmotion_studio.studio import Studio
 from pipeline.made import write_sound
 from studio.open_studio import HOST, TOKEN, OpenStudio, toy

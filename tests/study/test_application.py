@@ -2,6 +2,7 @@
 
 import socket
 import sqlite3
+from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -11,12 +12,12 @@ import pytest
 
 from children import wait_until
 from lipmotion.errors import InputError
-from lipmotion_studio.study import conduct, store
+from lipmotion_studio.study import store
 from lipmotion_studio.study.answers import KINDS, MOS, PAIRED, RANKING, read_answers
 from lipmotion_studio.study.application import ANSWER_BURST, JOIN_BURST, RateLimit, check_sheet, create_application
-from lipmotion_studio.study.conduct import export_answers, forget_rater
 from lipmotion_studio.study.manifest import VIDEOS, Study, check_videos, order_trials
-from lipmotion_studio.study.store import AnswerSheet, StudyStore
+from lipmotion_studio.study.store import AnswerSheet, StudyStore, collect_answers, export_answers, forget_rater
+from lipmotion_studio.verbs.study import run_serve
 from lipmotion_studio.web.replies import HEADERS
 from study.asgi import Application, ask
 from study.hostile import FOREIGN, hostile_requests
@@ -77,22 +78,22 @@ def test_a_rater_from_the_first_page_to_the_last(place, tmp_path):
     assert forget_rater(place.folder, rater) == len({(row.trial, row.question, row.condition) for row in rows})
 
 
-def test_nothing_that_raters_get_names_a_condition(place):
-    now = place.join()
-    texts = [ask(place.application, "/api/study").body, ask(place.application, "/api/state", token=now["token"]).body]
-    texts += [ask(place.application, f"/{name}").body for name in PAGE]
-    for text in texts:
-        assert not [name for name in ("visemes", "phones", "recording by", "anchor") if name.encode() in text]
+def test_nothing_that_raters_get_names_a_condition_or_comes_from_elsewhere(place):
+    pages = [ask(place.application, f"/{name}").body.decode() for name in PAGE]
+    for text in pages:
+        assert [word for word in text.split() if "://" in word and "www.w3.org/2000/svg" not in word] == []
+        assert "innerHTML" not in text
+        assert "<style" not in text
+    token = place.join()["token"]
+    replies = [ask(place.application, path, token=token).body.decode() for path in ("/api/study", "/api/state")]
+    for text in pages + replies:
+        assert not [name for name in ("visemes", "phones", "recording by", "anchor") if name in text]
 
 
-def test_no_trial_is_skipped(place):
+def test_no_trial_is_skipped_and_who_is_not_known_or_forgotten_is_refused(place):
     now = place.join()
     reply = place.send(now["token"], scripted_answer(place.study, now) | {"trial": 1})
     assert (reply.status, place.store.list_sheets()) == (409, [])
-
-
-def test_a_link_that_is_not_known_and_a_rater_who_was_forgotten(place):
-    now = place.join()
     for token in ("", "x", now["token"][:-1], now["token"] + "é"):
         assert ask(place.application, "/api/state", token=token).status == 401
     place.store.forget(1)
@@ -113,20 +114,16 @@ def test_bodies_that_are_refused(place, content, headers, status):
     assert place.store.list_sheets() == []
 
 
-def test_nobody_joins_without_agreeing(place):
+def test_too_many_requests_of_one_rater_do_not_stop_another_and_too_many_raters_have_to_wait(place):
     assert ask(place.application, "/api/raters", {"agrees": False}).status == 422
-    assert place.join()["rater"] == "r001"
-
-
-def test_too_many_requests_of_one_rater_do_not_stop_another(place):
-    first, second = place.join()["token"], place.join()["token"]
-    found = [ask(place.application, "/api/state", token=first).status for _ in range(ANSWER_BURST + 30)]
+    first, second = place.join(), place.join()
+    assert first["rater"] == "r001"
+    found = [ask(place.application, "/api/state", token=first["token"]).status for _ in range(ANSWER_BURST + 30)]
     assert 429 in found
-    assert ask(place.application, "/api/state", token=second).status == 200
-
-
-def test_too_many_raters_at_once_have_to_wait(place):
-    found = [ask(place.application, "/api/raters", {"agrees": True}).status for _ in range(JOIN_BURST + 20)]
+    assert ask(place.application, "/api/state", token=second["token"]).status == 200
+    found = [
+        ask(place.application, "/api/raters", {"agrees": True}).status for _ in range(JOIN_BURST + 60)
+    ]  # a slow machine lets some more in
     assert found[:20] == [201] * 20
     assert 429 in found
 
@@ -174,19 +171,6 @@ def test_only_the_page_itself_by_its_own_names_gets_an_answer(place, headers, st
     assert ask(application, "/api/raters", {"agrees": True}, headers=headers).status == (201 if status == 200 else 403)
 
 
-def test_the_page_has_no_resource_from_elsewhere(place):
-    for name in PAGE:
-        text = ask(place.application, f"/{name}").body.decode()
-        assert [word for word in text.split() if "://" in word and "www.w3.org/2000/svg" not in word] == []
-        assert "innerHTML" not in text
-        assert "<style" not in text
-
-
-def test_an_answer_is_taken_as_it_is(tmp_path):
-    study = small_study(tmp_path / "study")
-    assert check_sheet(study, order_trials(study, 7), 7, SENT) == AnswerSheet(7, 4, ("second",), 1.25, 3)
-
-
 WRONG: list[dict[str, Any]] = [
     {"trial": -1}, {"trial": 1000}, {"trial": True}, {"trial": "4"}, {"trial": 4.0}, {"values": []}, {"values": [1]},
     {"values": ["third"]}, {"values": ["first", "first"]}, {"values": "first"}, {"values": None}, {"plays": [1]},
@@ -199,8 +183,10 @@ WRONG: list[dict[str, Any]] = [
 @pytest.mark.parametrize("changed", [*(SENT | each for each in WRONG), None, [], "text", 7, {}, {"trial": 0}])
 def test_anything_else_is_refused(tmp_path, changed):
     study = small_study(tmp_path / "study")
+    trials = order_trials(study, 7)
+    assert check_sheet(study, trials, 7, SENT) == AnswerSheet(7, 4, ("second",), 1.25, 3)
     with pytest.raises(InputError):
-        check_sheet(study, order_trials(study, 7), 7, changed)
+        check_sheet(study, trials, 7, changed)
 
 
 def test_every_scale_and_every_slider_has_a_value(tmp_path):
@@ -226,11 +212,7 @@ def test_a_burst_and_then_a_rate():
     assert [limit.allows("a") for _ in range(2)] == [True, False]
     now_s[0] += 60
     assert [limit.allows("a") for _ in range(7)] == [True] * 5 + [False] * 2
-
-
-def test_nothing_is_kept_of_those_who_have_gone():
-    now_s = [0.0]
-    limit = RateLimit(1.0, 2, lambda: now_s[0])
+    limit = RateLimit(1.0, 2, lambda: now_s[0])  # nothing is kept of those who have gone
     for asker in range(20_000):
         now_s[0] += 0.01
         assert limit.allows(asker)
@@ -267,7 +249,7 @@ def test_twenty_scripted_raters_and_kills_in_the_middle(tmp_path):
         assert [rater.failure for rater in raters] == [None] * RATERS
         assert not any(rater.is_alive() for rater in raters)
         servers[-1].kill()
-    rows = conduct.collect_answers(folder)
+    rows = collect_answers(folder)
     assert len(rows) == RATERS * len(study.trials)
     assert len({(row.rater, row.trial, row.question) for row in rows}) == len(rows)
     by_rater = sorted(
@@ -313,12 +295,12 @@ def test_hostile_requests_get_no_file_and_leave_no_traceback(tmp_path):
         later.close()
         server.kill()
     assert "Traceback" not in errors.read_text(encoding="utf-8")
-    assert conduct.collect_answers(folder) == []
+    assert collect_answers(folder) == []
 
 
 def test_a_port_that_is_taken_is_said(tmp_path):
     small_study(tmp_path / "study")
-    with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(InputError, match="another --port"):
-        conduct.serve_study(tmp_path / "study", port=taken.getsockname()[1])
-    with pytest.raises(InputError, match="another --port"):
-        conduct.serve_study(tmp_path / "study", port=70_000)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        for port in (taken.getsockname()[1], 70_000):
+            with pytest.raises(InputError, match="another --port"):
+                run_serve(Namespace(study=tmp_path / "study", host="127.0.0.1", port=port, name=[]))

@@ -9,7 +9,7 @@ import pytest
 
 from children import wait_until
 from lipmotion.types import Audio
-from lipmotion_studio.study import conduct, manifest
+from lipmotion_studio.study import manifest, store
 from lipmotion_studio.study.answers import MOS, PAIRED, RANKING, Answer
 from study.browser import ENTER, LEFT, RIGHT, SPACE, Browser, check_screens
 from study.firefox import BOTH, Opens
@@ -86,7 +86,7 @@ def take_part(window: Browser, study: manifest.Study, act: Callable[[], object])
 
 
 def answers(tmp_path: Path) -> list[Answer]:
-    return [row for row in conduct.collect_answers(tmp_path / "study") if not row.practice]
+    return [row for row in store.collect_answers(tmp_path / "study") if not row.practice]
 
 
 def test_pairs_by_keys(opens, tmp_path):

@@ -23,7 +23,7 @@ from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.network_steps import ConvolutionalShape
 from lipmotion.speech.features.mfcc import BANDS, FFT_SIZE, HOP, WINDOW, mel_filters
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.stats.convolution import ConvolutionalNetwork
+from lipmotion.stats.networks import ConvolutionalNetwork
 from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS
 
 TAPS, BLOCK = 16, 160

@@ -69,9 +69,7 @@ def measure_clips(clips: Sequence[held_out.ComparedClip], recordings: Compared, 
     led = [clip[:, column] for clip in generated], [clip[:, column] for clip in original]
 
     def measure_distance(columns: NDArray[np.bool_]) -> float:
-        return curves.measure_mean_distance(
-            [clip[:, columns] for clip in generated], [clip[:, columns] for clip in original]
-        )
+        return curves.measure_mean_distance(*([clip[:, columns] for clip in part] for part in (generated, original)))
 
     figures = {
         "channels": {name: row for name, row in per_channel.items() if name not in eigenlips},
@@ -279,8 +277,8 @@ def pair_curves(
     recordings: Compared, made: Sequence[held_out.ComparedClip], channel: str = held_out.OPENING
 ) -> tuple[list[Array], list[Array]]:
     """Return the generated and the original opening, or another channel, of every clip [each shape=(T, 1)]."""
-    column = slice(recordings.channels.index(channel), recordings.channels.index(channel) + 1)
-    return [clip.generated[:, column] for clip in made], [clip.original[:, column] for clip in made]
+    n = recordings.channels.index(channel)
+    return [clip.generated[:, n : n + 1] for clip in made], [clip.original[:, n : n + 1] for clip in made]
 
 
 def list_statistics(recordings: Compared, made: Sequence[held_out.ComparedClip]) -> dict[str, ClipStatistic]:

@@ -15,7 +15,7 @@ from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures import curves
 from lipmotion.measures.closures import find_threshold
 from lipmotion.motion.eigenlips import Eigenlips
-from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps
+from lipmotion.motion.speaker_maps import SpeakerMaps
 from lipmotion.pipeline.analysis.speech_analysis import build_speech, recognise_speech, with_voice
 from lipmotion.pipeline.analysis.transcribe import warn_of_guesses
 from lipmotion.pipeline.generation import generate_for
@@ -72,12 +72,6 @@ class HeldOutRecordings:
         conditions = {name: phones[:count] for name, phones in self.conditions.items()}
         parts = {name: getattr(self, name)[:count] for name in ("utterances", "reference", "recognitions")}
         return replace(self, conditions=conditions, **parts)
-
-    def find_person(self, utterance: Utterance) -> SpeakerMap | None:
-        """Return the map to the motion of an utterance's speaker; None for a stranger."""
-        if self.speakers is None or utterance.speaker not in self.speakers.names:
-            return None
-        return self.speakers.of(utterance.speaker)
 
     @property
     def eigenlips_channels(self) -> tuple[str, ...]:
@@ -162,10 +156,9 @@ def choose_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], t
         return (*DISTANCES, *eigenlips), ()
     originals = [np.asarray(utterance.track.motion.values, float) for utterance in utterances]
     moves = curves.select_moving(originals, [channel.unit for channel in channels])
-    moves |= np.array([channel.unit == GREY for channel in channels])
-    if not moves.any():
+    moving = tuple(name for name, does in zip(names, moves, strict=True) if does or name in eigenlips)
+    if not moving:
         raise CorpusError(f"none of {len(names)} motion channels moves in these {len(utterances)} utterances")
-    moving = tuple(name for name, moved in zip(names, moves, strict=True) if moved)
     return moving, tuple(name for name in names if name not in moving)
 
 
@@ -205,12 +198,13 @@ def generate_compared(
     """Return recorded and generated motion of all utterances for their speech. Raises CorpusError: other channels."""
     clips, channels = [], recordings.channels
     for utterance, spoken, reference in zip(recordings.utterances, speech, recordings.reference, strict=True):
-        generated = generate_for(recordings.find_person(utterance), engine, learned, spoken).motion
-        missing = [name for name in channels if name not in generated.names]
-        if missing:
+        speakers = recordings.speakers
+        person = speakers.of(utterance.speaker) if speakers and utterance.speaker in speakers.names else None
+        generated = generate_for(person, engine, learned, spoken).motion
+        if missing := [name for name in channels if name not in generated.names]:
+            names = ", ".join(missing[:6])
             raise CorpusError(
-                f"the model has no channels {', '.join(missing[:6])}, which the corpus has: it was trained on other "
-                "motion"
+                f"the model has no channels {names}, which the corpus has: it was trained on other motion"
             )
         motion, seen = utterance.track.motion, np.asarray(utterance.track.seen)
         time_s = (np.arange(len(motion.values)) / motion.rate_hz)[seen]

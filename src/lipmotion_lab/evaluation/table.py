@@ -32,44 +32,37 @@ def format_figures(figures: Mapping[str, Any]) -> str:
         rows = condition["channels"] | ({f"{len(means['channels'])} eigenlips": means} if means else {})
         size = max(9, *map(len, rows))
         lines += ["", name, f"  {'channel':{size}}{'ACC':>7}{'per clip':>10}{'nRMSE':>7}{'variance':>10}{'jerk':>7}"]
+        forms = {"acc": "7.3f", "acc_per_clip": "10.3f", "nrmse": "7.3f", "global_variance": "10.2f", "jerk": "7.2f"}
         for channel, row in rows.items():
-            lines.append(
-                f"  {channel:{size}}{format_figure(row['acc'], '7.3f')}{format_figure(row['acc_per_clip'], '10.3f')}"
-                f"{format_figure(row['nrmse'], '7.3f')}{format_figure(row['global_variance'], '10.2f')}"
-                f"{format_figure(row['jerk'], '7.2f')}"
-            )
-        lines += _summary(condition)
+            lines.append(f"  {channel:{size}}" + "".join(format_figure(row[key], form) for key, form in forms.items()))
+        lines += _summarise(condition)
     return "\n".join(map(printable, lines))
 
 
-def _summary(condition: Mapping[str, Any]) -> list[str]:
-    lines = [
-        f"  mean ACC {condition['acc']:.3f}; AMSE {condition['amse']:.4f}; "
-        f"lag of {condition['leading']} {condition['lag_ms']:+.1f} ms"
-    ]
+def _summarise(condition: Mapping[str, Any]) -> list[str]:
+    head = f"mean ACC {condition['acc']:.3f}; AMSE {condition['amse']:.4f}; "
+    head += f"lag of {condition['leading']} {condition['lag_ms']:+.1f} ms"
+    if "closures" in condition:
+        low, high = condition["opening_acc_95"]
+        head = f"opening ACC 95 % interval {low:.3f} to {high:.3f}; {head}"
+    lines = [f"  {head}"]
     if "eigenlips" in condition and condition["channels"]:
-        lines.append(
-            f"  AMSE of the eigenlips {condition['eigenlips']['amse']:.1f}, in grey levels and this model's space"
-        )
+        amse = condition["eigenlips"]["amse"]
+        lines.append(f"  AMSE of the eigenlips {amse:.1f}, in grey levels and this model's space")
     if "closures" not in condition:
         return lines
-    low, high = condition["opening_acc_95"]
     quiet, original = condition["silence"]["generated"], condition["silence"]["original"]
-    without_pins = []
-    free = condition.get("unpinned")
-    if free is not None:
-        acc, (free_low, free_high) = format_figure(free["channels"]["opening"]["acc"], ".3f"), free["opening_acc_95"]
-        head = f"  without pins: ACC of opening {acc} ({free_low:.3f} to {free_high:.3f}), mean ACC {free['acc']:.3f}"
-        without_pins = [head, *(f"  {line}" for line in _format_closures(free))]
-    return [
-        f"  opening ACC 95 % interval {low:.3f} to {high:.3f};{lines[0][1:]}",
-        *lines[1:],
+    lines += [
         *_format_closures(condition),
         f"  silence: opening {format_figure(quiet['mean'], '.4f')} ± {format_figure(quiet['std'], '.4f')} "
         f"(original {format_figure(original['mean'], '.4f')} ± {format_figure(original['std'], '.4f')}, "
         f"{quiet['frames']} frames)",
-        *without_pins,
     ]
+    if (free := condition.get("unpinned")) is not None:
+        acc, (low, high) = format_figure(free["channels"]["opening"]["acc"], ".3f"), free["opening_acc_95"]
+        lines.append(f"  without pins: ACC of opening {acc} ({low:.3f} to {high:.3f}), mean ACC {free['acc']:.3f}")
+        lines += [f"  {line}" for line in _format_closures(free)]
+    return lines
 
 
 def _format_closures(condition: Mapping[str, Any]) -> list[str]:
@@ -124,20 +117,17 @@ def format_comparison(figures: Mapping[str, Any]) -> str:
                 lines.append(f"  {channel:{size}}{cells}")
             lines.append(f"  mean ACC {format_figure(pair['acc'], '.3f')}")
         lines += [format_closures(pair["closures"])] if "closures" in pair else []
-        if "points" in pair:
-            lines.append(f"  points: {', '.join(_list_points(pair['points']))}")
+        if points := pair.get("points"):
+            distance = format_figure(points["landmark_distance_mm"], ".2f")
+            parts = [f"landmark distance {distance} mm over {points['points']}"]
+            if points["lip_points"]:
+                error = format_figure(points["lip_vertex_error_mm"], ".2f")
+                parts.insert(0, f"lip vertex error {error} mm over {points['lip_points']}")
+            if points["upper_points"]:
+                deviation = format_figure(points["upper_face_deviation_mm"], "+.2f")
+                parts.append(f"upper-face deviation {deviation} mm over {points['upper_points']}")
+            lines.append(f"  points: {', '.join(parts)}")
         if "upper_face" in pair:
             deviation = format_figure(pair["upper_face"]["deviation"], "+.4f")
             lines.append(f"  upper face: deviation {deviation} over {pair['upper_face']['curves']} curves")
     return "\n".join(map(printable, lines))
-
-
-def _list_points(points: Mapping[str, Any]) -> list[str]:
-    parts = [f"landmark distance {format_figure(points['landmark_distance_mm'], '.2f')} mm over {points['points']}"]
-    if points["lip_points"]:
-        error = format_figure(points["lip_vertex_error_mm"], ".2f")
-        parts.insert(0, f"lip vertex error {error} mm over {points['lip_points']}")
-    if points["upper_points"]:
-        deviation = format_figure(points["upper_face_deviation_mm"], "+.2f")
-        parts.append(f"upper-face deviation {deviation} mm over {points['upper_points']}")
-    return parts

@@ -131,23 +131,14 @@ def draw_rising(title: str, unit: str, lines: Mapping[str, Sequence[tuple[float,
             parts.append(element("circle", cx=f"{x:.1f}", cy=f"{up(dot.value or 0):.1f}", r="3", class_=kind))
     looks = ("line", "dashed line")
     legend = "; ".join(f"{looks[order % 2]}: {name}" for order, name in enumerate(lines))
-    spoken = "; ".join(
-        f"{name}: {', '.join(f'{n:g} {_spell(dot.value)}' for n, dot in line)}" for name, line in lines.items()
-    )
+    spelt = {name: ", ".join(f"{n:g} {_spell(dot.value)}" for n, dot in line) for name, line in lines.items()}
+    spoken = "; ".join(f"{name}: {text}" for name, text in spelt.items())
     return _frame(title, f"{title}: {spoken}", height, parts, f"{title}. {legend.capitalize()}. Bars: 95 % intervals.")
 
 
 def _frame(title: str, spoken: str, height: int, parts: Sequence[Html], caption: str) -> Html:
-    drawing = element(
-        "svg",
-        element("title", title),
-        *parts,
-        viewBox=f"0 0 {WIDTH} {height}",
-        role="img",
-        aria_label=spoken,
-        class_="chart",
-    )
-    return add_caption(drawing, caption)
+    about = {"viewBox": f"0 0 {WIDTH} {height}", "role": "img", "aria_label": spoken, "class_": "chart"}
+    return add_caption(element("svg", element("title", title), *parts, **about), caption)
 
 
 def add_caption(content: Html, caption: str) -> Html:

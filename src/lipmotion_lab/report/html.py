@@ -32,19 +32,14 @@ def element(name: str, *content: str, **attributes: str | bool | None) -> Html:
     for key, value in attributes.items():
         if value is not None and value is not False:
             attribute = _simple(key.rstrip("_").replace("_", "-"))
-            words.append(attribute if value is True else f'{attribute}="{escape_html(value)}"')
+            words.append(attribute if value is True else f'{attribute}="{escape(printable(value))}"')
     start = f"<{' '.join(words)}>"
     return Html(start if name in VOID else f"{start}{joined(*content)}</{name}>")
 
 
 def joined(*content: str) -> Html:
     """Return some content one after another, escaped as in ``element``."""
-    return Html("".join(text if isinstance(text, Html) else escape_html(text) for text in content))
-
-
-def escape_html(text: str) -> str:
-    """Return a text as it stands in an element or an attribute, in one line, without anything invisible."""
-    return escape(printable(text))
+    return Html("".join(text if isinstance(text, Html) else escape(printable(text)) for text in content))
 
 
 def build_page(title: str, style: str, *content: str, script: str = "") -> str:

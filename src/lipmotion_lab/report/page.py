@@ -79,18 +79,6 @@ class ClipKeeper:
             return {}
 
 
-def draw_curves(content: Mapping[str, Any], systems: Sequence[str]) -> list[Html]:
-    """Return a chart of the opening for each of some systems, with the p, b and m of the recording."""
-    column, time_s = content["channels"].index(OPENING), np.array(content["time_s"])
-    recorded = np.array(content[RECORDED])[:, column]
-    marked = [tuple(span) for span in content["spoken"] if span[2] in BILABIAL]
-    return [
-        draw_curve(name, time_s, recorded, np.array(content["systems"][name])[:, column], marked)
-        for name in systems
-        if name in content["systems"]
-    ]
-
-
 def write_videos(
     content: Mapping[str, Any], systems: Sequence[str], corpus: Corpus, folder: Path, monitor: Monitor
 ) -> list[dict[str, str]]:
@@ -248,29 +236,37 @@ def _write_part(part: FinishedPart) -> Html:
 
 
 def _write_clip(part: FinishedPart) -> list[Html]:
-    """Return the recording that is shown: its videos and its curves."""
+    """Return the recording that is shown: its videos, and the curves of its opening with its p, b and m."""
     if not part.motion:
         return []
-    name, words = part.motion["name"], " ".join(part.motion["words"])
+    name, words, systems = part.motion["name"], " ".join(part.motion["words"]), part.motion["systems"]
+    column, time_s = part.motion["channels"].index(OPENING), np.array(part.motion["time_s"])
+    recorded = np.array(part.motion[RECORDED])[:, column]
+    marked = [tuple(span) for span in part.motion["spoken"] if span[2] in BILABIAL]
+    curves = [
+        draw_curve(each, time_s, recorded, np.array(systems[each])[:, column], marked)
+        for each in part.section.shown
+        if each in systems
+    ]
     videos = []
     for each in part.record["videos"]:
         about = {"src": f"{part.name}/{each['file']}", "aria_label": f"{name}: {each['caption']}"}
         video = element("video", controls=True, preload="metadata", playsinline=True, **about)
         videos.append(add_caption(video, each["caption"]))
     together = [element("button", "Play all together", type="button", class_="together", hidden=True)] if videos else []
-    said = f", “{words}”" if words else ""
+    quoted = f", “{words}”" if words else ""
     return [
         element("h3", "One recording, seen and heard"),
         element(
             "p",
-            f"{name}{said}: of the compared recordings the one with most p, b and m, whatever the systems make of it."
+            f"{name}{quoted}: of the compared recordings the one with most p, b and m, whatever the systems make of it."
             f"{' Sound alone was given.' if videos else ''}",
             class_="quiet",
         ),
         element("div", *together, element("div", *videos, class_="videos"), class_="clip"),
         element("h3", "Its opening of the mouth"),
         element("p", "Dashed: recorded, in eye distances; line: generated; shaded: p, b and m.", class_="quiet"),
-        element("div", *draw_curves(part.motion, part.section.shown), class_="grid"),
+        element("div", *curves, class_="grid"),
     ]
 
 

@@ -69,11 +69,6 @@ class ReportPart:
     draws: bool = False
 
 
-def can_draw() -> bool:
-    """Return whether there is what draws the pictures of experiments: the extra ``plots``."""
-    return find_spec("matplotlib") is not None
-
-
 def _run_xie_liu(run: PartRun) -> dict[str, Any]:
     options = six_systems.QUICK if run.quick else six_systems.DEFAULT_OPTIONS
     if not run.corpus.names("val"):  # nothing to choose settings with
@@ -188,10 +183,9 @@ def write_report(
         locks.remove_unfinished(folder)
         engine, phones, lexicon = engine_named("trajectory"), settings.recogniser, settings.lexicon or Lexicon()
         of_input = fingerprint_training(corpus, corpus.names(), engine, phones, lexicon, GEOMETRY, None)
-        lists = [[split, *corpus.names(split)] for split in SPLITS]
-        writer = _Writer(
-            corpus, folder, quick, settings, lacking, f"{of_input} {lists} {quick} {settings.seed} {can_draw()}"
-        )
+        lists, can_draw = [[split, *corpus.names(split)] for split in SPLITS], find_spec("matplotlib") is not None
+        of_run = f"{of_input} {lists} {quick} {settings.seed} {can_draw}"
+        writer = _Writer(corpus, folder, quick, settings, lacking, of_run, can_draw)
         writer.write_page(wanted)
         missing = [name for name in wanted if name not in lacking and writer.record(name) is None]
         parts = share_out(settings, missing, sizes=[PARTS[name].share for name in missing])
@@ -206,11 +200,9 @@ def write_report(
 
 def _check_folder(folder: Path) -> None:
     """Raise ExportError if a folder is neither new, nor empty, nor a report."""
+    page = folder / PAGE
     try:
-        if not folder.exists():
-            return
-        inner = [path for path in folder.iterdir() if not path.name.startswith(files.TEMPORARY)]
-        page = folder / PAGE
+        inner = folder.exists() and [path for path in folder.iterdir() if not path.name.startswith(files.TEMPORARY)]
         if not inner or (page.is_file() and GENERATOR in page.read_text("utf-8", errors="replace")):
             return
     except OSError as error:
@@ -226,6 +218,7 @@ class _Writer:
     settings: ExperimentSettings
     lacking: Mapping[str, str]
     digest: str
+    can_draw: bool
     failed: dict[str, Exception] = field(default_factory=dict)
 
     def make_key(self, name: str) -> str:
@@ -286,7 +279,7 @@ class _Writer:
             stamp = Stamp()
             keeper = ClipKeeper(work / MOTION, self.make_key(name))
             running = replace(settings.narrow(0, 0.95), receive=keeper)
-            plots = work / "plots" if part.draws and can_draw() else None
+            plots = work / "plots" if part.draws and self.can_draw else None
             figures = part.run(PartRun(self.corpus, self.quick, work, models, plots, running))
             section, motion = part.section(figures), keeper.collect()
             made_with = stamp.collect(self._build_command([name]), self.corpus, settings)

@@ -105,10 +105,14 @@ class Table:
             element("th", self.head, scope="col"),
             *(element("th", each.title, scope="col", class_="number" if each.form else None) for each in self.columns),
         ]
-        lines = [
-            element("tr", element("th", name, scope="row"), *(_write_cell(column, row) for column in self.columns))
-            for name, row in self.rows.items()
-        ]
+        lines = []
+        for name, row in self.rows.items():
+            cells = [element("th", name, scope="row")]
+            for column in self.columns:
+                figure, interval = _format_cell(column, row)
+                small = (" ", element("small", interval)) if interval else ()
+                cells.append(element("td", figure, *small, class_="number" if column.form else None))
+            lines.append(element("tr", *cells))
         table = element(
             "table", element("caption", self.caption), element("thead", element("tr", *heads)), element("tbody", *lines)
         )
@@ -135,12 +139,6 @@ def _format_cell(column: Column, row: Row) -> tuple[str, str]:
     form = column.form.replace("+", "")
     interval = "" if low is None or high is None else f"{low:{form}}–{high:{form}}"
     return format_figure(value, column.form).strip() + mark, interval
-
-
-def _write_cell(column: Column, row: Row) -> Html:
-    figure, interval = _format_cell(column, row)
-    beside = (" ", element("small", interval)) if interval else ()
-    return element("td", figure, *beside, class_="number" if column.form else None)
 
 
 FEW_CLIPS = 10
@@ -200,14 +198,11 @@ def write_text(path: Path, text: str) -> None:
 
 def warn_of_few(clips: int) -> dict[str, list[str]]:
     """Return a warning, as words of a section, where so few recordings were compared that intervals are too narrow."""
-    if clips >= FEW_CLIPS:
-        return {}
-    return {
-        "Beware": [
-            f"Only {clips} recordings were compared: intervals over fewer than {FEW_CLIPS} are too narrow, and nothing "
-            "here tells systems apart for sure."
-        ]
-    }
+    warning = (
+        f"Only {clips} recordings were compared: intervals over fewer than {FEW_CLIPS} are too narrow, and nothing "
+        "here tells systems apart for sure."
+    )
+    return {"Beware": [warning]} if clips < FEW_CLIPS else {}
 
 
 CHANCE = 0.05
@@ -271,11 +266,12 @@ class PaperOrder:
                 f"The paper's best is {-pair.difference:{self.form.replace('+', '')}} behind the best here: {best} "
                 f"against {here[0]} {pair.difference:{self.form}}{lies}, where print has it above 0."
             )
-        for sign, what in (
-            (1, "Held: the interval of the difference is on the paper's side of 0"),
-            (-1, "Reversed: it is on the other side"),
-            (0, "Open: it contains 0"),
-        ):
+        outcomes = {
+            1: "Held: the interval of the difference is on the paper's side of 0",
+            -1: "Reversed: it is on the other side",
+            0: "Open: it contains 0",
+        }
+        for sign, what in outcomes.items():
             grouped: dict[str, list[str]] = {}  # pairs of the same first system together; the better one here first
             pairs = [pair for pair in self.pairs if pair.sign == sign]
             for pair in pairs:

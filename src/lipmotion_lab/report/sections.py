@@ -89,10 +89,12 @@ def build_hofer_section(figures: Mapping[str, Any]) -> Section:
         f"Channels of motion: {figures['channels'] or 'all'}. Shown first: sound alone, {AS_PRINTED}, {states} states."
     )
     words = warn_of_few(figures["clips"]) | {"The paper's order": order.describe()}
-    more = [
-        replace(other, heading=f"{other.caption.removeprefix(SETS)}: {_build_hofer_order(block).judge()}")
-        for block, other in [(block, _build_hofer_table(block)) for block in blocks if block is not main]
-    ]
+    more = []
+    for block in blocks:
+        if block is not main:
+            other = _build_hofer_table(block)
+            heading = f"{other.caption.removeprefix(SETS)}: {_build_hofer_order(block).judge()}"
+            more.append(replace(other, heading=heading))
     shown = [f"{units}, {states} states" for units in table.rows]
     title = "Hofer, Yamagishi & Shimodaira 2008, Table 1: unit sets"
     return Section(title, about, order.judge(), words, charts, table, more, shown)
@@ -120,7 +122,7 @@ def _describe_closings(figures: Mapping[str, Any], row: Row) -> str:
 
 def _build_hofer_table(block: Mapping[str, Any]) -> Table:
     case = f"{block['states']} states, {block['condition']}, {block['pins']}"
-    name = f"hofer2008-{block['states']}-states-{block['condition']}-{block['pins']}".replace(" ", "-")
+    name = f"hofer2008-{case}".replace(",", "").replace(" ", "-")
     return Table(name, f"{SETS}{case}", HOFER_COLUMNS, block["rows"], REFERENCE_SET, "unit set")
 
 
@@ -256,7 +258,12 @@ def build_xie_liu_section(figures: Mapping[str, Any]) -> Section:
             by_amse.append(f"Systems {called}: {by_error.judge()}")
             verdict = verdict or by_acc.judge()
     words["By AMSE"] = by_amse
-    if changed := [_describe_options(name, row["options"]) for name, row in size["training"].items() if row["tried"]]:
+    changed = []
+    for name, row in size["training"].items():
+        if row["tried"]:
+            texts = [f"{key}={value}" for key, value in row["options"].items() if key not in ("structure", "chains")]
+            changed.append(f"{name}: {', '.join(texts) or 'as printed'}.")
+    if changed:
         words["Settings, the best on val"] = changed
     if size["pairs"]:
         rows = {f"{pair['better']} over {pair['worse']}": pair for pair in size["pairs"]}
@@ -294,11 +301,6 @@ def _build_systems_table(case: str, rows: Mapping[str, Row], size: Mapping[str, 
     return Table(name, f"Structures of chains, {case}", columns, full_rows, REFERENCE_SYSTEM)
 
 
-def _describe_options(name: str, options: Mapping[str, Any]) -> str:
-    texts = [f"{key}={value}" for key, value in options.items() if key not in ("structure", "chains")]
-    return f"{name}: {', '.join(texts) or 'as printed'}."
-
-
 def _compare_order(
     rows: Mapping[str, Row], pairs: Sequence[Mapping[str, Any]], ending: str, key: str, title: str, form: str
 ) -> PaperOrder:
@@ -326,9 +328,6 @@ ENGINES_COLUMNS = (
 )
 
 
-ENGINES_OUTCOMES = ("Higher than that", "Lower than that", "Not different for sure from that")
-
-
 def build_engines_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``compare_engines`` say."""
     reference = figures["reference"]
@@ -345,7 +344,8 @@ def build_engines_section(figures: Mapping[str, Any]) -> Section:
     best = max(main.rows, key=lambda name: main.rows[name]["acc"] or 0.0)
     acc = format_figure(main.rows[best]["acc"], ".3f")
     verdict = f"Most alike to the recordings: {best} (ACC {acc}); nothing is in print to compare."
-    outcomes = [f"{what} of the engine {reference}" for what in ENGINES_OUTCOMES]
+    places = ("Higher than that", "Lower than that", "Not different for sure from that")
+    outcomes = [f"{place} of the engine {reference}" for place in places]
     words = warn_of_few(figures["clips"]) | {"ACC of the opening": _group(signs, {n: n for n in signs}, outcomes)}
     minutes = ", ".join(sorted({f"{row['minutes']}" for row in figures["models"].values()}))
     about = (

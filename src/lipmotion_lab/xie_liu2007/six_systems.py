@@ -12,7 +12,8 @@ import numpy as np
 
 from lipmotion.corpora import Corpus
 from lipmotion.engines import engine_named
-from lipmotion.engines.coupled.conversion.em_conversion import convert
+from lipmotion.engines.coupled.chains.model import speech_observations
+from lipmotion.engines.coupled.conversion import convert
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.errors import ExportError, InputError, MissingDependencyError
@@ -62,20 +63,14 @@ PLOT_CAPTIONS = {
 }
 
 
-def import_figure() -> Any:
-    """Return matplotlib's class ``Figure``, which needs no screen. Raises MissingDependencyError."""
+def check_plot_folder(folder: Path) -> None:
+    """Check, before long work, that pictures can be written. Raises MissingDependencyError, ExportError."""
     try:
-        from matplotlib.figure import Figure
+        import matplotlib.figure  # noqa: F401
     except ImportError as error:
         raise MissingDependencyError(
             f"pictures need matplotlib, which cannot be imported ({error}); {install_command('plots')}"
         ) from error
-    return Figure
-
-
-def check_plot_folder(folder: Path) -> None:
-    """Check, before long work, that pictures can be written. Raises MissingDependencyError, ExportError."""
-    import_figure()
     if not folder.parent.is_dir():
         raise ExportError(f"{folder}: the folder {folder.parent} does not exist; create it first")
     if folder.exists() and not folder.is_dir():
@@ -83,15 +78,16 @@ def check_plot_folder(folder: Path) -> None:
 
 
 def draw_plots(chains: TrainedSystem, recordings: HeldOutRecordings, folder: Path) -> None:
-    """Write pictures of the conversion by EM of the first recordings. Raises MissingDependencyError, ExportError."""
-    figure = import_figure()
+    """Write pictures of the conversion by EM of the first recordings. Raises ExportError: they cannot be written."""
+    from matplotlib.figure import Figure  # which needs no screen
+
     some = recordings.select_first(CONVERGENCE_RECORDINGS)
     by_em = generate_clips(some, AUDIO_ONLY, chains.engine, chains.model)
     path_engine = CoupledEngine(replace(chains.engine.config, conversion="viterbi"))
     by_path = generate_clips(some, AUDIO_ONLY, path_engine, chains.model)
     make_folder(folder)
 
-    picture = figure(figsize=(10, 4.2), layout="constrained")
+    picture = Figure(figsize=(10, 4.2), layout="constrained")
     axes, clip = picture.subplots(), by_em[0]
     axes.plot(clip.time_s, clip.original[:, 0], "k:", label="recorded")
     axes.plot(by_path[0].time_s, by_path[0].generated[:, 0], color="tab:orange", label="means along the best path")
@@ -101,11 +97,12 @@ def draw_plots(chains: TrainedSystem, recordings: HeldOutRecordings, folder: Pat
     axes.legend(loc="upper right")
     _save(picture, folder / PLOT_FILES["start"])
 
-    picture = figure(figsize=(7, 4.6), layout="constrained")
-    axes, model = picture.subplots(), chains.model
+    picture = Figure(figsize=(7, 4.6), layout="constrained")
+    axes, model, config = picture.subplots(), chains.model, chains.engine.config
     for utterance in some.utterances:
-        observations = model.speech_observations(Speech(utterance.features, Timeline(())))
-        steps = convert(model.chains, observations, model.chains.full_lattice, chains.engine.config.em).log_likelihood
+        observations = speech_observations(Speech(utterance.features, Timeline(())), model.visual)
+        how = config.start, config.update, config.steps
+        _, steps = convert(model.chains, observations, model.chains.full_lattice, *how)
         axes.plot(range(len(steps)), steps, "o-", markersize=3, label=utterance.name)
     axes.set_xlabel("step of EM (0: means along the best path)")
     axes.set_ylabel("log likelihood of speech and lips (nats per frame)")
@@ -115,7 +112,7 @@ def draw_plots(chains: TrainedSystem, recordings: HeldOutRecordings, folder: Pat
     _save(picture, folder / PLOT_FILES["steps"])
 
     made = by_em[:PREDICTED_RECORDINGS]
-    picture = figure(figsize=(10, 2.2 * len(made)), layout="constrained")
+    picture = Figure(figsize=(10, 2.2 * len(made)), layout="constrained")
     all_axes = picture.subplots(len(made), 1, squeeze=False)[:, 0]
     for axes, clip, utterance in zip(all_axes, made, some.utterances, strict=False):
         axes.plot(clip.time_s, clip.original[:, 0], "k:", label="recorded")
@@ -202,23 +199,16 @@ def run_xieliu2007(  # noqa: PLR0913
     rows: list[dict[str, Any]] = []
     parts = runner.share_out(settings, [f"{count} clips" for count in steps], sizes=steps)
     for count, part in zip(steps, parts, strict=True):
-        trained = setup.train(names, listed[:count], part.monitor)
+        used, recordings, trained = setup.train(names, listed[:count], part.monitor)
         checkpoint = setup.open_checkpoint(listed[:count], held_out)
-        rows.append({"names": count} | _measure_size(trained, options.transcripts, settings, checkpoint))
-    recordings = trained.recordings
+        figures = _measure_systems(recordings, trained, options.transcripts, settings, checkpoint)
+        rows.append({"names": count, "used": used} | figures)
     if plots is not None:
-        draw_plots(trained.systems[REFERENCE_SYSTEM], recordings, plots)
+        draw_plots(trained[REFERENCE_SYSTEM], recordings, plots)
     about = {"split": split or "all", "clips": len(held_out), "seed": seed, "workers": settings.workers}
     about |= {"order": "given" if order is not None else "shuffled", "visual": options.visual}
     about |= {"channels": list(recordings.channels), "closed_under": recordings.closed_under}
     return replace_nan(about | {"validation": len(validation), "rows": rows})
-
-
-@dataclass(frozen=True, eq=False)
-class _TrainedSystems:
-    used: tuple[str, ...]
-    recordings: HeldOutRecordings
-    systems: Mapping[str, TrainedSystem]
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,37 +222,38 @@ class _TrainingSetup:
     settings: runner.ExperimentSettings
     work: Path | None
 
-    def train(self, systems: Sequence[str], names: Sequence[str], monitor: Monitor) -> _TrainedSystems:
-        """Return systems, trained on the same phones of the utterances ``names``."""
-        examples, recordings = self._prepare(names, self.held_out, sub_monitor(monitor, 0, 0.3))
+    def train(
+        self, systems: Sequence[str], names: Sequence[str], monitor: Monitor
+    ) -> tuple[int, HeldOutRecordings, dict[str, TrainedSystem]]:
+        """Return how many utterances ``names`` are used, what is held out, and systems trained on the same phones."""
+        examples, recordings = self._prepare(names, sub_monitor(monitor, 0, 0.3))
         checkpoint, trained = self.open_checkpoint(names), dict[str, TrainedSystem]()
         others = [*list_motionless(engine_named("coupled"), self.options.voices)]
         for number, name in enumerate(systems):
             start, stop = 0.3 + 0.7 * number / len(systems), 0.3 + 0.7 * (number + 1) / len(systems)
-            part, chains = sub_monitor(monitor, start, stop, f"{name}: "), COMPARED_SYSTEMS[name].is_trained_here
+            part, compared = sub_monitor(monitor, start, stop, f"{name}: "), COMPARED_SYSTEMS[name]
+            chains = compared.make is None and not compared.same_model_as  # coupled chains of its own
             arrays = checkpoint.load(f"system-{name}") if chains else None
             if arrays is not None:
                 trained[name] = system_from_arrays(arrays)
                 continue
             known = [*with_inputs_of(name, examples, self.corpus)]
-            known += others if COMPARED_SYSTEMS[name].second_stage else []
+            known += others if compared.second_stage else []
             trained[name] = train_system(name, known, recordings.get("val"), trained, self.options.mixtures, part)
             if chains:  # their arrays are rounded when they are stored, and so is every model that is used
                 arrays = system_to_arrays(trained[name])
                 checkpoint.save(f"system-{name}", arrays)
                 trained[name] = system_from_arrays(arrays)
-        return _TrainedSystems(tuple(example.name for example in examples), recordings["held out"], trained)
+        return len(examples), recordings["held out"], trained
 
-    def _prepare(
-        self, names: Sequence[str], held_out: Sequence[str], monitor: Monitor
-    ) -> tuple[list[Example], dict[str, HeldOutRecordings]]:
+    def _prepare(self, names: Sequence[str], monitor: Monitor) -> tuple[list[Example], dict[str, HeldOutRecordings]]:
         """Return the examples of some utterances, and recordings with the phones of models trained on these."""
         settings, visual = replace(self.settings, monitor=monitor), self.options.visual
         utterances = [self.corpus.utterance(name) for name in sorted(names)]
         eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
         utterances = [with_visual_channels(utterance, visual, eigenlips) for utterance in utterances]
         phones, examples = runner.train_phones(utterances, settings.narrow(0, 0.7), self.open_checkpoint(names))
-        parts = {name: part for name, part in (("held out", held_out), ("val", self.validation)) if part}
+        parts = {name: part for name, part in (("held out", self.held_out), ("val", self.validation)) if part}
         recordings: dict[str, HeldOutRecordings] = {}
         for number, (name, part) in enumerate(parts.items()):
             reading = settings.narrow(0.7 + 0.15 * number, 0.85 + 0.15 * number)
@@ -280,15 +271,25 @@ class _TrainingSetup:
         return runner.open_parts(self.work and self.work / str(len(names)), self.corpus, self.settings, key)
 
 
-def _measure_size(
-    trained: _TrainedSystems, transcripts: bool, settings: runner.ExperimentSettings, checkpoint: Checkpoint
+def _measure_systems(
+    recordings: HeldOutRecordings,
+    systems: Mapping[str, TrainedSystem],
+    transcripts: bool,
+    settings: runner.ExperimentSettings,
+    checkpoint: Checkpoint,
 ) -> dict[str, Any]:
     """Return the figures of all systems trained on one number of utterances."""
-    recordings, systems, seed = trained.recordings, trained.systems, settings.seed
-    conditions = list(recordings.conditions) if transcripts else [AUDIO_ONLY]
-    generated = {condition: _generate(recordings, condition, systems, checkpoint) for condition in conditions}
-    for condition, of_systems in generated.items():
-        for name, clips in of_systems.items():
+    conditions, seed = list(recordings.conditions) if transcripts else [AUDIO_ONLY], settings.seed
+    generated: dict[str, dict[str, list[ComparedClip]]] = {condition: {} for condition in conditions}
+    for condition, made in generated.items():
+        for name, system in systems.items():
+            arrays = checkpoint.load(f"{condition}-{name}")
+            if arrays is None:
+                arrays = runner.clips_to_arrays(generate_clips(recordings, condition, system.engine, system.model))
+                checkpoint.save(f"{condition}-{name}", arrays)
+            made[name] = runner.clips_from_arrays(arrays)
+    for condition, made in generated.items():
+        for name, clips in made.items():
             settings.receive(name, condition, recordings, clips)
     training: dict[str, dict[str, Any]] = {}
     for name, system in systems.items():
@@ -300,25 +301,10 @@ def _measure_size(
             row |= {"parameters": system.model.chains.parameters, "options": list_changed_options(system.engine.config)}
         training[name] = row
     return {
-        "used": len(trained.used),
         "training": training,
         "conditions": {condition: _make_rows(recordings, clips, seed) for condition, clips in generated.items()},
         "pairs": _compare_paper_pairs(recordings, generated[AUDIO_ONLY], seed),
     }
-
-
-def _generate(
-    recordings: HeldOutRecordings, condition: str, systems: Mapping[str, TrainedSystem], checkpoint: Checkpoint
-) -> dict[str, list[ComparedClip]]:
-    made = {}
-    for name, system in systems.items():
-        stage = f"{condition}-{name}"
-        arrays = checkpoint.load(stage)
-        if arrays is None:
-            arrays = runner.clips_to_arrays(generate_clips(recordings, condition, system.engine, system.model))
-            checkpoint.save(stage, arrays)
-        made[name] = runner.clips_from_arrays(arrays)
-    return made
 
 
 def _compare_paper_pairs(

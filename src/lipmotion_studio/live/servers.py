@@ -51,7 +51,7 @@ class Server:
     greeting : the first message to each client; empty: none
     reply    : returns what a request that is not for a WebSocket is answered
     joined   : is called when a client has come
-    said     : is called with what a client says
+    received : is called with what a client says
     The last three are called in the server's own thread.
     """
 
@@ -60,9 +60,9 @@ class Server:
         greeting: str = "",
         reply: Callable[[ServerConnection, Request], Coroutine[Any, Any, Response]] | None = None,
         joined: Callable[[], object] = lambda: None,
-        said: Callable[[str | bytes], object] = lambda _: None,
+        received: Callable[[str | bytes], object] = lambda _: None,
     ) -> None:
-        self._greeting, self._reply, self._joined, self._said = greeting, reply, joined, said
+        self._greeting, self._reply, self._joined, self._received = greeting, reply, joined, received
         self._clients: dict[asyncio.Event, deque[str | bytes]] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
         self.address = ""
@@ -102,16 +102,12 @@ class Server:
         try:
             await asyncio.Future()
         finally:
-            await self._finish()
+            for _ in range(round(CLOSE_S / 0.02)):  # until all clients have taken what was sent
+                if not any(self._clients.values()):
+                    break
+                await asyncio.sleep(0.02)
             server.close()
             await asyncio.wait([asyncio.ensure_future(server.wait_closed())], timeout=CLOSE_S)
-
-    async def _finish(self) -> None:
-        """Wait a little until all clients have taken what was sent."""
-        for _ in range(round(CLOSE_S / 0.02)):
-            if not any(self._clients.values()):
-                return
-            await asyncio.sleep(0.02)
 
     async def _process(self, connection: ServerConnection, request: Request) -> Response | None:
         if self._reply is None or request.headers.get("upgrade", "").lower() == "websocket":
@@ -128,7 +124,7 @@ class Server:
         self._joined()
         try:
             async for message in connection:
-                self._said(message)
+                self._received(message)
         except ConnectionClosed:
             pass
         finally:

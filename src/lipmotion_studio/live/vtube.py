@@ -99,12 +99,12 @@ class VTubeStudio:
         from websockets.asyncio.client import connect
         from websockets.exceptions import WebSocketException
 
-        is_told = False
+        was_warned = False
         while True:
             try:
                 connection = await connect(self._address, compression=None, close_timeout=CLOSE_S, proxy=None)
                 try:
-                    is_told = False
+                    was_warned = False
                     if not await self._authenticate(connection):
                         LOG.warning("VTube Studio was told not to let lipmotion in; allow it there, and begin again")
                         return
@@ -115,9 +115,9 @@ class VTubeStudio:
                     finally:  # where it is cancelled meanwhile
                         connection.transport.abort()
             except (OSError, WebSocketException, TimeoutError, asyncio.TimeoutError, InputError):
-                if not is_told:
+                if not was_warned:
                     LOG.warning("VTube Studio is not at %s; start it, and allow plugins to use its API", self._address)
-                is_told = True
+                was_warned = True
                 await asyncio.sleep(AGAIN_S)
 
     async def _authenticate(self, connection: Any) -> bool:
@@ -159,8 +159,8 @@ class VTubeStudio:
             await self._is_new.wait()
             self._is_new.clear()
             if self._frame is not None:
-                values = {name: value for name, value in list_parameters(self._frame).items() if name in names}
-                listed = [{"id": name, "value": value} for name, value in values.items()]
+                values = list_parameters(self._frame).items()
+                listed = [{"id": name, "value": value} for name, value in values if name in names]
                 about = {"faceFound": True, "mode": "set", "parameterValues": listed}
                 await self._ask(connection, "InjectParameterDataRequest", **about)
 

@@ -87,7 +87,7 @@ def open_window(to: str, sound: LiveSound) -> Iterator[Consumer]:
     head: Future[bytes] = Future()
     page = dict(read_page(files("lipmotion_studio") / "page"))
     reply = partial(_reply, page | {"": page[FIRST]}, head)
-    server = Server(json.dumps(greeting), reply, joined.set, lambda said: ready.set() if said == READY else None)
+    server = Server(json.dumps(greeting), reply, joined.set, lambda message: ready.set() if message == READY else None)
     with open_server(to, PORT, server):
         Thread(target=_make_head, args=(head,), daemon=True).start()  # it takes seconds, in which the browser opens
         print_error(f"the page is at http://{server.address}/ (Ctrl-C ends)")

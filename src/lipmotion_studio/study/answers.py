@@ -101,19 +101,16 @@ def read_answers(path: Path) -> list[Answer]:
         if missing:
             raise InputError(f"no column {missing[0]!r}; required {', '.join(COLUMNS)}")
         for row in table:
-            answers.append(
-                Answer(
-                    **{
-                        name: from_field(row[name])
-                        for name in ("rater", "kind", "sentence", "question", "condition", "other", "value")
-                    },
-                    trial=parse_whole(row["trial"], "trial is"),
-                    seconds=parse_number(row["seconds"], "seconds is"),
-                    plays=parse_whole(row["plays"], "plays is"),
-                    practice=bool(parse_whole(row["practice"], "practice is")),
-                    expected=row["expected"],
-                )
+            names = ("rater", "kind", "sentence", "question", "condition", "other", "value")
+            answer = Answer(
+                **{name: from_field(row[name]) for name in names},
+                trial=parse_whole(row["trial"], "trial is"),
+                seconds=parse_number(row["seconds"], "seconds is"),
+                plays=parse_whole(row["plays"], "plays is"),
+                practice=bool(parse_whole(row["practice"], "practice is")),
+                expected=row["expected"],
             )
+            answers.append(answer)
     except (InputError, csv.Error) as error:
         raise InputError(f"{path}: line {table.line_num}: {error}") from error
     return answers

@@ -23,7 +23,7 @@ from lipmotion.errors import InputError
 from lipmotion.types.values import items, members, number, text, whole
 from lipmotion_studio.study.answers import HIGHEST_MOS, HIGHEST_RANK, MOS, PAIRED, POSSIBLE, is_possible
 from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial, list_questions, order_trials
-from lipmotion_studio.study.settings import ASKED, POINTS, SCALES
+from lipmotion_studio.study.settings import POINTS, QUESTIONS, SCALES
 from lipmotion_studio.study.store import AnswerSheet, StudyStore, name_rater
 from lipmotion_studio.web.listening import read_page
 from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, SecurityHeaders, read_json, refuse_foreign, reply_json
@@ -58,7 +58,9 @@ SHARE_PLAYED = 0.9
 """Least time of a trial, as a share of the time that its videos last: clocks of browsers and files differ."""
 LONGEST_S, MAX_PLAYS = 86_400.0, 1000
 _MEMBERS = {
-    **{"trial": whole(0, 1 << 31), "values": items(text(100)), "plays": items(whole(1, MAX_PLAYS))},
+    "trial": whole(0, 1 << 31),
+    "values": items(text(100)),
+    "plays": items(whole(1, MAX_PLAYS)),
     "seconds": number(0, LONGEST_S),
 }
 _SHEET = members(_MEMBERS, _MEMBERS, alone=True)
@@ -117,9 +119,6 @@ def create_application(
         except ValueError:  # neither a known name nor an address of numbers
             return False
 
-    def find_refusal(_method: str, path: str, _query: bytes, headers: Mapping[str, str]) -> tuple[int, str] | None:
-        return refuse_foreign(path, headers, is_own, names)
-
     replies = _Replies(study, store)
     page = dict(read_page(files("lipmotion_studio.study") / "page"))
 
@@ -142,7 +141,7 @@ def create_application(
         Route("/api/answers", replies.answer, methods=["POST"]),
     ]
     application = Starlette(routes=routes, exception_handlers=ERRORS)
-    application.add_middleware(Guard, refusal=find_refusal)
+    application.add_middleware(Guard, refusal=lambda _, path, __, headers: refuse_foreign(path, headers, is_own, names))
     application.add_middleware(SecurityHeaders)
     return application
 
@@ -160,7 +159,7 @@ class _Replies:
         """Send what raters read before they begin; nothing of conditions."""
         study = self._study
         document = {"kind": study.kind, "title": study.title, "consent": study.consent.split("\n")}
-        return reply_json(document | {"instructions": study.instructions.split("\n"), "asks": ASKED[study.kind]})
+        return reply_json(document | {"instructions": study.instructions.split("\n"), "asks": QUESTIONS[study.kind]})
 
     async def join(self, request: Request) -> Response:
         """Add a rater, who has agreed to take part."""
@@ -212,8 +211,8 @@ class _Replies:
         )
         page: dict[str, Any] = {"practice": trial.practice, "note": trial.note, "videos": videos}
         if study.kind == MOS:
-            scales = [SCALES[question] for question, _, _ in list_questions(study, trial)]
-            page["scales"] = [{"title": scale.title, "asks": scale.asks} for scale in scales]
+            names = [question for question, _, _ in list_questions(study, trial)]
+            page["scales"] = [{"title": name.capitalize(), "asks": SCALES[name]} for name in names]
             page["points"] = POINTS[:HIGHEST_MOS]
         elif study.kind != PAIRED:
             page["highest"] = HIGHEST_RANK

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import find_version
 from lipmotion.formats.base import list_read_suffixes
 from lipmotion.pipeline.job import Job, list_recordings, run
-from lipmotion.pipeline.model import Model, find_shipped, load_model
+from lipmotion.pipeline.model import find_shipped, load_model
 from lipmotion.pipeline.outputs.motion_files import match_duration, read_generation
 from lipmotion.pipeline.outputs.output import write
 from lipmotion.pipeline.request import Outputs, Request
@@ -35,44 +35,29 @@ MODEL_SUFFIX, JOB_SUFFIX = ".lipmotion", ".toml"
 SHIPPED = "shipped"
 
 
-@dataclass(frozen=True)
-class StudySentence:
-    """A sentence: its name, and its recording, which is the sound of all videos that are drawn."""
-
-    name: str
-    recording: Path
+Condition = Callable[[Path, Path], tuple[Path, dict[str, str]]]
+"""Returns the video of a sentence, given by its recording, which is the sound of all videos that are drawn; where it
+has to be made, it is the file of the second path. And how it was made, in texts by name."""
 
 
-@dataclass(frozen=True)
-class MadeVideo:
-    """A video that is ready to be shown: its file, and how it was made, in texts by name."""
-
-    file: Path
-    made: dict[str, str] = field(default_factory=dict)
-
-
-Condition = Callable[[StudySentence, Path], MadeVideo]
-"""Gives the video of a sentence; where it has to be made, as the file of the path."""
-
-
-def read_sentences(given: Sequence[Path]) -> list[StudySentence]:
-    """Return the sentences of files and folders by name. Raises InputError: none, or two of one name."""
-    sentences = [StudySentence(path.stem, path) for path in list_recordings(given)]
+def read_sentences(paths: Sequence[Path]) -> list[Path]:
+    """Return the recordings of sentences in files and folders. Raises InputError: none, or two of one name."""
+    sentences = list_recordings(paths)
     if not sentences:
         raise InputError("no sentences; give recordings: --sentence FILE|FOLDER")
-    names = [sentence.name for sentence in sentences]
-    for sentence in sentences:
-        if names.count(sentence.name) > 1:
-            raise InputError(f"{sentence.recording}: two sentences are called {sentence.name!r}; rename one file")
-        if not sentence.recording.is_file():
-            raise InputError(f"{sentence.recording}: no such file; give the recording of a sentence")
-    return sentences
+    names = [path.stem for path in sentences]
+    for path in sentences:
+        if names.count(path.stem) > 1:
+            raise InputError(f"{path}: two sentences are called {path.stem!r}; rename one file")
+        if not path.is_file():
+            raise InputError(f"{path}: no such file; give the recording of a sentence")
+    return list(sentences)
 
 
-def parse_conditions(given: Sequence[str]) -> dict[str, str]:
+def parse_conditions(texts: Sequence[str]) -> dict[str, str]:
     """Return the sources of conditions by name. Raises InputError: another form, a name that is taken, or under two."""
     sources: dict[str, str] = {}
-    for text in given:
+    for text in texts:
         name, equals, source = text.partition("=")
         name, source = name.strip(), source.strip()
         if text.strip() == RECORDING:
@@ -89,7 +74,7 @@ def parse_conditions(given: Sequence[str]) -> dict[str, str]:
     return sources
 
 
-def make_condition(source: str, sentences: Sequence[StudySentence], drawn: Job) -> Condition:
+def make_condition(source: str, sentences: Sequence[Path], drawn: Job) -> Condition:
     """Return what gives the videos of a condition.
 
     source : ``recording``; a model, ``shipped`` or a file; a job file; or a folder with a video or a motion file of
@@ -98,13 +83,13 @@ def make_condition(source: str, sentences: Sequence[StudySentence], drawn: Job) 
     """
     path = Path(source)
     if source == RECORDING:
-        for sentence in sentences:
-            if not has_video(sentence.recording):
+        for recording in sentences:
+            if not has_video(recording):
                 raise InputError(
-                    f"{sentence.recording}: has no pictures, so the recording cannot be shown; give videos as "
-                    f"sentences, or leave the condition {RECORDING} out"
+                    f"{recording}: has no pictures, so the recording cannot be shown; give videos as sentences, or "
+                    f"leave the condition {RECORDING} out"
                 )
-        return lambda sentence, target: MadeVideo(sentence.recording, {"made": "recording"})  # noqa: ARG005
+        return lambda recording, _: (recording, {"made": "recording"})
     if path.is_dir():
         return _collect_finished(path, sentences, drawn)
     if source != SHIPPED and not path.is_file():
@@ -118,10 +103,10 @@ def make_condition(source: str, sentences: Sequence[StudySentence], drawn: Job) 
     return _animate_sentences(replace(drawn, request=replace(drawn.request, model=model)), {})
 
 
-def _collect_finished(folder: Path, sentences: Sequence[StudySentence], drawn: Job) -> Condition:
+def _collect_finished(folder: Path, sentences: Sequence[Path], drawn: Job) -> Condition:
     """Return a condition of finished videos or of motion to draw. Raises InputError: none or several of a sentence."""
     files: dict[str, Path] = {}
-    for name in (sentence.name for sentence in sentences):
+    for name in (recording.stem for recording in sentences):
         there = [path for path in sorted(folder.iterdir()) if path.is_file() and path.stem == name]
         for suffixes in (VIDEO_SUFFIXES, list_read_suffixes()):
             fitting = [path for path in there if path.suffix.lower() in suffixes]
@@ -134,14 +119,14 @@ def _collect_finished(folder: Path, sentences: Sequence[StudySentence], drawn: J
             way_out = f"add {name}.mp4 or {name}.json"
             raise InputError(f"{folder}: has no video and no motion of the sentence {name!r}; {way_out}")
 
-    def condition(sentence: StudySentence, target: Path) -> MadeVideo:
-        path, outputs = files[sentence.name], drawn.outputs
+    def condition(recording: Path, target: Path) -> tuple[Path, dict[str, str]]:
+        path, outputs = files[recording.stem], drawn.outputs
         made = {"file": path.name, "file_sha256": hash_file(path)}
         if path.suffix.lower() in VIDEO_SUFFIXES:
-            return MadeVideo(path, made | {"made": "finished"})
-        generation = match_duration(read_generation(path), read_audio(sentence.recording, warn=False).duration_s)
-        write(generation, target, speech=sentence.recording, face=outputs.face, fps=outputs.fps)
-        return MadeVideo(target, made | {"made": "drawn", "face": outputs.face})
+            return path, made | {"made": "finished"}
+        generation = match_duration(read_generation(path), read_audio(recording, warn=False).duration_s)
+        write(generation, target, speech=recording, face=outputs.face, fps=outputs.fps)
+        return target, made | {"made": "drawn", "face": outputs.face}
 
     return condition
 
@@ -152,13 +137,11 @@ def _animate_sentences(job: Job, made: dict[str, str]) -> Condition:
     made = made | {"made": "animated", "model": model_path.name, "model_sha256": hash_file(model_path)}
     made |= {"face": job.outputs.face}
 
-    @cache
-    def load() -> Model:
-        return load_model(job.request.model)
+    load = cache(load_model)
 
-    def condition(sentence: StudySentence, target: Path) -> MadeVideo:
-        run(job.of(sentence.recording, (str(target),)), model=load(), words_beside=True)
-        return MadeVideo(target, made)
+    def condition(recording: Path, target: Path) -> tuple[Path, dict[str, str]]:
+        run(job.of(recording, (str(target),)), model=load(job.request.model), words_beside=True)
+        return target, made
 
     return condition
 
@@ -219,7 +202,7 @@ def design_study(
     drawn = Job(Request(recogniser=settings.recogniser), Outputs(face=settings.face, fps=settings.fps))
     makers = {name: make_condition(source, spoken, drawn) for name, source in sources.items()}
     base = RECORDING if RECORDING in sources else next(iter(sources))
-    names, seed = [sentence.name for sentence in spoken], settings.seed
+    names, seed = [recording.stem for recording in spoken], settings.seed
     late = manifest.shuffle(names, "anchor", seed)[: settings.anchors]  # the sentences that have an anchor
     if kind == RANKING:  # every page has one, if any has
         late = names if settings.anchors else []
@@ -231,13 +214,18 @@ def design_study(
     with replace_folder(output) as folder:
         (folder / manifest.VIDEOS).mkdir()
         videos: list[manifest.StudyVideo] = []
-        wanted = [(sentence, name) for sentence in spoken for name in makers]
-        for sentence, name in with_progress(wanted, "making videos", monitor):
-            made = makers[name](sentence, folder / _UNFINISHED)
-            videos.append(_encode(made, sentence, name, folder, settings))
-            if name == base and sentence.name in late:
-                videos.append(_encode(made, sentence, ANCHOR, folder, settings))
-            (folder / _UNFINISHED).unlink(missing_ok=True)
+        for recording, name in with_progress([*itertools.product(spoken, makers)], "making videos", monitor):
+            video, made = makers[name](recording, folder / "made.mp4")
+            is_anchor = name == base and recording.stem in late
+            for shown_as in (name, ANCHOR) if is_anchor else (name,):  # named by their content
+                late_ms, file = settings.anchor_ms if shown_as == ANCHOR else 0.0, folder / manifest.VIDEOS / "made.mp4"
+                seconds = encode_video(video, file, recording, Region.parse(settings.region), late_ms)
+                digest = hash_file(file)
+                file.replace(file.with_name(f"{digest[:32]}.mp4"))
+                about = made | ({"sound_late_ms": f"{late_ms:g}"} if late_ms else {})
+                of = (recording.stem, shown_as, round(seconds, 3), digest, about)
+                videos.append(manifest.StudyVideo(f"{digest[:32]}.mp4", *of))
+            (folder / "made.mp4").unlink(missing_ok=True)
         numbers = {(video.sentence, video.condition): n for n, video in enumerate(videos)}
         trials = manifest.make_main_trials(kind, list(sources), names, numbers)
         with_anchor = [name for name in names if (name, ANCHOR) in numbers]
@@ -251,9 +239,7 @@ def design_study(
             scales=settings.scales if kind == MOS else (),
             seed=seed,
             conditions=sources | ({ANCHOR: f"{base}, sound {settings.anchor_ms:g} ms late"} if late else {}),
-            sentences={
-                each.name: {"file": each.recording.name, "sha256": hash_file(each.recording)} for each in spoken
-            },
+            sentences={path.stem: {"file": path.name, "sha256": hash_file(path)} for path in spoken},
             videos=tuple(videos),
             trials=(*practice, *trials, *anchored, *checks),
             made_by={"lipmotion": find_version()}
@@ -261,19 +247,3 @@ def design_study(
         )
         manifest.write_manifest(study, folder)
     return study
-
-
-_UNFINISHED = "made.mp4"
-
-
-def _encode(
-    video: MadeVideo, sentence: StudySentence, name: str, folder: Path, settings: StudySettings
-) -> manifest.StudyVideo:
-    """Encode a video as it is shown, and name it by its content."""
-    late_ms = settings.anchor_ms if name == ANCHOR else 0.0
-    file = folder / manifest.VIDEOS / "encoded.mp4"
-    seconds = encode_video(video.file, file, sentence.recording, settings.shown_region, late_ms)
-    digest = hash_file(file)
-    file.replace(file.with_name(f"{digest[:32]}.mp4"))
-    made = video.made | ({"sound_late_ms": f"{late_ms:g}"} if late_ms else {})
-    return manifest.StudyVideo(f"{digest[:32]}.mp4", sentence.name, name, round(seconds, 3), digest, made)

@@ -21,25 +21,17 @@ PREFERENCE, MATCH = "preference", "match"
 """Questions of a paired comparison, and of a ranking."""
 
 
-@dataclass(frozen=True)
-class OpinionScale:
-    """A five-point scale: its name, as raters read it, and the question."""
-
-    title: str
-    asks: str
-
-
 SCALES = {
-    "smoothness": OpinionScale("Smoothness", "Does the mouth move smoothly, without jumps or trembling?"),
-    "closure": OpinionScale("Closure", "Do the lips close where they should, as in m, b and p, and only there?"),
-    "protrusion": OpinionScale("Protrusion", "Are the lips pushed forward where they should be, as in oo, w and sh?"),
-    "turning": OpinionScale("Turning", "Does the mouth turn from opening to closing, and back, at the right moments?"),
-    "overall": OpinionScale("Overall", "All in all, how natural is the mouth with this sound?"),
+    "smoothness": "Does the mouth move smoothly, without jumps or trembling?",
+    "closure": "Do the lips close where they should, as in m, b and p, and only there?",
+    "protrusion": "Are the lips pushed forward where they should be, as in oo, w and sh?",
+    "turning": "Does the mouth turn from opening to closing, and back, at the right moments?",
+    "overall": "All in all, how natural is the mouth with this sound?",
 }
 """The criteria of Xie & Liu 2007 (section 7.3), which names them without a definition: the questions are ours."""
 POINTS = ("bad", "poor", "fair", "good", "excellent")
 """Words of the points 1 to 5: the ends are the paper's, those between are of ITU-T P.800."""
-ASKED = {
+QUESTIONS = {
     PAIRED: "In which video do the lips match the sound better?",
     MOS: "How good is the mouth in this video?",
     RANKING: "How well do the lips match the sound? 0 is not at all, 100 is perfectly.",
@@ -73,10 +65,8 @@ class Region:
     height: float = 1.0
 
     def __post_init__(self) -> None:
-        inside = (
-            0 <= self.left < self.left + self.width <= 1 + 1e-9 and 0 <= self.top < self.top + self.height <= 1 + 1e-9
-        )
-        if not inside:
+        spans = ((self.left, self.width), (self.top, self.height))
+        if not all(0 <= start < start + size <= 1 + 1e-9 for start, size in spans):
             raise InputError(
                 f"the region {self.left:g},{self.top:g},{self.width:g},{self.height:g}, required shares of width and "
                 "height inside the picture: LEFT,TOP,WIDTH,HEIGHT"
@@ -146,12 +136,7 @@ class StudySettings(Configuration):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.shown_region  # noqa: B018 (raises)
+        Region.parse(self.region)
         unknown = [name for name in self.scales if name not in SCALES]
         if unknown or not self.scales or len(set(self.scales)) < len(self.scales):
             raise InputError(f"the scales {','.join(self.scales)}, required some of {','.join(SCALES)}, each once")
-
-    @property
-    def shown_region(self) -> Region:
-        """The part of the pictures that is shown. Raises InputError: not a region."""
-        return Region.parse(self.region)

@@ -7,6 +7,7 @@ import sqlite3
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from contextlib import closing
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -16,7 +17,8 @@ from typing import Any, TypeVar
 from lipmotion.errors import ExportError, InputError
 from lipmotion.storage.files import check_own
 from lipmotion.storage.sources import hash_file
-from lipmotion_studio.study.manifest import MANIFEST
+from lipmotion_studio.study.answers import Answer, write_answers
+from lipmotion_studio.study.manifest import MANIFEST, list_questions, order_trials, read_study
 
 ResultT = TypeVar("ResultT")
 Work = Callable[[sqlite3.Connection], Any]
@@ -235,3 +237,42 @@ def parse_rater(name: str) -> int:
 
 def _digest(token: str) -> str:
     return sha256(token.encode("utf-8", "replace")).hexdigest()
+
+
+def collect_answers(folder: Path) -> list[Answer]:
+    """Return the judgements of a study by rater and trial. Raises InputError: no study, or nobody has answered."""
+    study = read_study(folder)
+    with closing(StudyStore(folder, create=False)) as store:
+        sheets = store.list_sheets()
+    orders = {number: order_trials(study, number) for number in sorted({sheet.rater for sheet in sheets})}
+    answers = []
+    for sheet in sheets:
+        trial = orders[sheet.rater][sheet.trial]
+        rater, sentence = name_rater(sheet.rater), study.list_shown(trial)[0].sentence
+        for (question, condition, other), value in zip(list_questions(study, trial), sheet.values, strict=True):
+            judged = (question, condition, other, value, sheet.seconds, sheet.plays, trial.practice, trial.expected)
+            answers.append(Answer(rater, study.kind, sheet.trial, sentence, *judged))
+    return answers
+
+
+def export_answers(folder: Path, output: Path, rater: str | None = None) -> int:
+    """Write the answers of a study as CSV (``write_answers``); return how many there are.
+
+    rater : name of the only rater whose answers are written, as the page shows it; None: all raters
+    Raises InputError: as ``collect_answers``; no answers of this rater. Raises ExportError: the file is not written.
+    """
+    answers = collect_answers(folder)
+    if rater is not None:
+        name = name_rater(parse_rater(rater))
+        answers = [answer for answer in answers if answer.rater == name]
+        if not answers:
+            raise InputError(f"{folder}: no answers of the rater {name}; the names are in the exported answers")
+    write_answers(output, answers)
+    return len(answers)
+
+
+def forget_rater(folder: Path, name: str) -> int:
+    """Delete a rater and all answers; return how many. Raises InputError: no study, no such rater."""
+    read_study(folder)
+    with closing(StudyStore(folder, create=False)) as store:
+        return store.forget(parse_rater(name))

@@ -92,19 +92,35 @@ def run_design(options: argparse.Namespace) -> None:
 
 
 def run_serve(options: argparse.Namespace) -> None:
-    """Call ``serve_study``; print the address of the page."""
-    from lipmotion_studio.study.conduct import serve_study
+    """Let raters take part in a study, until the process is stopped; print the address of the page.
+
+    Every answer is on the disk before the rater's page learns that it is stored. A stopped study goes on where it was.
+    Raises InputError: no study, a video is missing or has changed, or the address cannot be listened at.
+    Raises MissingDependencyError: a package of the extra ``study`` is not installed.
+    """
+    from contextlib import closing
+
+    from lipmotion_studio.study.manifest import check_videos, read_study
+    from lipmotion_studio.study.store import StudyStore
+    from lipmotion_studio.web.listening import check_installed, open_socket, serve
+
+    check_installed("serving a study", "study")
+    from lipmotion_studio.study.application import create_application
 
     def announce(address: str) -> None:
         print_line(f"raters begin at {address} (Ctrl-C ends; answers are kept in {options.study})")
         flush_output()
 
-    serve_study(options.study, host=options.host, port=options.port, names=options.name, started=announce)
+    study = read_study(options.study)
+    videos = check_videos(study, options.study)
+    with open_socket(options.host, options.port) as place, closing(StudyStore(options.study)) as store:
+        application = create_application(study, videos, store, options.name)
+        serve(application, place, host=options.host, started=announce)
 
 
 def run_export(options: argparse.Namespace) -> None:
     """Call ``export_answers``; print how many there are."""
-    from lipmotion_studio.study.conduct import export_answers
+    from lipmotion_studio.study.store import export_answers
 
     print_line(f"{options.output}: {export_answers(options.study, options.output, options.rater)} answers")
 
@@ -124,7 +140,7 @@ def run_analyse(options: argparse.Namespace) -> None:
 
 def run_forget(options: argparse.Namespace) -> None:
     """Call ``forget_rater``; print how many answers there were."""
-    from lipmotion_studio.study.conduct import forget_rater
+    from lipmotion_studio.study.store import forget_rater
 
     count = forget_rater(options.study, options.rater)
     print_line(f"{options.rater}: {count} answers deleted; files that were exported before still have them")

@@ -137,21 +137,16 @@ async def read_json(request: Request, largest: int = MAX_JSON_BYTES) -> Any:
     """Return the JSON that a request brings. Raises HTTPException: something else, too much, or too slowly."""
     if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
         raise HTTPException(415, "required application/json")  # which no other site's page can send unasked
+    body = io.BytesIO()
+    await write_body(request, body, largest, BODY_S)
     try:
-        return from_json((await read_body(request, largest, BODY_S)).decode("utf-8"))
+        return from_json(body.getvalue().decode("utf-8"))
     except ValueError as error:
         raise HTTPException(400, "not JSON in UTF-8") from error
 
 
-async def read_body(request: Request, largest: int, within_s: float) -> bytes:
-    """Return the body of a request. Raises HTTPException: more than ``largest`` bytes, too slow, or broken off."""
-    file = io.BytesIO()
-    await write_body(request, file, largest, within_s)
-    return file.getvalue()
-
-
 async def write_body(request: Request, file: IO[bytes], largest: int, within_s: float) -> None:
-    """Write the body of a request into a file. Raises as ``read_body``."""
+    """Write the body of a request into a file. Raises HTTPException: over ``largest`` bytes, too slow, broken off."""
 
     async def write() -> None:
         size = 0

@@ -33,6 +33,7 @@ from lipmotion.pipeline.job import check_outputs, open_face
 from lipmotion.storage.archive import take_array
 from lipmotion.storage.json_text import from_json
 from lipmotion.types import Outlook, Span, Timeline, Unit
+from lipmotion_studio.application import TOKEN_HEADER
 from lipmotion_studio.folder import PROJECT, VOTES, ProjectFolder
 from lipmotion_studio.live import servers, vtube
 from lipmotion_studio.project import (
@@ -43,7 +44,6 @@ from lipmotion_studio.project import (
     describe_project,
     parse_project,
 )
-from lipmotion_studio.requests import TOKEN_HEADER
 from lipmotion_studio.study.answers import COLUMNS, read_answers
 from lipmotion_studio.study.application import create_application
 from lipmotion_studio.study.manifest import MANIFEST, check_videos, read_study

@@ -68,12 +68,9 @@ def test_options_that_are_refused(options, error):
         analyse_study(study(), **options)  # type: ignore[arg-type]
 
 
-def test_a_study_without_answers_is_refused():
+def test_no_rater_left_and_no_answers():
     with pytest.raises(InputError, match="1 answers, none of which counts"):
         analyse_study([replace(rating(("r", "s"), "a", 3), practice=True)])
-
-
-def test_no_rater_left():
     answers = [replace(rating(("r", "s"), "a", 3), expected="4"), rating(("r", "s"), "a", 3)]
     figures = analyse_study(answers)
     assert figures["screened"] is None
@@ -139,54 +136,42 @@ CASES: list[tuple[str, Change, str]] = [
 ]
 
 
+def left_out(answers: list[Answer]) -> dict[str, dict[str, str]]:
+    """Return what was found of each rater that is left out, by rule."""
+    found: dict[str, dict[str, str]] = {}
+    for row in screen(answers)["left_out"]:
+        found.setdefault(row["rater"], {})[row["rule"]] = row["found"]
+    return found
+
+
 def test_an_attentive_panel_stays():
     """Also where all conditions look alike, so that answers to both orders agree by chance alone."""
-    screening = screen(panel())
-    assert len(screening.raters) == 10
-    assert not screening.found
-    assert screening.list_figures() == {"rules": RULES, "raters": 10, "kept": 10, "left_out": []}
+    assert screen(panel()) == {"rules": RULES, "raters": 10, "kept": 10, "left_out": []}
+    assert screen([])["raters"] == 0
+    assert len(select_counting(panel())) == len(panel()) - 30  # practice and checks do not count
 
 
 @pytest.mark.parametrize(("rule", "change", "text"), CASES, ids=[case[0] for case in CASES])
 def test_a_rule_finds_its_rater(rule, change, text):
     answers = changed(change)
-    screening = screen(answers)
-    assert set(screening.found) == {"r3"}
-    assert rule in screening.found["r3"]
-    assert re.search(text, screening.found["r3"][rule])
-    row = next(row for row in screening.list_figures()["left_out"] if row["rule"] == rule)
-    assert row["rater"] == "r3"
-    assert {each.rater for each in screening.select_kept(answers)} == set(screening.raters) - {"r3"}
+    found = left_out(answers)
+    assert set(found) == {"r3"}
+    assert re.search(text, found["r3"][rule])
+    assert screen(answers)["kept"] == 9
 
 
-def test_too_few_answers():
+def test_too_few_answers_and_an_anchor_that_is_preferred():
     answers = [each for each in panel() if each.rater != "r3" or each.sentence == "s1"]
-    assert screen(answers).found["r3"]["answers"] == "9 of usually 54"
+    assert left_out(answers)["r3"]["answers"] == "9 of usually 54"
+    draw, nothing = np.random.default_rng(1), Effects(0, 0, 0, 0, 0)
+    table = comparisons(draw, np.array([5.0, -5, -5]), (6, 6), nothing)
+    answers = paired_answers(replace(table, conditions=("anchor", *table.conditions[1:])))
+    assert set(left_out(answers)) == {f"r{rater}" for rater in range(6)}
 
 
-def test_an_anchor_that_is_preferred():
-    answers = paired_answers(
-        comparisons(np.random.default_rng(1), np.array([5.0, -5, -5]), (6, 6), Effects(0, 0, 0, 0, 0))
-    )
-    answers = [
-        replace(each, condition=each.condition.replace("c0", "anchor"), other=each.other.replace("c0", "anchor"))
-        for each in answers
-    ]
-    assert set(screen(answers).found) == {f"r{rater}" for rater in range(6)}
-
-
-def test_equal_times_exclude_nobody_and_broken_ones_are_passed_over():
+def test_equal_times_exclude_nobody_and_broken_ones_and_those_of_four_are_passed_over():
     answers = [replace(each, seconds=4.0) for each in panel()]
-    assert not screen(answers).found
-    answers = [replace(each, seconds=float("nan") if each.rater == "r1" else 0.0) for each in answers]
-    assert not screen(answers).found
-
-
-def test_four_raters_are_no_panel_for_times():
+    assert not left_out(answers)
+    assert not left_out([replace(each, seconds=float("nan") if each.rater == "r1" else 0.0) for each in answers])
     few = [each for each in changed(lambda each: replace(each, seconds=each.seconds / 9)) if each.rater < "r4"]
-    assert not screen(few).found
-
-
-def test_practice_and_checks_do_not_count():
-    assert len(select_counting(panel())) == len(panel()) - 30
-    assert screen([]).raters == ()
+    assert not left_out(few)

@@ -29,19 +29,12 @@ def test_a_table_is_counted_right():
     first, second = table.count_wins()
     assert first.tolist() == [[0, 2], [1, 0]]
     assert second.tolist() == [[0, 0], [1, 0]]
-    (pair,) = paired.analyse_pairs(table)["pairs"]
+    figures = paired.analyse_pairs(table)
+    (pair,) = figures["pairs"]
     assert (pair["condition"], pair["other"], pair["wins"], pair["answers"]) == ("a", "b", 3, 4)
     assert pair["share"] == pytest.approx(2 / 3)  # of three cells: the one in both orders counts once
     assert paired.compare_orders(table).tolist() == [[1, 1], [0, 0]]
-    assert paired.measure_consistency(table) == {"pairs": 1, "consistent": 1, "share": 1.0}
-
-
-def test_answers_survive_the_table():
-    table = comparisons(np.random.default_rng(0), np.array([0, 0.5, 1]), (3, 2), USUAL)
-    again = paired.tabulate_pairs(paired_answers(table))
-    assert again.conditions == table.conditions
-    for name in ("shown", "is_first", "rater", "sentence"):
-        assert np.array_equal(getattr(again, name), getattr(table, name)), name
+    assert figures["consistency"] == {"pairs": 1, "consistent": 1, "share": 1.0}
 
 
 @pytest.mark.parametrize("other", ["a", ""])
@@ -52,6 +45,11 @@ def test_a_pair_has_two_conditions(other):
 
 def test_known_preferences_are_found():
     strengths = np.array([-0.6, -0.2, 0.8])
+    small = comparisons(np.random.default_rng(0), strengths, (3, 2), USUAL)
+    again = paired.tabulate_pairs(paired_answers(small))
+    assert again.conditions == small.conditions
+    for name in ("shown", "is_first", "rater", "sentence"):
+        assert np.array_equal(getattr(again, name), getattr(small, name)), name
     table = comparisons(np.random.default_rng(1), strengths, (60, 30), USUAL, order=0.3)
     figures = paired.analyse_pairs(table)
     found = {row["condition"]: row for row in figures["bradley_terry"]["conditions"]}
@@ -67,16 +65,13 @@ def test_known_preferences_are_found():
     assert row["p"] <= row["p_holm"] < 0.001
 
 
-def test_answers_of_one_rater_are_not_so_many_raters():
+def test_answers_of_one_rater_are_not_so_many_raters_and_those_who_all_agree_count_once_each():
     """Raters disagree about what is better, each sure of it: the binomial test is wrong, the other is not."""
     cells = np.repeat(np.array([1.0, 1, 1, 0, 1, 0, 1, 1])[:, None], 40, axis=1)
     figures = paired.analyse_shares(cells)
     assert paired.compute_binomial_p(int(cells.sum()), cells.size) < 1e-9
     assert figures["p"] > 0.1
     assert figures["low"] < 0.5 < figures["high"]
-
-
-def test_raters_who_all_agree_count_once_each():
     figures = paired.analyse_shares(np.ones((6, 30)))
     assert figures["over"] == paired.ALL_EQUAL
     assert (figures["low"], figures["high"]) == pytest.approx(tuple(stats.binomtest(6, 6).proportion_ci()))

@@ -1,3 +1,5 @@
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -50,16 +52,12 @@ def test_improvement_has_an_interval_around_it():
     assert row["low"] < 100 * (expected[2] / expected[0] - 1) < row["high"]
 
 
-def test_answers_survive_the_table():
-    table = simulated((3, 4))
-    again = tabulate_ratings(rated_answers(table))
-    assert again.conditions == table.conditions
-    assert np.array_equal(again.values, table.values)
+def test_known_means_are_found_and_answers_survive_the_table():
+    again = tabulate_ratings(rated_answers(simulated((3, 4))))
+    assert again.conditions == simulated((3, 4)).conditions
+    assert np.array_equal(again.values, simulated((3, 4)).values)
     ranked = ratings(np.random.default_rng(1), MEANS, (2, 2), Effects(), RANKS)
     assert tabulate_ratings(rated_answers(ranked)).scale == RANKS
-
-
-def test_known_means_are_found():
     figures = analyse_ratings(simulated((60, 40)), None)
     assert figures["baseline"] == "c0"
     assert [row["condition"] for row in figures["conditions"]] == ["c2", "c1", "c0"]
@@ -94,7 +92,10 @@ def test_the_anchor_is_shown_but_not_tested():
     assert [row["condition"] for row in figures["relative_improvement"]] == ["recording"]
 
 
-def test_conditions_never_compared_by_one_rater_have_no_difference():
+def test_conditions_never_compared_by_one_rater_have_no_difference_and_none_improves_on_nothing():
+    ranks = [rating((r, s), name, 50 * (name == "b"), kind="ranking") for r, s, name in product("xy", "xy", "ab")]
+    (row,) = analyse_ratings(tabulate_ratings(ranks), "a")["relative_improvement"]
+    assert np.isnan(row["percent"])
     answers = [rating((f"r{r}", f"s{s}"), "ab"[r % 2], 1 + (r + s) % 5) for r in range(6) for s in range(4)]
     figures = analyse_ratings(tabulate_ratings(answers), "a")
     (pair,) = figures["pairs"]
@@ -102,17 +103,6 @@ def test_conditions_never_compared_by_one_rater_have_no_difference():
     assert pair["over"] == "nothing"
     assert np.isnan(figures["relative_improvement"][0]["percent"])
     assert not np.isnan(figures["conditions"][0]["low"])
-
-
-def test_a_baseline_of_nothing_has_no_improvement_over_it():
-    ranks = [
-        rating((f"r{r}", f"s{s}"), name, 50 * (name == "b"), kind="ranking")
-        for r in "xy"
-        for s in "xy"
-        for name in "ab"
-    ]
-    (row,) = analyse_ratings(tabulate_ratings(ranks), "a")["relative_improvement"]
-    assert np.isnan(row["percent"])
 
 
 @pytest.mark.long
@@ -128,7 +118,7 @@ def test_intervals_cover_known_means_near_the_end_of_the_scale():
 USUAL = Components(0.16, 0.04, 1.0)
 
 
-def told(components: Components, difference: float, raters: int, sentences: int, studies: int) -> float:
+def detected(components: Components, difference: float, raters: int, sentences: int, studies: int) -> float:
     draw, found = np.random.default_rng(7), 0
     rater, sentence, rest = np.sqrt(components)
     for _ in range(studies):
@@ -139,33 +129,24 @@ def told(components: Components, difference: float, raters: int, sentences: int,
 
 
 @pytest.mark.parametrize("components", [USUAL, Components(0, 0, 1.0), Components(0.0, 0.3, 0.5)])
-def test_power_is_that_of_simulated_studies(components):
-    assert compute_power(components, 0.5, 12, 6) == pytest.approx(told(components, 0.5, 12, 6, 800), abs=0.04)
-
-
-def test_where_raters_alone_differ_power_is_that_of_the_t_test():
+def test_power_is_that_of_simulated_studies_and_where_raters_alone_differ_of_the_t_test(components):
+    assert compute_power(components, 0.5, 12, 6) == pytest.approx(detected(components, 0.5, 12, 6, 800), abs=0.04)
     critical, shift = stats.t.ppf(0.975, 15), 0.5 / np.sqrt(0.5 / 16)
     usual = 1 - stats.nct.cdf(critical, 15, shift) + stats.nct.cdf(-critical, 15, shift)
     assert compute_power(Components(0.5, 0, 1e-9), 0.5, 16, 6) == pytest.approx(usual, abs=0.01)
 
 
-def test_the_number_of_raters_is_the_smallest():
+def test_the_number_of_raters_is_the_smallest_and_bound_by_sentences_that_differ():
     for difference in (0.3, 0.5, 1.0):
         raters = count_raters(USUAL, difference, 12)
         assert raters is not None
         assert compute_power(USUAL, difference, raters, 12) >= 0.8
         assert raters == 2 or compute_power(USUAL, difference, raters - 1, 12) < 0.8
     assert count_raters(USUAL, 0.5, 12, 0.95) > count_raters(USUAL, 0.5, 12)  # type: ignore[operator]
-
-
-def test_sentences_that_differ_bound_what_raters_can_tell():
     components = Components(0.1, 0.3, 0.5)
     assert count_raters(components, 0.3, 6) is None
     assert count_raters(components, 0.3, 60) is not None
-
-
-def test_judgements_that_never_vary():
-    nothing = Components(0, 0, 0)
+    nothing = Components(0, 0, 0)  # judgements that never vary
     assert compute_power(nothing, 0.1, 2, 2) == 1
     assert compute_power(nothing, 0.0, 2, 2) == pytest.approx(0.05)
     assert count_raters(nothing, 0.1, 2) == 2
@@ -210,7 +191,7 @@ def test_components_are_those_of_a_mixed_model():
     assert found.error == pytest.approx(0.743818, abs=1e-5)
 
 
-def test_the_variance_is_that_of_the_mean_squares():
+def test_the_variance_is_that_of_the_mean_squares_and_an_effect_of_nothing_leaves_the_degrees_of_freedom():
     table = TABLE + np.arange(5)
     by_rater, by_sentence, rest = mean_squares(table)
     found = estimate_mean(table, 4.0)
@@ -218,9 +199,6 @@ def test_the_variance_is_that_of_the_mean_squares():
     assert found.error**2 == pytest.approx(variance)
     doubt = by_rater**2 / 6 + by_sentence**2 / 4 + rest**2 / 24
     assert found.degrees == pytest.approx((35 * variance) ** 2 / doubt)
-
-
-def test_an_effect_estimated_as_nothing_leaves_the_degrees_of_freedom():
     table = TABLE - TABLE.mean(axis=0)  # sentences differ less than by chance
     by_rater, _, rest = mean_squares(table)
     found = estimate_mean(table, 4.0)
@@ -244,7 +222,7 @@ def test_one_sentence_or_one_rater_is_the_usual_t_interval(by_rater):
     assert found.components is None
 
 
-def test_who_shares_no_sentence_is_grouped_by_what_is_shared():
+def test_who_shares_no_sentence_is_grouped_by_what_is_shared_and_gaps_leave_rows_and_columns_out():
     table = np.full((6, 3), np.nan)
     table[np.arange(6), np.arange(6) % 3] = TABLE[:6, 0]  # every rater judges one sentence
     found = estimate_mean(table, 4.0)
@@ -253,9 +231,6 @@ def test_who_shares_no_sentence_is_grouped_by_what_is_shared():
     assert found.interval == pytest.approx(tuple(stats.ttest_1samp(groups, 0).confidence_interval()))
     assert estimate_mean(table.T, 4.0).over == RATERS
     assert estimate_mean(table.T, 4.0).error == pytest.approx(found.error)
-
-
-def test_gaps_leave_rows_and_columns_out():
     wider = np.full((9, 8), np.nan)
     wider[1:8, 2:7] = TABLE
     assert estimate_mean(wider, 4.0) == estimate_mean(TABLE, 4.0)
@@ -281,15 +256,12 @@ def test_equal_judgements_have_no_interval(level):
     assert np.isnan(found.p_value)
 
 
-def test_intervals_within_a_scale_stay_there():
+def test_intervals_within_a_scale_stay_there_and_are_those_of_any_other_scale():
     table = np.array([[5, 5, 5], [5, 5, 4], [5, 4, 5], [5, 5, 5.0]])
     found = estimate_mean(table, 4.0)
     low, high = found.compute_interval_within(1, 5)
     assert found.interval.high > 5 > high > found.mean > low
     assert np.isnan(estimate_mean(np.full((2, 2), 5.0), 4.0).compute_interval_within(1, 5)).all()
-
-
-def test_a_scale_of_any_place_and_size_has_the_same_interval():
     share = estimate_mean((TABLE - TABLE.min() + 1) / 10, 1.0)
     moved = estimate_mean((TABLE - TABLE.min() + 1) / 10 * 100 - 20, 100.0)
     expected = np.array(share.compute_interval_within(0, 1)) * 100 - 20

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -52,38 +51,13 @@ RULES = {
 }
 
 
-@dataclass(frozen=True)
-class Screening:
-    """All raters, and for each that is left out what was found, by rule."""
-
-    raters: tuple[str, ...]
-    found: Mapping[str, Mapping[str, str]]
-
-    def select_kept(self, answers: Sequence[Answer]) -> list[Answer]:
-        """Return the answers of the raters that are kept."""
-        return [answer for answer in answers if answer.rater not in self.found]
-
-    def list_figures(self) -> Figures:
-        """Return the rules, and whom they leave out."""
-        return {
-            "rules": dict(RULES),
-            "raters": len(self.raters),
-            "kept": len(self.raters) - len(self.found),
-            "left_out": [
-                {"rater": rater, "rule": rule, "found": text}
-                for rater, texts in self.found.items()
-                for rule, text in texts.items()
-            ],
-        }
-
-
 def select_counting(answers: Sequence[Answer]) -> list[Answer]:
     """Return the answers that count: neither practice nor checks of attention."""
     return [answer for answer in answers if not answer.practice and not answer.expected]
 
 
-def screen(answers: Sequence[Answer]) -> Screening:
-    """Return which raters of a study are left out."""
+def screen(answers: Sequence[Answer]) -> Figures:
+    """Return the rules, how many raters of a study there are and are kept, and which are left out, by what rule."""
     real = [answer for answer in answers if not answer.practice]
     raters = sorted({answer.rater for answer in real})
     judged: dict[str, list[Answer]] = {rater: [] for rater in raters}
@@ -92,7 +66,7 @@ def screen(answers: Sequence[Answer]) -> Screening:
         (checks if answer.expected else judged)[answer.rater].append(answer)
     fast = _find_fast(select_counting(real))
     usual = float(np.median([len(mine) for mine in judged.values()])) if raters else 0.0
-    reasons: dict[str, dict[str, str]] = {}
+    left_out = []
     for rater, mine in judged.items():
         right, shown = sum(each.value == each.expected for each in checks[rater]), len(checks[rater])
         texts = {
@@ -103,9 +77,9 @@ def screen(answers: Sequence[Answer]) -> Screening:
             "time": fast.get(rater, ""),
             "answers": f"{len(mine)} of usually {usual:g}" if len(mine) < MIN_ANSWERS * usual else "",
         }
-        if any(texts.values()):
-            reasons[rater] = {rule: text for rule, text in texts.items() if text}
-    return Screening(tuple(raters), reasons)
+        left_out += [{"rater": rater, "rule": rule, "found": text} for rule, text in texts.items() if text]
+    kept = len(raters) - len({row["rater"] for row in left_out})
+    return {"rules": dict(RULES), "raters": len(raters), "kept": kept, "left_out": left_out}
 
 
 def _check_values(mine: Sequence[Answer]) -> str:
@@ -136,8 +110,6 @@ def _check_anchor(mine: Sequence[Answer]) -> str:
 def _check_sides(mine: Sequence[Answer]) -> str:
     from scipy.special import bdtr
 
-    if not mine:
-        return ""
     alike, pairs = compare_orders(tabulate_pairs(mine)).sum(axis=0).tolist()
     if pairs and bdtr(alike, pairs, 0.5) < MIN_CHANCE:
         return f"{alike} of {pairs} pairs answered alike in both orders"
@@ -258,11 +230,11 @@ def analyse_study(
     >>> [(row["condition"], row["mean"]) for row in part["conditions"]]
     [('trajectory', 4.0), ('coupled', 2.0)]
     """
-    given = read_answers(Path(answers)) if isinstance(answers, str | Path) else list(answers)
-    counted = select_counting(given)
+    table = read_answers(Path(answers)) if isinstance(answers, str | Path) else list(answers)
+    counted = select_counting(table)
     if not counted:
         raise InputError(
-            f"{len(given)} answers, none of which counts: required some that are neither practice nor checks"
+            f"{len(table)} answers, none of which counts: required some that are neither practice nor checks"
         )
     conditions = sorted({each.condition for each in counted if each.kind != PAIRED})
     if baseline is not None and baseline not in conditions:
@@ -272,16 +244,17 @@ def analyse_study(
         raise InputError(f"a power of {power:g}, required between 0.05 and 1, such as {USUAL_POWER}")
     if sentences is not None and sentences < 2:
         raise InputError(f"{sentences} sentences of planned studies, required at least 2")
-    screening = screen(given)
-    kept = screening.select_kept(counted)
+    screening = screen(table)
+    left_out = {row["rater"] for row in screening["left_out"]}
+    kept = [answer for answer in counted if answer.rater not in left_out]
     plan = (baseline, power, sentences)
     everybody = _list_parts(counted, *plan)
     screened = everybody if len(kept) == len(counted) else _list_parts(kept, *plan)
     return {
         "answers": len(counted),
-        "left_aside": len(given) - len(counted),
+        "left_aside": len(table) - len(counted),
         "power": power,
-        "screening": screening.list_figures(),
+        "screening": screening,
         "screened": screened or None,
         "all": everybody,
     }
@@ -291,35 +264,26 @@ def _list_parts(answers: Sequence[Answer], baseline: str | None, power: float, s
     parts = []
     for kind, question in dict.fromkeys((each.kind, each.question) for each in answers):
         mine = [each for each in answers if (each.kind, each.question) == (kind, question)]
-        if kind == PAIRED:
-            figures = _analyse_comparisons(mine, power, sentences)
-        else:
-            table = tabulate_ratings(mine)
-            components, planned = average_difference_effects(table), sentences or table.values.shape[2]
-            figures = analyse_ratings(table, baseline) | {
-                "variance": components._asdict() if components else None,
-                "planned_sentences": planned,
-                "raters_needed": plan_ratings(components, kind, planned, power),
-            }
         part: Figures = {"kind": kind, "question": question, "answers": len(mine)}
         part |= {"raters": len({each.rater for each in mine}), "sentences": len({each.sentence for each in mine})}
-        parts.append(part | figures)
+        parts.append(part)
+        if kind == PAIRED:
+            compared = [each for each in mine if ANCHOR not in (each.condition, each.other)]  # the others only screen
+            if not compared:
+                part["missing"] = "all comparisons are with the anchor"
+                continue
+            pairs = tabulate_pairs(compared)
+            components, planned = average_share_effects(pairs), sentences or len(pairs.sentences)
+            part |= analyse_pairs(pairs)
+            needed = plan_pairs(components, planned, power)
+        else:
+            ratings = tabulate_ratings(mine)
+            components, planned = average_difference_effects(ratings), sentences or ratings.values.shape[2]
+            part |= analyse_ratings(ratings, baseline)
+            needed = plan_ratings(components, kind, planned, power)
+        part |= {"variance": components._asdict() if components else None, "planned_sentences": planned}
+        part["raters_needed"] = needed
     return parts
-
-
-def _analyse_comparisons(answers: Sequence[Answer], power: float, sentences: int | None) -> Figures:
-    """Return the figures of paired comparisons but those with the anchor, which only screen."""
-    mine = [each for each in answers if ANCHOR not in (each.condition, each.other)]
-    if not mine:
-        return {"missing": "all comparisons are with the anchor"}
-    table = tabulate_pairs(mine)
-    components = average_share_effects(table)
-    planned = sentences or len(table.sentences)
-    return analyse_pairs(table) | {
-        "variance": components._asdict() if components else None,
-        "planned_sentences": planned,
-        "raters_needed": plan_pairs(components, planned, power),
-    }
 
 
 NO_FIGURE = "–"
@@ -357,18 +321,27 @@ def format_analysis(figures: Figures) -> str:
 def _format_ratings(part: Figures, everybody: Figures | None) -> list[str]:
     before = {row["condition"]: row["mean"] for row in everybody["conditions"]} if everybody else {}
     relative = {row["condition"]: row for row in part["relative_improvement"]}
-    rows = [["condition", "mean", "95 %", "deviation", f"% over {part['baseline']}", "95 %", "all raters"]]
+    rows = [
+        [
+            "condition",
+            "mean",
+            "95 %",
+            "deviation",
+            f"% over {part['baseline']}",
+            "95 %",
+            *(["all raters"] if before else []),
+        ]
+    ]
     for row in part["conditions"]:
         better = relative.get(row["condition"], {"percent": None, "low": None, "high": None})
         mean = [row["condition"], _show(row["mean"], ".2f"), _show_ci(row, ".2f"), _show(row["deviation"], ".2f")]
         gain = [_show(better["percent"], "+.1f"), _show_ci(better, "+.1f")]
-        rows.append([*mean, *gain, _show(before.get(row["condition"]), ".2f")])
+        rows.append([*mean, *gain, *([_show(before.get(row["condition"]), ".2f")] if before else [])])
     pairs = [["pair", "difference", "95 %", "p", "p (Holm)"]]
-    pairs += [
-        [f"{row['condition']} - {row['other']}", _show(row["difference"], "+.2f"), _show_ci(row, "+.2f"), *_show_p(row)]
-        for row in part["pairs"]
-    ]
-    return [*_align(_without_last(rows, bool(before))), *_format_scope(part["conditions"]), *_align(pairs)]
+    for row in part["pairs"]:
+        name, difference = f"{row['condition']} - {row['other']}", _show(row["difference"], "+.2f")
+        pairs.append([name, difference, _show_ci(row, "+.2f"), _show_p(row["p"]), _show_p(row["p_holm"])])
+    return [*_align(rows), *_format_scope(part["conditions"]), *_align(pairs)]
 
 
 def _format_pairs(part: Figures, everybody: Figures | None) -> list[str]:
@@ -381,16 +354,19 @@ def _format_pairs(part: Figures, everybody: Figures | None) -> list[str]:
         [row["condition"], f"{row['wins']} of {row['answers']}", _show(row["share"], ".1%"), _show_ci(row, ".1%")]
         for row in part["conditions"]
     ]
-    pairs = [["pair", "preferred", "share", "95 %", "p", "p (Holm)", "p (binomial)", "all raters"]]
+    pairs = [
+        ["pair", "preferred", "share", "95 %", "p", "p (Holm)", "p (binomial)", *(["all raters"] if before else [])]
+    ]
     for row in part["pairs"]:
         name = f"{row['condition']} over {row['other']}"
         share = [f"{row['wins']} of {row['answers']}", _show(row["share"], ".1%"), _show_ci(row, ".1%")]
-        all_raters = _show(before.get((row["condition"], row["other"])), ".1%")
-        pairs.append([name, *share, *_show_p(row), _round_p(row["p_binomial"]), all_raters])
+        tests = [_show_p(row[key]) for key in ("p", "p_holm", "p_binomial")]
+        all_raters = [_show(before.get((row["condition"], row["other"])), ".1%")] if before else []
+        pairs.append([name, *share, *tests, *all_raters])
     first, both = part["first_preferred"], part["consistency"]
     orders = f"  the first was preferred in {_show(first['share'], '.1%')} ({_show_ci(first, '.1%')}); "
     orders += f"{both['consistent']} of {both['pairs']} pairs in both orders alike ({_show(both['share'], '.1%')})"
-    lines = [*_align(scores), *_align(_without_last(pairs, bool(before))), *_format_scope(part["pairs"]), orders]
+    lines = [*_align(scores), *_align(pairs), *_format_scope(part["pairs"]), orders]
     model = part["bradley_terry"]
     if "missing" in model:
         return [*lines, f"  no Bradley–Terry strengths: {model['missing']}"]
@@ -411,41 +387,22 @@ def _format_scope(rows: Sequence[Figures]) -> list[str]:
     return [f"  intervals over {' / '.join(scopes)} only: {', '.join(named)}"] if scopes else []
 
 
-def _without_last(rows: list[list[str]], is_kept: bool) -> list[list[str]]:
-    return rows if is_kept else [row[:-1] for row in rows]
-
-
 def _align(rows: Sequence[Sequence[str]]) -> list[str]:
     """Return rows in columns, the first to the left, the others to the right; no line for a head alone."""
     if len(rows) < 2:
         return []
-    sizes = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  "
-        + "  ".join(
-            [f"{row[0]:{sizes[0]}}", *(f"{cell:>{size}}" for cell, size in zip(row[1:], sizes[1:], strict=True))]
-        )
-        for row in rows
-    ]
+    first, *sizes = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join([f"  {row[0]:{first}}", *map(str.rjust, row[1:], sizes)]) for row in rows]
 
 
-def _show_p(row: Figures) -> list[str]:
-    return [_round_p(row["p"]), _round_p(row["p_holm"])]
-
-
-def _round_p(p: float | None) -> str:
+def _show_p(p: float | None) -> str:
     return "<0.001" if p is not None and p < 0.001 else _show(p, ".3f")
 
 
 def _show_ci(row: Figures, form: str) -> str:
-    if _is_missing(row["low"]):
-        return NO_FIGURE
-    return f"{row['low']:{form}} to {row['high']:{form}}"
+    low, high = _show(row["low"], form), _show(row["high"], form)
+    return low if low == NO_FIGURE else f"{low} to {high}"
 
 
 def _show(value: float | None, form: str) -> str:
-    return NO_FIGURE if value is None or _is_missing(value) else format(value, form)
-
-
-def _is_missing(value: float | None) -> bool:
-    return value is None or value != value  # noqa: PLR0124 - NaN
+    return NO_FIGURE if value is None or np.isnan(value) else format(value, form)

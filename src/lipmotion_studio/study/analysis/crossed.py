@@ -115,18 +115,23 @@ def estimate_mean(values: Array, width: float) -> CrossedMean:
     raters, sentences = table.shape
     if cells == 1:
         return CrossedMean(mean, np.nan, np.nan, NOTHING, None)
+
+    def compute_error(variance: float) -> float:
+        error = float(np.sqrt(variance))
+        return error if error > ROUNDING * width else 0.0
+
     if cells in (raters, sentences):  # a cell for each of one kind: grouped by the other, unless there is one group
         by_rater = sentences == 1 or (raters > 1 and cells == sentences)
         sums = rest.sum(axis=int(by_rater))  # of the differences from the mean in each group
         spread = len(sums) / (len(sums) - 1) * float(np.square(sums).sum()) / cells**2
         over = RATERS if by_rater else SENTENCES
-        return CrossedMean(mean, _compute_error(spread, width), len(sums) - 1, over, None)
+        return CrossedMean(mean, compute_error(spread), len(sums) - 1, over, None)
     components = _estimate_components(rest, seen)
     shares = [float(np.square(seen.sum(axis=axis) / cells).sum()) for axis in (1, 0)]  # 1 / R and 1 / S without gaps
     rater, sentence, residual = np.array(components)[:, None] * np.array([*shares, 1 / cells])[:, None]
     free = 1 / shares[0] - 1, 1 / shares[1] - 1, max(cells - raters - sentences + 1.0, 1.0)
     variance, degrees = combine_variances(rater, sentence, residual, free)
-    return CrossedMean(mean, _compute_error(variance[0], width), float(degrees[0]), BOTH, components)
+    return CrossedMean(mean, compute_error(variance[0]), float(degrees[0]), BOTH, components)
 
 
 def combine_variances(
@@ -154,11 +159,6 @@ def _estimate_components(rest: Array, seen: NDArray[np.bool_]) -> Components:
     excess = raters * without_sentence + sentences * without_rater - squares
     residual = max(excess / (raters + sentences - cells + 1), 0.0) if raters + sentences > cells - 1 else 0.0
     return Components(max(without_sentence - residual, 0.0), max(without_rater - residual, 0.0), residual)
-
-
-def _compute_error(variance: float, width: float) -> float:
-    error = float(np.sqrt(variance))
-    return error if error > ROUNDING * width else 0.0
 
 
 def correct_p_values(p_values: list[float]) -> list[float]:
@@ -237,7 +237,10 @@ def analyse_ratings(table: RatingTable, baseline: str | None) -> Figures:
             "over": mean.over,
         }
         means.append(row)
-    base = baseline if baseline in table.conditions else find_lowest(table)
+    base = baseline
+    if baseline not in table.conditions:  # the lowest mean but those of anchor and recording
+        names = [name for name in table.conditions if name not in (ANCHOR, RECORDING)]
+        base = min(names, key=lambda name: float(np.nanmean(table.select_condition(name))), default=None)
     pairs = table.list_pairs()
     differences = [table.compare(*pair) for pair in pairs]
     p_values = [each.p_value for each in differences]
@@ -254,12 +257,6 @@ def analyse_ratings(table: RatingTable, baseline: str | None) -> Figures:
             for pair, mean, p, corrected in zip(pairs, differences, p_values, correct_p_values(p_values), strict=True)
         ],
     }
-
-
-def find_lowest(table: RatingTable) -> str | None:
-    """Return the condition with the lowest mean but anchor and recording; None: there is no other."""
-    names = [name for name in table.conditions if name not in (ANCHOR, RECORDING)]
-    return min(names, key=lambda name: float(np.nanmean(table.select_condition(name))), default=None)
 
 
 def measure_improvement(table: RatingTable, condition: str, base: str) -> Figures:

@@ -36,10 +36,6 @@ class Strengths:
     covariance: crossed.Array
     is_shrunk: bool
 
-    def compute_probability(self) -> crossed.Array:
-        """Return the probability that i, shown first, is preferred to j [shape=(C, C)]."""
-        return _apply_logistic(self.strengths[:, None] - self.strengths + self.order)
-
 
 def fit_strengths(first_wins: crossed.Array, second_wins: crossed.Array) -> Strengths:
     """Return the strengths of most likely preferences.
@@ -68,8 +64,8 @@ def fit_strengths(first_wins: crossed.Array, second_wins: crossed.Array) -> Stre
         if np.abs(np.append(worth, place) / before - 1).max() < SMALLEST_STEP:
             break
     strengths, order = np.log(worth), float(np.log(place))
-    probability = _apply_logistic(strengths[:, None] - strengths + order)
-    weights = (first_wins + second_wins) * probability * (1 - probability)
+    probability = 1 / (1 + np.exp(strengths - strengths[:, None] - order))
+    weights = comparisons * probability * (1 - probability)
     pairs = np.argwhere(weights > 0)
     contrasts = _build_contrasts(pairs, len(weights))
     contrasts[:, -1] *= has_order
@@ -90,11 +86,11 @@ def _has_maximum(first_wins: crossed.Array, second_wins: crossed.Array, has_orde
     """Return whether the likelihood has a maximum: no direction of strengths and order in which it never falls."""
     from scipy.optimize import linprog
 
-    rows = _build_contrasts(np.argwhere(first_wins > 0), len(first_wins)).tolist()
-    rows += (-_build_contrasts(np.argwhere(second_wins > 0), len(first_wins))).tolist()
-    contrasts = np.array(rows)
+    won, lost = (_build_contrasts(np.argwhere(wins > 0), len(wins)) for wins in (first_wins, second_wins))
+    contrasts = np.concatenate([won, -lost])
     contrasts[:, -1] *= has_order
-    best = linprog(-contrasts.sum(axis=0), A_ub=-contrasts, b_ub=np.zeros(len(rows)), bounds=(-1, 1), method="highs")
+    limits = np.zeros(len(contrasts))
+    best = linprog(-contrasts.sum(axis=0), A_ub=-contrasts, b_ub=limits, bounds=(-1, 1), method="highs")
     return bool(-best.fun < 1e-7)
 
 
@@ -115,12 +111,9 @@ def compute_deviations(model: Strengths, pairs: NDArray[np.intp], is_first: NDAr
     Their sum over all answers is 0 at the maximum of the likelihood; how it varies with raters and sentences is how
     sure the strengths are (Liang & Zeger 1986).
     """
-    expected = model.compute_probability()[pairs[:, 0], pairs[:, 1]]
+    first, second = model.strengths[pairs].T
+    expected = 1 / (1 + np.exp(-(first - second + model.order)))
     return (_build_contrasts(pairs, len(model.strengths)) * (is_first - expected)[:, None]) @ model.covariance
-
-
-def _apply_logistic(values: crossed.Array) -> crossed.Array:
-    return 1 / (1 + np.exp(-values))
 
 
 Indices = NDArray[np.intp]
@@ -159,12 +152,11 @@ class PairTable:
         """Return which answers prefer a condition [shape=(N,)]."""
         return np.where(self.is_first, self.shown[:, 0], self.shown[:, 1]) == condition
 
-    def count_wins(self) -> tuple[crossed.Array, crossed.Array]:
-        """Return how often i, shown first, was preferred to j, and j to it [each shape=(C, C)]."""
-        first, second = (np.zeros((len(self.conditions),) * 2) for _ in range(2))
-        np.add.at(first, tuple(self.shown[self.is_first].T), 1)
-        np.add.at(second, tuple(self.shown[~self.is_first].T), 1)
-        return first, second
+    def count_wins(self) -> crossed.Array:
+        """Return how often i, shown first, was preferred to j, and j to it [shape=(2, C, C)]."""
+        wins = np.zeros((2, len(self.conditions), len(self.conditions)))
+        np.add.at(wins, (1 - self.is_first.astype(int), *self.shown.T), 1)
+        return wins
 
 
 def tabulate_pairs(answers: Sequence[Answer]) -> PairTable:
@@ -207,11 +199,12 @@ def analyse_pairs(table: PairTable) -> Figures:
         share = analyse_shares(table.average_cells(preferred.astype(float), chosen))
         counts = {"wins": int((preferred & chosen).sum()), "answers": int(chosen.sum())}
         scores.append({"condition": name} | counts | {key: share[key] for key in ("share", "low", "high")})
+    consistent, pairs = compare_orders(table).sum(axis=0).tolist()  # of the pairs that a rater saw in both orders
     return {
         "conditions": scores,
         "pairs": [row | {"p_holm": p} for row, p in zip(rows, corrected, strict=True)],
         "first_preferred": {"answers": len(table.is_first)} | first,
-        "consistency": measure_consistency(table),
+        "consistency": {"pairs": pairs, "consistent": consistent, "share": consistent / pairs if pairs else np.nan},
         "bradley_terry": analyse_strengths(table),
     }
 
@@ -248,14 +241,6 @@ def compute_binomial_p(wins: int, count: int) -> float:
     from scipy.special import bdtr
 
     return min(1.0, float(2 * bdtr(min(wins, count - wins), count, 0.5)))
-
-
-def measure_consistency(table: PairTable) -> Figures:
-    """Return in what share of the pairs that a rater saw in both orders the same condition was preferred twice."""
-    agreed = compare_orders(table)
-    count = int(agreed[:, 1].sum())
-    share = float(agreed[:, 0].sum() / count) if count else np.nan
-    return {"pairs": count, "consistent": int(agreed[:, 0].sum()), "share": share}
 
 
 def compare_orders(table: PairTable) -> Indices:
