@@ -9,7 +9,7 @@ from __future__ import annotations
 import platform
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from hashlib import sha256
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
 from lipmotion.extensions import Registry
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, Passage, analysed
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.voice_activity import Stretch, find_sound, read_stretch
 from lipmotion.types import Audio, JoinedRows, ParallelMap, TokenPosteriors
 from lipmotion.types.audio import from_sixteen_bits
@@ -169,20 +169,18 @@ def find_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> 
             by_passage[part.first].append(PosteriorStretch(stretch, posteriors))
         if audio.is_passage:
             return by_passage[0]
+        placed = []
         for part in audio.passages:
             part.audio.cached(key, partial(by_passage.__getitem__, part.first))
-        return [placed for part in audio.passages for placed in _place_stretches(by_passage[part.first], part)]
+            for (first, end), posteriors in by_passage[part.first]:
+                start, stop = max(part.first + first, part.own.start), min(part.first + end, part.own.stop)
+                skipped = -(-(start - part.first - first) // POSTERIOR_STEP)
+                values = posteriors.values[skipped : skipped + -(-(stop - start) // POSTERIOR_STEP)]
+                if len(values):
+                    placed.append(PosteriorStretch(Stretch(start, stop), PhonePosteriors(values, tokens)))
+        return placed
 
     return audio.cached(key, compute)
-
-
-def _place_stretches(stretches: Sequence[PosteriorStretch], passage: Passage) -> Iterator[PosteriorStretch]:
-    for (first, end), posteriors in stretches:
-        start, stop = max(passage.first + first, passage.own.start), min(passage.first + end, passage.own.stop)
-        skipped = -(-(start - passage.first - first) // POSTERIOR_STEP)
-        values = posteriors.values[skipped : skipped + -(-(stop - start) // POSTERIOR_STEP)]
-        if len(values):
-            yield PosteriorStretch(Stretch(start, stop), PhonePosteriors(values, posteriors.tokens))
 
 
 def mean_posterior(stretches: Sequence[PosteriorStretch]) -> float:
