@@ -213,7 +213,7 @@ def test_a_program_reads_what_it_is_given_and_what_it_started_ends_with_it(tmp_p
     for name in ("reader", "starter"):
         (tmp_path / name).mkdir()
     reader = [str(_program(tmp_path / "reader", "exec cat"))]
-    assert synthesiser.run_program(reader, "a-package", given="Helló\n") == "Helló\n"
+    assert synthesiser.run_program(reader, "a-package", stdin="Helló\n") == "Helló\n"
     child = int(synthesiser.run_program([str(_program(tmp_path / "starter", "sleep 30 & echo $!"))], "a-package"))
     for _ in range(100):
         if not _is_running(child):
