@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from children import LIPMOTION, child, wait_until
+from children import wait_until
 from lipmotion import load_model, read_motion, save_model
 from lipmotion.pipeline.model import find_shipped
+from studio.served import served
 from studio.test_recorded_videos import shifted
 from study.browser import (
     CONTROL,
@@ -138,22 +139,13 @@ class Page:
 
 
 @contextmanager
-def served(folder: Path, *source: Path | str) -> Iterator[str]:
-    """Give the address of a studio over a project in a folder; what follows a source are options."""
-    command = [*LIPMOTION, "studio", *(source or [folder]), *(["-o", folder] if source else []), "--no-browser"]
-    with child(command, limit_s=WINDOW_S) as process:
-        line = process.stdout.readline() if process.stdout else ""
-        found = re.search(r"http://127\.0\.0\.1:\d+/#\S+", line)
-        assert found, line
-        yield found[0]
-
-
-@contextmanager
-def shown(opens: Opens, folder: Path) -> Iterator[Page]:
-    """Give the page of a studio of one recording, in a browser."""
+def shown(opens: Opens, folder: Path, source: Path = WELCOME, *options: Path | str) -> Iterator[Page]:
+    """Give the page of a studio of one recording, or of a project, in a browser; its project is in the folder."""
     (folder / "home").mkdir()
-    with served(folder / "project", WELCOME) as address, opens(folder / "home", *WEBGL) as window:
-        window.open(address)
+    place = () if source == folder / "project" else ("-o", folder / "project")
+    studio = served(source, folder / "errors.txt", *place, *options, limit_s=WINDOW_S)
+    with studio as server, opens(folder / "home", *WEBGL) as window:
+        window.open(f"http://127.0.0.1:{server.port}/#{server.token}")
         page = Page(window, folder / "project")
         page.ready()
         yield page
@@ -535,7 +527,6 @@ def test_every_screen(page):
 
 @pytest.mark.parametrize("opens", BOTH)
 def test_the_real_video_beside_and_comparisons(opens, tmp_path, filmed_face_file):
-    (tmp_path / "home").mkdir()
     sound = Path(shutil.copy(WELCOME, tmp_path))
     pictures = (np.full((64, 96, 3), 40 + number % 200, np.uint8) for number in range(100))
     write_film(tmp_path / "in step.mp4", pictures, sound)
@@ -543,11 +534,8 @@ def test_the_real_video_beside_and_comparisons(opens, tmp_path, filmed_face_file
     other = tmp_path / find_shipped().name  # another file, of the same name
     model = load_model()
     save_model(replace(model, about={**model.about, "seed": "another"}), other)
-    options = ("--against", other, "--face", filmed_face_file)
-    with served(tmp_path / "project", sound, *options) as address, opens(tmp_path / "home", *WEBGL) as window:
-        window.open(address)
-        page = Page(window, tmp_path / "project")
-        page.ready()
+    with shown(opens, tmp_path, sound, "--against", other, "--face", filmed_face_file) as page:
+        window = page.window
         window.press("x")
         wait_until(lambda: page.of("document.querySelector('.recorded').readyState") >= 2, LIMIT_S)
         window.run("studio.player.seek(1.23)")
