@@ -128,7 +128,7 @@ def _find_fast(answers: Sequence[Answer]) -> dict[str, str]:
         by_rater.setdefault(each.rater, []).append(float(np.log(each.seconds)) - usual[each.kind, each.question])
     if len(by_rater) < MIN_PANEL:
         return {}
-    times = {rater: float(np.median(found)) for rater, found in by_rater.items()}
+    times = {rater: float(np.median(relative)) for rater, relative in by_rater.items()}
     panel = np.array(list(times.values()))
     middle = float(np.median(panel))
     spread = DEVIATIONS * NORMAL * float(np.median(np.abs(panel - middle)))
