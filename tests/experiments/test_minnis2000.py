@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from engines.selection.drawn_units import PHONE_S, costs_of, inventory, target_of
-from experiments.conftest import few_sets, states
-from experiments.copies import SETTINGS, copied, renamed
+from experiments.conftest import SETTINGS, copied, few_sets, renamed, states
 from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import create_engine
 from lipmotion.engines.selection.concatenation import to_pieces
