@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from lipmotion_studio.study.analysis.analyse import compute_power, count_raters, plan_pairs, plan_ratings
+from lipmotion_studio.study.analysis.analyse import compute_power, count_raters, plan_study
 from lipmotion_studio.study.analysis.crossed import (
     BOTH,
     RANKS,
@@ -153,14 +153,14 @@ def test_the_number_of_raters_is_the_smallest_and_bound_by_sentences_that_differ
 
 
 def test_tables_of_raters():
-    rows = plan_ratings(USUAL, "mos", 12, 0.8)
+    rows = plan_study(USUAL, "mos", 12, 0.8)
     assert [row["difference"] for row in rows] == [0.1, 0.2, 0.3, 0.5, 1.0]
-    assert [row["difference"] for row in plan_ratings(USUAL, "ranking", 12, 0.8)] == [2, 5, 10, 20]
-    shares = plan_pairs(Components(0.05, 0.02, 0.6), 12, 0.8)
+    assert [row["difference"] for row in plan_study(USUAL, "ranking", 12, 0.8)] == [2, 5, 10, 20]
+    shares = plan_study(Components(0.05, 0.02, 0.6), "paired", 12, 0.8)
     assert [row["share"] for row in shares] == [0.55, 0.6, 0.65, 0.7, 0.75]
     needed = [row["raters"] for row in shares if row["raters"]]
     assert needed == sorted(needed, reverse=True)
-    assert plan_ratings(None, "mos", 12, 0.8) == plan_pairs(None, 12, 0.8) == plan_ratings(USUAL, "mos", 1, 0.8) == []
+    assert plan_study(None, "mos", 12, 0.8) == plan_study(USUAL, "mos", 1, 0.8) == []
 
 
 TABLE = np.random.default_rng(4).normal(3, 1, (7, 5)) + np.random.default_rng(5).normal(size=(7, 1))

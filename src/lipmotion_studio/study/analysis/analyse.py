@@ -182,22 +182,19 @@ def count_raters(components: Components, difference: float, sentences: int, powe
     return high if high <= MAX_RATERS else None
 
 
-def plan_ratings(components: Components | None, kind: str, sentences: int, power: float) -> list[Figures]:
-    """Return the raters needed for differences of means of a kind of judgement."""
-    if components is None or sentences < 2:
-        return []
-    differences: Sequence[float] = DIFFERENCES.get(kind, RANK_DIFFERENCES)
-    return [{"difference": d, "raters": count_raters(components, d, sentences, power)} for d in differences]
+def plan_study(components: Components | None, kind: str, sentences: int, power: float) -> list[Figures]:
+    """Return the raters needed for differences of means, or for preferences.
 
-
-def plan_pairs(components: Components | None, sentences: int, power: float) -> list[Figures]:
-    """Return the raters needed for preferences; ``components``: of ``paired.average_share_effects``."""
+    components : of ``average_difference_effects``, or of ``average_share_effects``
+    """
+    rows: list[Figures] = []
     if components is None or sentences < 2:
-        return []
-    rows = []
-    for share in SHARES:
+        return rows
+    for share in SHARES if kind == PAIRED else ():
         scaled = Components(*(share * (1 - share) * np.array(components)).tolist())
         rows.append({"share": share, "raters": count_raters(scaled, share - 0.5, sentences, power)})
+    for difference in () if kind == PAIRED else DIFFERENCES.get(kind, RANK_DIFFERENCES):
+        rows.append({"difference": difference, "raters": count_raters(components, difference, sentences, power)})
     return rows
 
 
@@ -275,14 +272,12 @@ def _list_parts(answers: Sequence[Answer], baseline: str | None, power: float, s
             pairs = tabulate_pairs(compared)
             components, planned = average_share_effects(pairs), sentences or len(pairs.sentences)
             part |= analyse_pairs(pairs)
-            needed = plan_pairs(components, planned, power)
         else:
             ratings = tabulate_ratings(mine)
             components, planned = average_difference_effects(ratings), sentences or ratings.values.shape[2]
             part |= analyse_ratings(ratings, baseline)
-            needed = plan_ratings(components, kind, planned, power)
         part |= {"variance": components._asdict() if components else None, "planned_sentences": planned}
-        part["raters_needed"] = needed
+        part["raters_needed"] = plan_study(components, kind, planned, power)
     return parts
 
 
