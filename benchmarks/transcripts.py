@@ -145,7 +145,7 @@ def _synthetic_sentences() -> list[tuple[NDArray[np.float32], list[Row]]]:
     texts = [text for text in texts if len(split_words(text)) > 2]
     voices = [voice for voice in list_installed() if voice.synthesiser == "flite"]
     spoken = [item for voice in voices for item in zip(texts, speak_sentences(texts, voice), strict=True)]
-    timed = [(text, audio.samples, _word_times(units)) for text, (audio, units) in spoken]
+    timed = [(text, audio.samples, _word_times(units)) for text, (audio, units, _) in spoken]
     return [
         (samples, rows)
         for text, samples, rows in timed
@@ -334,7 +334,7 @@ def _voiced(voices: Sequence[SyntheticVoice]) -> list[Said]:
     return [
         (audio.samples, split_words(text))
         for voice in voices
-        for text, (audio, _) in zip(texts, speak_sentences(texts, voice), strict=True)
+        for text, (audio, _, _) in zip(texts, speak_sentences(texts, voice), strict=True)
     ]
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.corpora import Corpus
 from lipmotion.errors import InputError
 from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
-from lipmotion.motion.mouth_region import HEIGHT, WIDTH
+from lipmotion.motion.mouth_region import CORNER, HEIGHT, WIDTH
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.request import Outputs
 from lipmotion.pipeline.training.channels import PICTURES
@@ -28,7 +28,6 @@ from lipmotion_faces.film.filmed_video import FILM, make_film
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import AS_PRINTED, STITCHING
 from lipmotion_faces.registry import make_face
-from lipmotion_faces.tracking.head_pose import map_region_to_image
 from lipmotion_faces.tracking.track import decode_footage, track_footage
 from lipmotion_faces.tracking.trackers import LIP_POINTS
 
@@ -77,7 +76,7 @@ class RecordedClip:
     @cached_property
     def to_frame(self) -> Array:
         """The maps from pixels of the mouth region to their positions in the image [shape=(T, 2, 3)]."""
-        return np.stack([map_region_to_image(one) for one in self.maps])
+        return lower_face.map_region(np.asarray(self.maps), 1, CORNER)
 
     @cached_property
     def lower_face_to_frame(self) -> Array:
@@ -130,7 +129,7 @@ def video_of(clips: Path, name: str) -> Path:
 def training_video(path: Path) -> tuple[Pictures, Array]:
     """Return the frames of a video, and the maps from the mouth region to them."""
     footage = track_footage(path)
-    maps = np.stack([map_region_to_image(one) for one in footage.face_to_image])
+    maps = lower_face.map_region(footage.face_to_image, 1, CORNER)
     return np.stack(list(decode_footage(footage))), maps
 
 

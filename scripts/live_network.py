@@ -52,9 +52,8 @@ from lipmotion.live.network import (
 )
 from lipmotion.meshes.fitting.shape_weights import viseme_curves
 from lipmotion.meshes.model.shape_names import VISEMES_15
-from lipmotion.motion import general_motion
 from lipmotion.motion.articulation import ARTICULATORS, measure_articulators
-from lipmotion.motion.network_steps import cut_random_piece
+from lipmotion.motion.network_steps import ENCODING_SCALE, GENERAL_SHAPE, cut_random_piece
 from lipmotion.motion.space import resample_track
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.curve_sets import make_curves
@@ -63,8 +62,8 @@ from lipmotion.speech.features.encoding import COMPONENTS
 from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.speech.sound.acoustic_conditions import apply_condition, mark_spoken
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
+from lipmotion.stats.networks import ConvolutionalNetwork
 from lipmotion.types import SPECTRUM_BANDS, Audio, Motion, Timeline, Track, Unit
 
 OUTPUT = Path(__file__).parents[1] / "src" / "lipmotion" / "models" / WEIGHTS
@@ -221,11 +220,11 @@ def take_weights(network: ConvolutionalNetwork, known: ConvolutionalNetwork) -> 
 
 def learn_general(lessons: list[Lesson]) -> dict[str, NDArray[np.float16]]:
     """Return the arrays of the general network, from the encoding in quiet and in conditions to articulators."""
-    shape, every = general_motion.SHAPE, GENERAL_EVERY
+    shape, every = GENERAL_SHAPE, GENERAL_EVERY
     sequences = [
         [
             TrainingSequence(
-                encoding[::every] * general_motion.ENCODING_SCALE,
+                encoding[::every] * ENCODING_SCALE,
                 targets[::every, : len(ARTICULATORS)],
                 np.ones(-(-len(targets) // every), bool),
             )

@@ -36,11 +36,9 @@ def test_public_names_are_those_that_type_checkers_see() -> None:
     assert all(getattr(lipmotion, name).__module__.partition(".")[0] != "lipmotion" for name in added)
     for name, module in typed.items():
         assert getattr(lipmotion, name) is getattr(importlib.import_module(module), name)
-
-
-def test_an_unknown_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="module 'lipmotion' has no attribute 'animat'"):
         _ = lipmotion.animat
+    assert (Path(lipmotion.__file__).parent / "py.typed").is_file()
 
 
 def test_heavy_packages_are_imported_when_they_are_needed() -> None:
@@ -56,27 +54,14 @@ def test_heavy_packages_are_imported_when_they_are_needed() -> None:
     assert done.stderr.strip() == "[]"
 
 
-def test_the_package_is_typed() -> None:
-    assert (Path(lipmotion.__file__).parent / "py.typed").is_file()
-
-
 CLASSES: list[Any] = [value for _, value in inspect.getmembers(errors, inspect.isclass)]
-EXIT_CODES = {
-    "InputError": 3,
-    "CorpusError": 4,
-    "AlignmentError": 5,
-    "ModelFormatError": 6,
-    "ExportError": 7,
-    "MissingDependencyError": 8,
-}
+NAMES = ("InputError", "CorpusError", "AlignmentError", "ModelFormatError", "ExportError", "MissingDependencyError")
+EXIT_CODES = dict(zip(NAMES, range(3, 9), strict=True))
 """As ``lipmotion --help`` lists them: scripts depend on these numbers."""
 
 
 def test_every_error_has_its_exit_code() -> None:
     assert {kind.__name__: kind.exit_code for kind in CLASSES if kind is not LipMotionError} == EXIT_CODES
-
-
-def test_all_are_caught_as_one_and_some_are_what_python_calls_them() -> None:
     assert all(issubclass(kind, LipMotionError) for kind in CLASSES)
     assert issubclass(InputError, ValueError)
     assert issubclass(MissingDependencyError, ImportError)

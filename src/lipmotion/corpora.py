@@ -111,7 +111,7 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
         "notes": utterance.track.notes,
         "source": utterance.source,
         "settings": settings,
-        "checksums": {name: _compute_checksum(array) for name, array in arrays.items()},
+        "checksums": {name: zlib.crc32(array.tobytes()) for name, array in arrays.items()},
     }
     if crops is not None:  # read only where they are used, without a checksum
         arrays["crops"] = crops.astype(np.uint8)
@@ -147,10 +147,6 @@ def read_entry(folder: Path) -> dict[str, Any]:
     except (OSError, ValueError) as error:
         raise _damaged(folder, error) from error
     return entry
-
-
-def _compute_checksum(array: NDArray[Any]) -> int:
-    return zlib.crc32(array.tobytes())
 
 
 def _load(folder: Path, name: str) -> NDArray[Any]:
@@ -252,9 +248,8 @@ class Corpus:
         except (KeyError, InputError) as error:
             what = f"the list of utterances is damaged ({error})"
             raise CorpusError(f"{file}: {what}; prepare the corpus again") from error
-        for name in index:
-            if not is_utterance_name(name):
-                raise CorpusError(f"{file}: the utterance {name!r} is not listed as one; prepare the corpus again")
+        if wrong := [name for name in index if not is_utterance_name(name)]:
+            raise CorpusError(f"{file}: the utterance {wrong[0]!r} is not listed as one; prepare the corpus again")
         return cls(path, index)
 
     @classmethod
@@ -345,9 +340,7 @@ class Corpus:
 
     def summary(self) -> dict[str, str]:
         """Return a description of the corpus for users, by keyword."""
-        seconds = sum(float(entry["duration_s"]) for entry in self._index.values())
-        frames = sum(int(entry["frames"]) for entry in self._index.values())
-        unseen = sum(int(entry["unseen_frames"]) for entry in self._index.values())
+        seconds, frames, unseen = (sum(entry[name] for entry in self._index.values()) for name in _COUNTS)
         sources = [read_entry(self.folder(name)) for name in self.names()]
         speakers = []
         for speaker, (count, spoken_s) in self.speakers.items():
@@ -398,7 +391,7 @@ class Corpus:
             motion = Motion(arrays["motion"].astype(np.float64), entry["rate_hz"], channels)
             check_curves(motion)
             for array, checksum in entry.get("checksums", {}).items():
-                if array in arrays and _compute_checksum(arrays[array]) != checksum:
+                if array in arrays and zlib.crc32(arrays[array].tobytes()) != checksum:
                     raise ValueError(f"{array} holds other bytes than were written")
             phones = entry.get("phones")
             if phones is not None:
@@ -480,8 +473,7 @@ def _open_remote(url: str) -> tuple[Path, Callable[[str], None]]:
 
 
 def _summary(entry: dict[str, Any]) -> dict[str, Any]:
-    listed = {key: entry[key] for key in ("split", "duration_s", "frames", "unseen_frames")}
-    return listed | {"speaker": entry.get("speaker", "")}
+    return {key: entry[key] for key in ("split", *_COUNTS)} | {"speaker": entry.get("speaker", "")}
 
 
 _COUNTS = ("duration_s", "frames", "unseen_frames")

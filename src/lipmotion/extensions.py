@@ -43,14 +43,9 @@ def find_version() -> str:
 def install_command(extra: str) -> str:
     """Return the command that installs an extra of lipmotion, as a shell takes it.
 
-    It names the folder or wheel that lipmotion was installed from, or runs in, where that is there: an index need not
-    have lipmotion.
+    It names the folder or wheel that lipmotion was installed from, as pip has recorded it (PEP 610), or runs in, where
+    that is there: an index need not have lipmotion.
     """
-    return f'pip install "{_find_origin()}[{extra}]"'
-
-
-def _find_origin() -> str:
-    """Return the path that lipmotion was installed from, as pip has recorded it (PEP 610); without one its name."""
     import json
     from urllib.parse import urlsplit
     from urllib.request import url2pathname
@@ -59,10 +54,11 @@ def _find_origin() -> str:
         record = metadata.distribution(PACKAGE).read_text("direct_url.json") or "{}"
         url = urlsplit(json.loads(record).get("url", ""))
         origin = url2pathname(url.path) if url.scheme == "file" else ""
+        is_there = origin and Path(origin).exists()
     except metadata.PackageNotFoundError:
         origin = str(Path(__file__).parents[2])
-        return origin if (Path(origin) / "pyproject.toml").is_file() else "lipmotion"
-    return origin if origin and Path(origin).exists() else "lipmotion"
+        is_there = (Path(origin) / "pyproject.toml").is_file()
+    return f'pip install "{origin if is_there else PACKAGE}[{extra}]"'
 
 
 @dataclass(frozen=True)
@@ -93,15 +89,15 @@ class Registry(Generic[ExtensionT]):
 
         Raises InputError: none has this name, the package that adds it cannot be imported, or it is of another kind.
         """
-        found = self._find(name)
+        loaded = self._import(name)
         if self.base is not None:
-            fits = isinstance(found, type) and issubclass(found, self.base)
-            if not fits or (self.named and getattr(found, "name", "") != name):
+            fits = isinstance(loaded, type) and issubclass(loaded, self.base)
+            if not fits or (self.named and getattr(loaded, "name", "") != name):
                 required = f"a class of {self.base.__name__}{' of this name' * self.named}"
-                raise InputError(f"the {self.kind} {name!r} of an installed package is {found!r}, required {required}")
-        return found
+                raise InputError(f"the {self.kind} {name!r} of an installed package is {loaded!r}, required {required}")
+        return loaded
 
-    def _find(self, name: str) -> ExtensionT:
+    def _import(self, name: str) -> ExtensionT:
         if name in self.built_in:
             module, _, attribute = self.built_in[name].partition(":")
             return getattr(import_module(module), attribute)
@@ -117,7 +113,7 @@ class Registry(Generic[ExtensionT]):
             raise
         except BaseException as error:  # also sys.exit(), which would end the program without a word
             raise InputError(
-                f"the {self.kind} {name!r} cannot be imported from the {_origin(entry)}: {_said(error)}; install a "
+                f"the {self.kind} {name!r} cannot be imported from the {_locate(entry)}: {_describe(error)}; install a "
                 "version of the package that works with this lipmotion, or remove it"
             ) from error
         return added
@@ -162,7 +158,9 @@ def describe_failed_extension(error: BaseException) -> str | None:
         package = entry.value.partition(":")[0].partition(".")[0].strip()
         if package in modules:
             _, file, line = next(frame for frame in reversed(frames) if frame[0] == package)
-            return f"the {_origin(entry)} failed: {_said(error)} ({file}, line {line}); tell its authors, or remove it"
+            return (
+                f"the {_locate(entry)} failed: {_describe(error)} ({file}, line {line}); tell its authors, or remove it"
+            )
     return None
 
 
@@ -177,16 +175,16 @@ def _entries(group: str) -> Iterator[metadata.EntryPoint]:
             except Exception as reason:
                 raise InputError(
                     f"entry_points.txt of the package {distribution.metadata['Name']!r} cannot be read: "
-                    f"{_said(reason)}; install the package again, or remove it"
+                    f"{_describe(reason)}; install the package again, or remove it"
                 ) from error
         raise
 
 
-def _origin(entry: metadata.EntryPoint) -> str:
+def _locate(entry: metadata.EntryPoint) -> str:
     """Return what tells an entry point from all others: its package, its name and its value."""
     package = "" if entry.dist is None else f" {entry.dist.metadata['Name']!r}"
     return f"package{package} (entry point {entry.name} = {entry.value} of {entry.group})"
 
 
-def _said(error: BaseException) -> str:
+def _describe(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

@@ -12,12 +12,22 @@ from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.fitting.eyes_and_brows import stage_liveliness as stage_liveliness  # noqa: PLC0414 (part of this module's interface)
+from lipmotion.meshes.fitting.eyes_and_brows import stage_liveliness
 from lipmotion.types import Motion, Prosody, Timeline, Unit
-from lipmotion.types.delivery import SCENE as SCENE  # noqa: PLC0414 (part of this module's interface)
-from lipmotion.types.delivery import SMALLEST_PX as SMALLEST_PX  # noqa: PLC0414 (part of this module's interface)
-from lipmotion.types.delivery import TRANSPARENT as TRANSPARENT  # noqa: PLC0414 (part of this module's interface)
-from lipmotion.types.delivery import Staging as Staging  # noqa: PLC0414 (part of this module's interface)
+from lipmotion.types.delivery import SCENE, SMALLEST_PX, TRANSPARENT, Staging
+
+__all__ = [
+    "SCENE",
+    "SMALLEST_PX",
+    "TRANSPARENT",
+    "DrawnMotion",
+    "DrawsSingly",
+    "Face",
+    "Picture",
+    "Stageable",
+    "Staging",
+]
+__all__ += ["rotate_head", "stage_liveliness"]
 
 PoseT = TypeVar("PoseT")
 Picture = NDArray[np.uint8]

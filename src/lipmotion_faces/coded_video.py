@@ -19,6 +19,7 @@ from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_err
 from lipmotion.storage.sources import MAX_PIXELS, bound_allocations, read_x264
 
 Frame = NDArray[np.uint8]
+Stream = NDArray[np.uint8]
 ReadFrames = Callable[[int, int], Iterable[Frame]]
 
 MAX_DECODED_BYTES = 160 * 2**20
@@ -56,23 +57,16 @@ class FrameGroups:
         if not 0 <= index < len(self):
             raise IndexError(f"frame {index} of {len(self)}")
         group = bisect_right(self._starts, index) - 1
-        if group in self._groups:
-            self._groups.move_to_end(group)
-        else:
-            self._decode(group)
+        if group not in self._groups:
+            while len(self._groups) > 1:
+                largest = max(sum(frame.nbytes for frame in frames) for frames in self._groups.values())
+                if (len(self._groups) + 1) * largest <= self._most_bytes:
+                    break
+                self._groups.popitem(last=False)
+            self._groups[group] = list(self._read(self._starts[group], self._starts[group + 1]))
+        self._groups.move_to_end(group)
         return self._groups[group][index - self._starts[group]]
 
-    def _decode(self, group: int) -> None:
-        while len(self._groups) > 1 and (len(self._groups) + 1) * self._find_largest() > self._most_bytes:
-            self._groups.popitem(last=False)
-        self._groups[group] = list(self._read(self._starts[group], self._starts[group + 1]))
-
-    def _find_largest(self) -> int:
-        return max(sum(frame.nbytes for frame in group) for group in self._groups.values())
-
-
-Pictures = NDArray[np.uint8]
-Stream = NDArray[np.uint8]
 
 VIDEO_CRF = 18.0
 """Quality of a stored background: x264's constant rate factor, 0 (lossless) to 51; smaller is better."""
@@ -128,12 +122,12 @@ class StoredVideo:
         """
         return FrameGroups(self._decode_range, self._layout[1])
 
-    def decode(self, order: Iterable[int]) -> Iterator[Pictures]:
+    def decode(self, order: Iterable[int]) -> Iterator[Frame]:
         """Yield frames by their numbers, in any order; as ``open_groups``."""
         groups = self.open_groups()
         return (groups.decode(index) for index in order)
 
-    def _decode_range(self, start: int, stop: int) -> list[Pictures]:
+    def _decode_range(self, start: int, stop: int) -> list[Frame]:
         begins = self._layout[0]
         pictures = list(_decode(self.data, begins[start : stop + 1], self.size))
         if len(pictures) != stop - start:
@@ -144,9 +138,7 @@ class StoredVideo:
         return pictures
 
 
-def encode_video(
-    frames: Iterable[Pictures], rate_hz: float, *, crf: float = VIDEO_CRF, group: int = GROUP
-) -> StoredVideo:
+def encode_video(frames: Iterable[Frame], rate_hz: float, *, crf: float = VIDEO_CRF, group: int = GROUP) -> StoredVideo:
     """Return a video whose frames can be read in any order.
 
     frames  : uint8 RGB [shape=(H, W, 3)], all of one size, at least one; taken one at a time
@@ -166,7 +158,7 @@ def encode_video(
     return StoredVideo(data, float(rate_hz), (first.shape[0], first.shape[1]), len(parts))
 
 
-def encode_pictures(pictures: Pictures, crf: float = PICTURES_CRF) -> Stream:
+def encode_pictures(pictures: Frame, crf: float = PICTURES_CRF) -> Stream:
     """Return a stack of pictures in few bytes [shape=(bytes,)].
 
     pictures : uint8 RGB [shape=(N, H, W, 3)], at least one; each is smaller where it resembles the one before
@@ -181,7 +173,7 @@ def encode_pictures(pictures: Pictures, crf: float = PICTURES_CRF) -> Stream:
     return np.frombuffer(b"".join(_encode(pictures, crf, PICTURE_GROUP, "yuv444p")), np.uint8)
 
 
-def decode_pictures(data: Stream) -> Pictures:
+def decode_pictures(data: Stream) -> Frame:
     """Return the pictures of ``encode_pictures`` [shape=(N, H, W, 3)]. Raises ModelFormatError: they are damaged."""
     with format_errors("the stored pictures", _REMEDY, verb="are"):
         begins, _ = _read_layout(data)
@@ -234,7 +226,7 @@ STORED_VIDEO = {
 _REMEDY = "build the file again, or download it again"
 
 
-def _encode(frames: Iterable[Pictures], crf: float, group: int, pixel_format: str) -> Iterator[bytes]:
+def _encode(frames: Iterable[Frame], crf: float, group: int, pixel_format: str) -> Iterator[bytes]:
     import av
 
     if not 0 <= crf <= 51 or group < 1:
@@ -248,7 +240,13 @@ def _encode(frames: Iterable[Pictures], crf: float, group: int, pixel_format: st
                 raise InputError(f"a picture of shape {shape}, required (H, W, 3)")
             if shape[0] * shape[1] > MAX_PIXELS:
                 raise InputError(f"a picture of shape {shape}, required at most {MAX_PIXELS} pixels; scale the video")
-            context = _open_encoder(shape, crf, group, pixel_format)
+            context = av.CodecContext.create("libx264", "w")
+            step = 2 if pixel_format == "yuv420p" else 1
+            context.height, context.width = (-(-side // step) * step for side in shape[:2])
+            context.pix_fmt, context.time_base = pixel_format, Fraction(1, 25)
+            context.colorspace, context.color_range = _BT601, _LIMITED_RANGE
+            groups = f"keyint={group}:min-keyint={group}:scenecut=0:bframes=0:aud=1:repeat-headers=1:threads=1"
+            context.options = {"crf": f"{crf:g}", "preset": "medium", "x264-params": groups + read_x264()}
         if frame.shape != shape or frame.dtype != np.uint8:
             raise InputError(f"frame {n} is {frame.dtype} {frame.shape}, required uint8 {shape} as the first")
         rest = (context.height - shape[0], context.width - shape[1])
@@ -258,24 +256,6 @@ def _encode(frames: Iterable[Pictures], crf: float, group: int, pixel_format: st
         picture.pts = n
         yield from map(bytes, context.encode(picture))
     yield from map(bytes, context.encode(None))
-
-
-def _open_encoder(shape: tuple[int, ...], crf: float, group: int, pixel_format: str) -> Any:
-    import av
-
-    context: Any = av.CodecContext.create("libx264", "w")
-    step = 2 if pixel_format == "yuv420p" else 1
-    context.height, context.width = (-(-side // step) * step for side in shape[:2])
-    context.pix_fmt = pixel_format
-    context.time_base = Fraction(1, 25)
-    context.colorspace, context.color_range = _BT601, _LIMITED_RANGE
-    context.options = {
-        "crf": f"{crf:g}",
-        "preset": "medium",
-        "x264-params": f"keyint={group}:min-keyint={group}:scenecut=0:bframes=0:aud=1:repeat-headers=1:threads=1"
-        + read_x264(),
-    }
-    return context
 
 
 def _read_layout(data: Stream) -> tuple[list[int], list[int]]:
@@ -293,7 +273,7 @@ def _read_layout(data: Stream) -> tuple[list[int], list[int]]:
     return [*begins.tolist(), len(data)], [*groups.tolist(), len(frames)]
 
 
-def _decode(data: Stream, begins: Sequence[int], size: tuple[int, int] | None) -> Iterator[Pictures]:
+def _decode(data: Stream, begins: Sequence[int], size: tuple[int, int] | None) -> Iterator[Frame]:
     """Yield the frames of some groups. ``size`` : the size required. Raises ModelFormatError: they are damaged."""
     import av
 
@@ -304,16 +284,12 @@ def _decode(data: Stream, begins: Sequence[int], size: tuple[int, int] | None) -
     try:
         for packet in chain((av.Packet(data[start:stop].tobytes()) for start, stop in pairwise(begins)), [None]):
             for picture in context.decode(packet):
-                yield _as_rgb(picture, size)
+                height, width = size or (picture.height, picture.width)
+                if picture.is_corrupt or not (0 <= picture.height - height <= 1 and 0 <= picture.width - width <= 1):
+                    written = f"{picture.width} × {picture.height}"
+                    raise ValueError(f"a picture of {written} pixels, required {width} × {height}")
+                rgb = picture.reformat(format="rgb24", src_colorspace=_BT601, src_color_range=_LIMITED_RANGE)
+                yield rgb.to_ndarray()[:height, :width]
     except (av.FFmpegError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise ModelFormatError(f"the stored pictures are damaged ({reason}); {_REMEDY}") from error
-
-
-def _as_rgb(picture: Any, size: tuple[int, int] | None) -> Pictures:
-    height, width = size or (picture.height, picture.width)
-    if picture.is_corrupt or not (0 <= picture.height - height <= 1 and 0 <= picture.width - width <= 1):
-        raise ValueError(f"a picture of {picture.width} × {picture.height} pixels, required {width} × {height}")
-    picture = picture.reformat(format="rgb24", src_colorspace=_BT601, src_color_range=_LIMITED_RANGE)
-    rgb: Pictures = picture.to_ndarray()
-    return rgb[:height, :width]

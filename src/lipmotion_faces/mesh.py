@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple, final
@@ -17,7 +17,7 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter, DrivenPose
 from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
-from lipmotion.meshes.model.mesh import HEAD, LEFT_EYE, NECK, RIGHT_EYE, Bone
+from lipmotion.meshes.model.mesh import HEAD, LEFT_EYE, NECK, RIGHT_EYE
 from lipmotion.storage.files import atomic_file
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces import base
@@ -26,7 +26,7 @@ from lipmotion_faces.rendering.drawn_surface import Camera, TexturedCanvas, fill
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
-Turn = tuple[float, float, float]
+Turn = Sequence[float]
 
 SHARE_BELOW_MOUTH = 0.55
 """The picture shows as much below the mouth as this share of what is above it, up to the top of the head."""
@@ -52,8 +52,8 @@ class MeshPose(NamedTuple):
     """A character in one frame: of ``DrivenCharacter.poses``, angles of the head, and of the eyes, in radians."""
 
     row: DrivenPose
-    turn: tuple[float, float, float]
-    look: tuple[float, float]
+    turn: Turn
+    look: Sequence[float]
 
 
 @final
@@ -74,16 +74,11 @@ class MeshFace(base.Face):
         prosody: Prosody | None = None,
     ) -> None:
         self.staging = staging or base.Staging()
-        self._character, self._prosody, self._size = character, prosody, (width, height)
-
-    @property
-    def character(self) -> DrivenCharacter:
-        """The character that is shown."""
-        return self._character
+        self.character, self._prosody, self._size = character, prosody, (width, height)
 
     def with_staging(self, staging: base.Staging, prosody: Prosody | None = None) -> MeshFace:
         """Return the same character with other settings, and prosody for accents of brows and head."""
-        return MeshFace(self._character, *self._size, staging, prosody)
+        return MeshFace(self.character, *self._size, staging, prosody)
 
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
         return iter(self.draw(motion, units, fps=fps))
@@ -92,14 +87,10 @@ class MeshFace(base.Face):
         if not 0 < fps < np.inf:
             raise InputError(f"the frame rate is {fps}, required more than 0")
         time_s = frame_times(len(motion.values), motion.rate_hz, fps)
-        moved = base.stage_liveliness(time_s, with_mouth(motion), units, self.staging, self._prosody)
-        rows = self._character.poses(motion, units, time_s, eye_and_brow_weights(moved))
-        gaze = moved.gaze if not self._character.has_shape("eyeLookOutLeft") else np.zeros_like(moved.gaze)
-        turns, looks = moved.turn.tolist(), gaze.tolist()
-        poses = [
-            MeshPose(row, (yaw, pitch, roll), (across, up))
-            for row, (yaw, pitch, roll), (across, up) in zip(rows, turns, looks, strict=True)
-        ]
+        motions = base.stage_liveliness(time_s, with_mouth(motion), units, self.staging, self._prosody)
+        rows = self.character.poses(motion, units, time_s, eye_and_brow_weights(motions))
+        gaze = motions.gaze if not self.character.has_shape("eyeLookOutLeft") else np.zeros_like(motions.gaze)
+        poses = [MeshPose(*pose) for pose in zip(rows, motions.turn.tolist(), gaze.tolist(), strict=True)]
         return base.DrawnMotion(poses, lambda: self._painter, FRAMES_AHEAD)
 
     @cached_property
@@ -107,9 +98,9 @@ class MeshFace(base.Face):
         width, height = self._size
         if self.staging.size:
             width, height = max(2 * round(self.staging.size * 8 / 9), base.SMALLEST_PX), self.staging.size
-        stage = MeshStage(self._character, width, height, self.staging.colour)
+        stage = MeshStage(self.character, width, height, self.staging.colour)
         draw = stage.cut_out if self.staging.background == base.TRANSPARENT else stage.draw
-        return lambda pose: draw(self._character.place_vertices(pose.row), pose.turn, pose.look)
+        return lambda pose: draw(self.character.place_vertices(pose.row), pose.turn, pose.look)
 
 
 def write_picture(path: Path, character: DrivenCharacter) -> None:
@@ -156,11 +147,16 @@ class MeshStage:
         normals = compute_normals(self._join(self._rest), self._joined[mesh.triangles].astype(np.int32))[self._joined]
         self._normals = normals
         self._share, self._pivot = self._weigh_head(character, face)
-        self._eyes = [self._find_eye(bone) for bone in mesh.bones if bone.kind in (LEFT_EYE, RIGHT_EYE)]
+        self._eyes: list[tuple[Rows, Array, Array]] = []
+        for bone in mesh.bones:
+            if bone.kind in (LEFT_EYE, RIGHT_EYE):
+                held = self._rest[bone.rows[bone.shares > 0.5 * bone.shares.max()]]
+                middle = (held.min(axis=0) + held.max(axis=0)) / 2
+                self._eyes.append((bone.rows, bone.shares[:, None], middle))
         self._light, self._shine = self._light_vertices(self._rest, normals, np.arange(len(self._drawn.rows)))
         self._still = self._canvas.draw(self._rest[self._drawn.rows], self._light, self._shine)
 
-    def draw(self, vertices: Array, turn: Turn = STILL, gaze: tuple[float, float] = (0.0, 0.0)) -> base.Picture:
+    def draw(self, vertices: Array, turn: Turn = STILL, gaze: Sequence[float] = (0.0, 0.0)) -> base.Picture:
         """Return the picture of the mesh with its vertices at other places [shape=(H, W, 3)].
 
         vertices : in the frame and unit of the mesh [shape=(V, 3)]
@@ -175,13 +171,13 @@ class MeshStage:
         area = np.concatenate([places[drawn], self._rest[self._drawn.rows[drawn]]])
         return self._canvas.draw(places, light, shine, onto=self._still, moving=area)
 
-    def cut_out(self, vertices: Array, turn: Turn = STILL, gaze: tuple[float, float] = (0.0, 0.0)) -> base.Picture:
+    def cut_out(self, vertices: Array, turn: Turn = STILL, gaze: Sequence[float] = (0.0, 0.0)) -> base.Picture:
         """Return the same picture without background, with straight alpha [shape=(H, W, 4)]."""
         places, light, shine, _ = self._pose(vertices, turn, gaze)
         return self._canvas.cut_out(places, light, shine)
 
     def _pose(
-        self, vertices: Array, turn: Turn, gaze: tuple[float, float]
+        self, vertices: Array, turn: Turn, gaze: Sequence[float]
     ) -> tuple[Array, NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
         """Return places, light and highlights of the drawn vertices, and which vertices of the mesh have moved."""
         places, normals = self._place(vertices), self._normals.copy()
@@ -222,11 +218,6 @@ class MeshStage:
         if self._rest[face, 1].min() > 2 * NECK_TOP:  # a head without a neck
             return np.ones(len(self._rest)), PIVOT
         return smooth_step((self._rest[:, 1] - NECK_BOTTOM) / (NECK_TOP - NECK_BOTTOM)), PIVOT
-
-    def _find_eye(self, bone: Bone) -> tuple[Rows, Array, Array]:
-        """Return the vertices of an eye, how far each follows it [shape=(N, 1)], and its middle [shape=(3,)]."""
-        held = self._rest[bone.rows[bone.shares > 0.5 * bone.shares.max()]]
-        return bone.rows, bone.shares[:, None], (held.min(axis=0) + held.max(axis=0)) / 2
 
     def _join(self, vertices: Array) -> Array:
         """Return one vertex of each place [shape=(P, 3)]."""

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.testing.check_engine import require, require_error
-from lipmotion.testing.examples import example
+from lipmotion.testing.check_engine import example, require, require_error
 from lipmotion.types import Timeline, Unit
 from lipmotion_faces.base import TRANSPARENT, Face, Stageable, Staging
 

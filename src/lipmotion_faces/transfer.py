@@ -69,9 +69,20 @@ def map_onto(
     source, target = [], []
     for name, request, measured in _list_takes(opened, where, onto_speaker, speech):
         recognised = replace(request, recogniser=recogniser)
-        pair = measure_pair(model, person, name, recognised, measured, where, onto_speaker)
-        source.append(pair[0])
-        target.append(pair[1])
+        try:
+            analysed = analyse(model, recognised)
+        except AlignmentError:  # its transcript cannot be aligned
+            analysed = analyse(model, replace(recognised, transcript=None))
+        generated = generate_for(person, model.engine, model.learned, analysed).motion
+        if isinstance(measured, Track):
+            motion, valid = resample_track(measured, len(analysed.features.values))
+        else:
+            same = analyse(measured, Request(read_recording(recognised), units=analysed.units))
+            of_speaker = find_speaker_map(measured.speakers, onto_speaker)
+            motion = generate_for(of_speaker, measured.engine, measured.learned, same).motion
+            valid = np.ones(len(motion.values), bool)
+        source.append(Example(name, analysed, generated, valid))
+        target.append(Example(name, analysed, select_channels(motion, generated.channels, where), valid))
     spoken_s = count_speech_s(target)
     if spoken_s < MIN_SPEECH_S:
         raise InputError(
@@ -79,38 +90,6 @@ def map_onto(
             "recording in which the person speaks, with sound"
         )
     return fit_transfer_map(source, target)
-
-
-def measure_pair(
-    model: Model,
-    person: SpeakerMap | None,
-    name: str,
-    request: Request,
-    measured: Track | Model,
-    where: str,
-    speaker: str = "",
-) -> tuple[Example, Example]:
-    """Return what a model generates for a recording of another person, and this person's own motion in it.
-
-    person   : of the model; None: the mean person
-    name     : of the recording
-    measured : tracked motion, or the model that generates it
-    Raises InputError: the person's motion has other channels.
-    """
-    try:
-        speech = analyse(model, request)
-    except AlignmentError:  # its transcript cannot be aligned
-        speech = analyse(model, replace(request, transcript=None))
-    generated = generate_for(person, model.engine, model.learned, speech).motion
-    if isinstance(measured, Track):
-        motion, valid = resample_track(measured, len(speech.features.values))
-    else:
-        same = analyse(measured, Request(read_recording(request), units=speech.units))
-        of_speaker = find_speaker_map(measured.speakers, speaker)
-        motion = generate_for(of_speaker, measured.engine, measured.learned, same).motion
-        valid = np.ones(len(motion.values), bool)
-    motion = select_channels(motion, generated.channels, where)
-    return Example(name, speech, generated, valid), Example(name, speech, motion, valid)
 
 
 _Opened = Corpus | Model | FilmedFace | Path

@@ -16,7 +16,7 @@ from lipmotion.motion.network_steps import STEP, cut_random_piece, interpolate_s
 from lipmotion.motion.posterior_network import ROWS, fit_components, limit_logarithms
 from lipmotion.motion.space import MotionSpace, fit_reduced_motion
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
-from lipmotion.stats.recurrence import RecurrentNetwork, make_recurrent_network
+from lipmotion.stats.networks import RecurrentNetwork, make_recurrent_network
 from lipmotion.stats.trees import create_statistics, ridge
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.formats.markers import MILLIMETRES
+from lipmotion.formats.c3d import MILLIMETRES
 from lipmotion.measures import curves
 from lipmotion.measures.closures import find_threshold, measure_closures
 from lipmotion.measures.curves import measure_modulation_distance

@@ -85,7 +85,7 @@ def select_pieces(engine: SelectionEngine, model: SelectionModel, speech: Speech
     """Return the costs of a system, the phones of some speech, and the pieces that it chooses for them."""
     costs = model.costs(engine.config)
     target = build_target(model, costs, speech)
-    return costs, target, to_pieces(costs, target, select(costs, target).units)
+    return costs, target, to_pieces(costs, target, select(costs, target)[0])
 
 
 def list_overlaps(costs: Costs, target: Target, pieces: Sequence[Piece]) -> Array:

@@ -19,8 +19,7 @@ NAMES = ("jawOpen", "mouthSmileLeft", "tongueOut")
 
 @pytest.fixture
 def generation() -> Generation:
-    rng = np.random.default_rng(3)
-    moved = Motion(rng.random((121, 3)), 60.0, tuple(Channel(name, WEIGHT) for name in NAMES))
+    moved = Motion(np.random.default_rng(3).random((121, 3)), 60.0, tuple(Channel(name, WEIGHT) for name in NAMES))
     return of_motion(moved)
 
 
@@ -138,8 +137,7 @@ def test_curves_that_are_no_blendshapes_have_no_closures():
 
 
 def test_held_curves_are_not_interpolated_and_last_as_long_at_other_frames():
-    curves = {"browInnerUp": [0.0, 1.0, 0.0], "a": [0.0, 1.0, 0.0]}
-    found = at_frames(curves, [0.0, 0.1, 0.2], 20.0, ("a",))
+    found = at_frames({"browInnerUp": [0.0, 1.0, 0.0], "a": [0.0, 1.0, 0.0]}, [0.0, 0.1, 0.2], 20.0, ("a",))
     assert found["browInnerUp"] == pytest.approx([0, 0.5, 1, 0.5, 0])
     assert found["a"] == pytest.approx([0, 0, 1, 1, 0])
     jaw = np.repeat([0.3, 0.0, 0.4], [10, 10, 10]).tolist()

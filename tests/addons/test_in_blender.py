@@ -15,8 +15,7 @@ from programs import python_with, run_with
 
 __all__ = ["generation"]
 pytestmark = [pytest.mark.skipif(python_with("bpy") is None, reason="needs bpy (tests/programs)"), pytest.mark.long]
-ROUNDED = 6e-5
-"""The frames that show a closure are chosen among values of five decimals, or of six."""
+ROUNDED = 6e-5  # the frames that show a closure are chosen among values of five decimals, or of six
 RIG = "jaw.master.rotation.x,jawOpen,25\njaw.master[open],opening,1\n[lips],opening,2\n"
 
 
@@ -55,8 +54,7 @@ def compare(found: dict[str, Any], wanted: dict[str, list[float]], names: Path, 
     assert found["last"] == len(wanted["jawOpen"])
     for which in ("face", "other"):
         values = np.array([frame[which] for frame in found["frames"]])
-        expected = np.array([wanted[name] for name in listed]).T
-        assert np.abs(values - expected).max() < least
+        assert np.abs(values - np.array([wanted[name] for name in listed]).T).max() < least
     assert np.ptp([frame["face"][listed.index("jawOpen")] for frame in found["frames"]]) > 0.2
     assert found["strips"] == ["lipmotion sound"] * found["plays_sound"]
     assert found["end"] >= found["last"]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import selectors
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +54,7 @@ class _Loop(asyncio.SelectorEventLoop):
         return self.hurry.ahead_s
 
 
-def run(work: Coroutine[Any, Any, None], *, in_no_time: bool = True) -> None:
+def run(work: Coroutine[Any, Any, None], *, real_time: bool = False) -> None:
     """Run a coroutine to its end, in a clock in which computing takes no time and waiting neither; no task is left."""
 
     async def check() -> None:
@@ -62,12 +63,22 @@ def run(work: Coroutine[Any, Any, None], *, in_no_time: bool = True) -> None:
             await asyncio.sleep(0)
         assert asyncio.all_tasks() == {asyncio.current_task()}
 
-    loop = _Loop() if in_no_time else asyncio.new_event_loop()
+    loop = asyncio.new_event_loop() if real_time else _Loop()
     try:
         loop.run_until_complete(check())
     finally:
         loop.run_until_complete(loop.shutdown_asyncgens())
         loop.close()
+
+
+def in_no_time(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:
+    """Let ``run`` run a test."""
+
+    @wraps(test)
+    def run_test(**arguments: Any) -> None:
+        run(test(**arguments))
+
+    return run_test
 
 
 class Client:

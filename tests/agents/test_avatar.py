@@ -15,8 +15,8 @@ pytest.importorskip("livekit.agents", exc_type=ImportError)
 from livekit import rtc
 from livekit.agents.voice.avatar import AudioSegmentEnd, AvatarRunner, QueueAudioOutput
 
-from agents import read_speech, run
-from agents.test_livekit import bytes_of, frames_of
+from agents import in_no_time, read_speech, run
+from agents.test_livekit import bytes_of, frames_of, speak
 from lipmotion import Stream
 from lipmotion_agents.livekit_video import PICTURES_WAITING, AvatarVideo
 
@@ -36,59 +36,53 @@ async def read(video: AvatarVideo, pictures: int) -> list[Any]:
     return items
 
 
-def test_pictures_are_in_step_with_the_sound() -> None:
-    async def work() -> None:
-        video, sound = AvatarVideo("cartoon", size=96, sample_rate=16_000, seed=None), read_speech()[8_000:31_000]
-        for frame in frames_of(sound, [1_600, 77]):
-            await video.push_audio(frame)
-        await video.push_audio(AudioSegmentEnd())
-        items = await read(video, 40)
-        kinds = [type(item) for item in items]
-        assert kinds[: PICTURES_WAITING + 2] == [rtc.VideoFrame] * (PICTURES_WAITING + 1) + [rtc.AudioFrame]
-        chunks = [item for item in items if isinstance(item, rtc.AudioFrame)]
-        assert bytes_of(chunks) == sound.tobytes()
-        assert {chunk.duration for chunk in chunks[:-1]} == {0.04}
-        assert kinds.count(AudioSegmentEnd) == 1
-        assert kinds.index(AudioSegmentEnd) > items.index(chunks[-1])
+@in_no_time
+async def test_pictures_are_in_step_with_the_sound() -> None:
+    video, sound = AvatarVideo("cartoon", size=96, sample_rate=16_000, seed=None), read_speech()[8_000:31_000]
+    for frame in frames_of(sound, [1_600, 77]):
+        await video.push_audio(frame)
+    await video.push_audio(AudioSegmentEnd())
+    items = await read(video, 40)
+    kinds = [type(item) for item in items]
+    assert kinds[: PICTURES_WAITING + 2] == [rtc.VideoFrame] * (PICTURES_WAITING + 1) + [rtc.AudioFrame]
+    chunks = [item for item in items if isinstance(item, rtc.AudioFrame)]
+    assert bytes_of(chunks) == sound.tobytes()
+    assert {chunk.duration for chunk in chunks[:-1]} == {0.04}
+    assert kinds.count(AudioSegmentEnd) == 1
+    assert kinds.index(AudioSegmentEnd) > items.index(chunks[-1])
 
-        pictures = [picture_of(item) for item in items if isinstance(item, rtc.VideoFrame)]
-        changed = [np.abs(picture - pictures[-1]).mean() for picture in pictures]
-        stream = Stream(look_ahead_ms=320)
-        frames = stream.push(sound) + stream.flush()
-        opening = [frame["opening"] for frame in frames[::2]]
-        assert np.corrcoef(changed[: len(opening)], opening)[0, 1] > 0.8
-        assert changed[len(opening) + 3 :] == [0.0] * (40 - len(opening) - 3)
-
-    run(work())
+    pictures = [picture_of(item) for item in items if isinstance(item, rtc.VideoFrame)]
+    changed = [np.abs(picture - pictures[-1]).mean() for picture in pictures]
+    stream = Stream(look_ahead_ms=320)
+    frames = stream.push(sound) + stream.flush()
+    opening = [frame["opening"] for frame in frames[::2]]
+    assert np.corrcoef(changed[: len(opening)], opening)[0, 1] > 0.8
+    assert changed[len(opening) + 3 :] == [0.0] * (40 - len(opening) - 3)
 
 
-def test_an_interruption_rests_and_its_sound_is_forgotten() -> None:
-    async def work() -> None:
-        video = AvatarVideo("cartoon", size=96, sample_rate=16_000, seed=None)
-        (resting,) = [picture_of(item) for item in await read(video, 1)]
-        for frame in frames_of(read_speech()[8_000:24_000], [1_600]):
-            await video.push_audio(frame)
-        await read(video, 15)
-        video.clear_buffer()
-        items = await read(video, 10)
-        assert {type(item) for item in items} == {rtc.VideoFrame}
-        assert np.array_equal(picture_of(items[3]), resting)
-        sound = read_speech()[8_000:16_000]
-        for frame in frames_of(sound, [1_600]):
-            await video.push_audio(frame)
-        await video.push_audio(AudioSegmentEnd())
-        items = await read(video, 20)
-        assert bytes_of([item for item in items if isinstance(item, rtc.AudioFrame)]) == sound.tobytes()
-
-    run(work())
+@in_no_time
+async def test_an_interruption_rests_and_its_sound_is_forgotten() -> None:
+    video = AvatarVideo("cartoon", size=96, sample_rate=16_000, seed=None)
+    (resting,) = [picture_of(item) for item in await read(video, 1)]
+    for frame in frames_of(read_speech()[8_000:24_000], [1_600]):
+        await video.push_audio(frame)
+    await read(video, 15)
+    video.clear_buffer()
+    items = await read(video, 10)
+    assert {type(item) for item in items} == {rtc.VideoFrame}
+    assert np.array_equal(picture_of(items[3]), resting)
+    sound = read_speech()[8_000:16_000]
+    for frame in frames_of(sound, [1_600]):
+        await video.push_audio(frame)
+    await video.push_audio(AudioSegmentEnd())
+    items = await read(video, 20)
+    assert bytes_of([item for item in items if isinstance(item, rtc.AudioFrame)]) == sound.tobytes()
 
 
-def test_eyes_and_head_move_in_silence() -> None:
-    async def work() -> None:
-        pictures = [picture_of(item) for item in await read(AvatarVideo("cartoon", size=96, sample_rate=16_000), 40)]
-        assert sum(not np.array_equal(*pair) for pair in itertools.pairwise(pictures)) > 20
-
-    run(work())
+@in_no_time
+async def test_eyes_and_head_move_in_silence() -> None:
+    pictures = [picture_of(item) for item in await read(AvatarVideo("cartoon", size=96, sample_rate=16_000), 40)]
+    assert sum(not np.array_equal(*pair) for pair in itertools.pairwise(pictures)) > 20
 
 
 def test_the_runner_publishes_it() -> None:
@@ -108,9 +102,7 @@ def test_the_runner_publishes_it() -> None:
         )
         runner = AvatarRunner(room, audio_recv=output, video_gen=video, options=video.options)  # type: ignore[arg-type]
         await runner.start()
-        for frame in frames_of(read_speech()[8_000:16_000], [1_600]):
-            await output.capture_frame(frame)
-        output.flush()
+        await speak(output, frames_of(read_speech()[8_000:16_000], [1_600]))
         event = await output.wait_for_playout()
         assert (event.interrupted, event.playback_position) == (False, pytest.approx(0.5))
         for frame in frames_of(read_speech()[8_000:24_000], [1_600]):
@@ -123,4 +115,4 @@ def test_the_runner_publishes_it() -> None:
         assert event.playback_position < 1.0
         await runner.aclose()
 
-    run(work(), in_no_time=False)
+    run(work(), real_time=True)

@@ -23,7 +23,7 @@ from lipmotion_faces.appearance.candidates import (
     sharpen,
     square_distances,
 )
-from oracles.components import components, share
+from oracles.statistics import components, share
 
 
 def pictures(seed: int = 0, count: int = 40, height: int = 9, width: int = 12) -> np.ndarray:
@@ -197,9 +197,8 @@ def test_the_search_finds_the_cheapest_of_all_sequences(space: Eigenlips, togeth
     options = RefinementOptions(together, steadiness=2.0, neighbours=5)
     wanted = space.project(HELD_OUT[:4])
     chosen = Refiner(space, candidates, options).choose(wanted)
-    low = [
-        np.square(a[:, None] - b).sum(axis=2) for a, b in zip(np.split(wanted, 3, 1), candidates.by_colour, strict=True)
-    ]
+    colours_of = (np.split(each, 3, 1) for each in (wanted, candidates.coefficients))
+    low = [np.square(a[:, None] - b).sum(axis=2) for a, b in zip(*colours_of, strict=True)]
     for colours in ([0, 1, 2],) if together else ([0], [1], [2]):
 
         def cost(path: tuple[int, ...], colours: list[int] = colours) -> float:

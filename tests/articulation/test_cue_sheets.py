@@ -8,17 +8,8 @@ from hypothesis import strategies as st
 
 from formats.examples import result, spoken, timeline
 from lipmotion import CueSheet
-from lipmotion.articulation.cue_sheets import (
-    ANY_OPEN,
-    ANY_SHAPE,
-    PHONE_SHAPES,
-    choose_cues,
-    choose_hold_frames,
-    count_cue_frames,
-    frame_to_seconds,
-    lay_out_cues,
-    list_phone_shapes,
-)
+from lipmotion.articulation import cue_sheets
+from lipmotion.articulation.cue_sheets import choose_cues, list_phone_shapes
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent
 from lipmotion.units.phones import OPTIONAL, SHAPES, choose_drawn_shape
@@ -109,8 +100,7 @@ def test_p_b_m_win_over_f_v_where_there_is_no_room_for_both() -> None:
 
 
 def test_a_shape_is_there_with_its_sound_or_a_frame_before() -> None:
-    sheet = choose_cues(spoken("s aa s aa s", 0.2))
-    starts = [cue.start_s for cue in sheet.cues if cue.label == "D"]
+    starts = [cue.start_s for cue in choose_cues(spoken("s aa s aa s", 0.2)).cues if cue.label == "D"]
     for start_s, sound_s in zip(starts, (0.5, 0.9), strict=True):
         assert sound_s - 0.09 < start_s < sound_s + 0.01
 
@@ -162,12 +152,12 @@ def test_no_time_at_all_and_less_than_the_hold() -> None:
         (cue,) = choose_cues(result(timeline([("b", duration_s)])), 24.0, 4).cues
         assert (cue.start_s, cue.end_s, cue.label) == (0.0, duration_s, "A")
     for drawn, rest in (("ABCDEFX", "X"), ("ABCDEF", "A")):  # no segments are rest
-        (cue,) = lay_out_cues([], 0.0, 24, drawn).cues
+        (cue,) = cue_sheets.lay_out_cues([], 0.0, 24, drawn).cues
         assert (cue.start_s, cue.end_s, cue.label) == (0.0, 0.0, rest)
 
 
 def test_the_usual_hold_is_two_frames_at_24() -> None:
-    assert [choose_hold_frames(fps) for fps in (1, 12, 24, 25, 30, 48, 60)] == [1, 1, 2, 2, 3, 4, 5]
+    assert [cue_sheets.choose_hold_frames(fps) for fps in (1, 12, 24, 25, 30, 48, 60)] == [1, 1, 2, 2, 3, 4, 5]
 
 
 def test_phones_outside_the_motion() -> None:
@@ -179,10 +169,10 @@ def test_phones_outside_the_motion() -> None:
 
 
 def test_every_phone_but_h_has_shapes_whose_parts_are_the_whole() -> None:
-    assert set(PHONES) - set(PHONE_SHAPES) == {"hh"}
-    assert set(PHONE_SHAPES) <= set(PHONES)
-    assert list_phone_shapes("hh") == list_phone_shapes("a phone of another language") == ANY_OPEN
-    assert list_phone_shapes("") == ANY_SHAPE
+    assert set(PHONES) - set(cue_sheets.PHONE_SHAPES) == {"hh"}
+    assert set(cue_sheets.PHONE_SHAPES) <= set(PHONES)
+    assert list_phone_shapes("hh") == list_phone_shapes("a phone of another language") == cue_sheets.ANY_OPEN
+    assert list_phone_shapes("") == cue_sheets.ANY_SHAPE
     for phone in PHONES:
         assert sum(look.share for look in list_phone_shapes(phone)) == pytest.approx(1)
         for look in list_phone_shapes(phone):
@@ -209,7 +199,7 @@ RATES = [1, 10, 12, 15, 23.976, 24, 25, 29.97, 30, 48, 50, 59.94, 60]
 def test_times_in_hundredths_lead_back_to_their_frames() -> None:
     """Also where the time is rounded, as the Blender add-ons do."""
     for fps in RATES:
-        times_s = [frame_to_seconds(frame, fps) for frame in range(2_000)]
+        times_s = [cue_sheets.frame_to_seconds(frame, fps) for frame in range(2_000)]
         assert [int(fps * float(f"{time_s:.2f}")) for time_s in times_s] == list(range(2_000))
         assert fps >= 50 or [round(fps * time_s) for time_s in times_s] == list(range(2_000))
         assert all(before < after for before, after in pairwise(times_s))
@@ -219,8 +209,9 @@ def test_times_in_hundredths_lead_back_to_their_frames() -> None:
 def test_the_last_frame_begins_before_the_end() -> None:
     for fps in RATES:
         for duration_s in [0.0, 0.004, 0.01, 0.04, 0.0417, 0.05, 0.5, 1.0, 2.975, 3.0, 10.009, 60.0]:
-            frames = count_cue_frames(duration_s, fps)
-            sheet = lay_out_cues([(frame, "BC"[frame % 2]) for frame in range(frames)], duration_s, fps, "ABCDEF")
+            frames = cue_sheets.count_cue_frames(duration_s, fps)
+            drawn = [(frame, "BC"[frame % 2]) for frame in range(frames)]
+            sheet = cue_sheets.lay_out_cues(drawn, duration_s, fps, "ABCDEF")
             assert duration_s - 0.01 < sheet.duration_s <= duration_s
             assert frames == pytest.approx(duration_s * fps, abs=1.7)
             assert all(cue.start_s < cue.end_s for cue in sheet.cues) or duration_s < 0.01
@@ -231,4 +222,4 @@ def test_a_time_in_whole_hundredths_is_not_rounded_up() -> None:
         exact = {frame: frame * hundredths / 100 for frame in range(200)}
         kept = {frame: time_s for frame, time_s in exact.items() if int(fps * time_s) == frame}
         assert len(kept) > 150
-        assert [frame_to_seconds(frame, fps) for frame in kept] == pytest.approx(list(kept.values()))
+        assert [cue_sheets.frame_to_seconds(frame, fps) for frame in kept] == pytest.approx(list(kept.values()))

@@ -6,16 +6,8 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion import Delivery
+from lipmotion.articulation import delivery
 from lipmotion.articulation.contact import find_closures
-from lipmotion.articulation.delivery import (
-    choose_holds,
-    close_on_frame_grid,
-    delay_units,
-    find_closed_times,
-    hold_poses,
-    intensify,
-    shift_in_time,
-)
 from lipmotion.errors import InputError
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 from meshes.speech import motion, units
@@ -41,7 +33,7 @@ def test_values_out_of_their_ranges() -> None:
 
 
 def test_the_mouth_moves_earlier_and_the_phones_with_it(said: Generation) -> None:
-    early = shift_in_time(said, Delivery(anticipation_ms=40))
+    early = delivery.shift_in_time(said, Delivery(anticipation_ms=40))
     assert early.motion["opening"][:-4] == pytest.approx(said.motion["opening"][4:])
     assert len(early.motion.values) == len(said.motion.values)
     assert early.units[1].start_s == pytest.approx(said.units[1].start_s - 0.04)
@@ -50,29 +42,29 @@ def test_the_mouth_moves_earlier_and_the_phones_with_it(said: Generation) -> Non
 
 
 def test_everything_comes_later(said: Generation) -> None:
-    late = shift_in_time(said, Delivery(offset_ms=500))
+    late = delivery.shift_in_time(said, Delivery(offset_ms=500))
     assert len(late.motion.values) == len(said.motion.values) + 50
     assert late.motion["opening"][50:] == pytest.approx(said.motion["opening"])
     assert late.motion["opening"][:50] == pytest.approx(said.motion["opening"][0])
     assert (late.units[0].start_s, late.units[1].start_s) == (0, 1.0)
-    assert delay_units(said.units, Delivery(offset_ms=500, anticipation_ms=80), 2.0) == late.units
+    assert delivery.delay_units(said.units, Delivery(offset_ms=500, anticipation_ms=80), 2.0) == late.units
 
 
 @pytest.mark.parametrize("offset_ms", [1000.0, -250.0])
 def test_phones_that_end_after_the_last_frame_are_not_cut(said: Generation, offset_ms: float) -> None:
     *spans, last = said.units
     longer = Timeline((*spans, replace(last, end_s=2.005)))
-    delivery, end_s = Delivery(offset_ms=offset_ms), pytest.approx(2.005 + offset_ms / 1000)
-    assert shift_in_time(replace(said, units=longer), delivery).units[len(spans)].end_s == end_s
-    assert delay_units(longer, delivery, 2.0)[len(spans)].end_s == end_s
+    late, end_s = Delivery(offset_ms=offset_ms), pytest.approx(2.005 + offset_ms / 1000)
+    assert delivery.shift_in_time(replace(said, units=longer), late).units[len(spans)].end_s == end_s
+    assert delivery.delay_units(longer, late, 2.0)[len(spans)].end_s == end_s
 
 
 def test_what_is_before_the_beginning_is_cut(said: Generation) -> None:
-    cut = shift_in_time(said, Delivery(offset_ms=-550))
+    cut = delivery.shift_in_time(said, Delivery(offset_ms=-550))
     assert cut.motion["opening"] == pytest.approx(said.motion["opening"][55:])
     assert (cut.units[0].label.phone, cut.units[0].start_s) == ("m", 0)
     with pytest.raises(InputError, match=r"the offset is -3000 ms, and the motion lasts 2\.00 s: nothing is left"):
-        shift_in_time(said, Delivery(offset_ms=-3000))
+        delivery.shift_in_time(said, Delivery(offset_ms=-3000))
 
 
 def test_closures_survive_a_shift_between_two_frames(said: Generation) -> None:
@@ -80,13 +72,14 @@ def test_closures_survive_a_shift_between_two_frames(said: Generation) -> None:
     column = said.motion.column("opening")
     spiky[90:101, column] = 0.1
     spiky[95, column] = 0.0
-    early = shift_in_time(replace(said, motion=replace(said.motion, values=spiky)), Delivery(anticipation_ms=33))
+    moved = replace(said, motion=replace(said.motion, values=spiky))
+    early = delivery.shift_in_time(moved, Delivery(anticipation_ms=33))
     assert early.motion["opening"][86:100].min() == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize("intensity", [0.5, 1.5, 2.0, 3.0])
 def test_movements_grow_and_closures_stay(said: Generation, intensity: float) -> None:
-    larger = intensify(said, intensity)
+    larger = delivery.intensify(said, intensity)
     before, after = said.motion["opening"], larger.motion["opening"]
     assert after.max() > before.max() if intensity > 1 else after.max() < before.max()
     assert after.max() <= 2 * before.max()
@@ -100,10 +93,9 @@ def test_movements_grow_and_closures_stay(said: Generation, intensity: float) ->
 
 
 def test_weights_stay_between_0_and_1(said: Generation) -> None:
-    time_s = said.motion.time_s
-    ramp = np.interp(time_s, [0.5, 0.9, 1.3], [0, 0.8, 0])[:, None]
+    ramp = np.interp(said.motion.time_s, [0.5, 0.9, 1.3], [0, 0.8, 0])[:, None]
     weights = Motion(np.hstack([ramp, ramp]), 100.0, (Channel("jawOpen", WEIGHT), Channel("protrusion", WEIGHT)))
-    larger = intensify(replace(said, motion=weights, spread=np.zeros((len(ramp), 2))), 3.0).motion
+    larger = delivery.intensify(replace(said, motion=weights, spread=np.zeros((len(ramp), 2))), 3.0).motion
     assert larger.values.min() >= 0
     assert larger.values.max() <= 1
     assert larger["jawOpen"][70] > weights["jawOpen"][70] > 0
@@ -111,9 +103,9 @@ def test_weights_stay_between_0_and_1(said: Generation) -> None:
 
 @pytest.mark.parametrize(("rate_hz", "frames"), [(24.0, 2), (25.0, 3), (100.0, 12)])
 def test_held_poses_last_long_enough_and_close(said: Generation, rate_hz: float, frames: int) -> None:
-    closed_s = find_closed_times(said)
+    closed_s = delivery.find_closed_times(said)
     assert len(closed_s) == 2
-    steps = hold_poses(close_on_frame_grid(said, rate_hz).resampled(rate_hz), frames, closed_s)
+    steps = delivery.hold_poses(delivery.close_on_frame_grid(said, rate_hz).resampled(rate_hz), frames, closed_s)
     changes = np.flatnonzero(np.abs(np.diff(steps.motion.values, axis=0)).max(axis=1) > 1e-12) + 1
     assert np.diff([0, *changes, len(steps.motion.values)]).min() >= frames
     for time_s in closed_s:
@@ -122,14 +114,14 @@ def test_held_poses_last_long_enough_and_close(said: Generation, rate_hz: float,
 
 
 def test_holds_in_frames() -> None:
-    for delivery, rate_hz, frames in (
+    for settings, rate_hz, frames in (
         (Delivery(), 24, 0),
         (Delivery(stepped=True), 24, 2),
         (Delivery(stepped=True), 100, 9),
         (Delivery(min_hold_ms=120), 25, 3),
         (Delivery(min_hold_ms=1), 25, 1),
     ):
-        assert delivery.hold_frames(rate_hz) == frames
+        assert settings.hold_frames(rate_hz) == frames
 
 
 def error(rows: NDArray[np.float64], borders: list[int], fixed: list[int]) -> float:
@@ -161,7 +153,7 @@ def test_no_division_is_nearer() -> None:
         hold = int(rng.integers(1, 6))
         rows = rng.normal(size=(int(rng.integers(2 * hold, 30)), 2)).cumsum(axis=0)
         fixed = sorted(rng.choice(len(rows), int(rng.integers(0, 3)), replace=False).tolist())
-        borders = choose_holds(rows, hold, fixed)
+        borders = delivery.choose_holds(rows, hold, fixed)
         assert borders[0] == 0
         assert borders[-1] == len(rows)
         assert np.diff(borders).min() >= hold
@@ -170,8 +162,8 @@ def test_no_division_is_nearer() -> None:
 
 def test_a_curve_of_steps_is_found_again_and_few_frames_are_one_pose() -> None:
     rows = np.repeat([0.0, 3.0, 1.0, 2.0], [5, 4, 6, 7])[:, None]
-    borders = choose_holds(rows, 4)
+    borders = delivery.choose_holds(rows, 4)
     assert {5, 9, 15} <= set(borders)
     assert error(rows, borders, []) == pytest.approx(0, abs=1e-12)
     for frames, borders in ((0, [0]), (1, [0, 1]), (7, [0, 7])):
-        assert choose_holds(np.arange(frames, dtype=float)[:, None], 4) == borders
+        assert delivery.choose_holds(np.arange(frames, dtype=float)[:, None], 4) == borders

@@ -26,8 +26,7 @@ def motion(rate_hz: float = 25.0, **curves: list[float] | np.ndarray) -> Motion:
 
 def in_phone(phone: str, opening: float = 0.06, width: float = 0.57) -> dict[str, float]:
     """Return the mouth in the middle of a phone after silence, whatever is measured there."""
-    wide = np.where(np.arange(101) < 25, 0.57, width)
-    moved = motion(100.0, opening=np.full(101, opening), width=wide)
+    moved = motion(100.0, opening=np.full(101, opening), width=np.where(np.arange(101) < 25, 0.57, width))
     return list(find_mouth(moved, said((0, 0.2, "sil"), (0.3, 0.7, phone))).rows())[50]
 
 
@@ -56,8 +55,7 @@ def test_speakers_with_different_rest_poses_move_alike():
 
 
 def test_the_rest_is_taken_from_silence():
-    width = np.r_[np.full(50, 0.5), np.full(50, 0.6)]
-    still = motion(opening=np.r_[np.full(50, 0.02), np.zeros(50)], width=width)
+    still = motion(opening=np.r_[np.full(50, 0.02), np.zeros(50)], width=np.r_[np.full(50, 0.5), np.full(50, 0.6)])
     assert find_mouth(still, NOTHING_SAID).width[75] == pytest.approx(1)
     units = said((0, 2, "sil"), (2, 4, "p"))
     assert find_mouth(still, units).width[25] == pytest.approx(1)

@@ -16,8 +16,7 @@ def said(*phones: str, each_s: float = 0.12) -> Timeline[Unit]:
 
 
 def middle(phones: tuple[str, ...], number: int, name: str) -> float:
-    time_s = np.array([(number + 0.5) * 0.12])
-    return float(gesture_curves(said(*phones), time_s, [name])[name][0])
+    return float(gesture_curves(said(*phones), np.array([(number + 0.5) * 0.12]), [name])[name][0])
 
 
 def test_a_phone_reaches_its_target_whatever_is_beside_it():

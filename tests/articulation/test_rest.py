@@ -2,23 +2,10 @@ import numpy as np
 import pytest
 
 from formats.examples import of_motion
+from lipmotion.articulation import rest
 from lipmotion.articulation.contact import CLOSED_OPENING
 from lipmotion.articulation.mouth import find_mouth
-from lipmotion.articulation.rest import (
-    BREATH_GAP,
-    INHALING_GAP,
-    LARGEST_REST,
-    LAUGH_GAP,
-    LAUGH_SHARE,
-    NATURAL,
-    OPENING_S,
-    REST,
-    find_rest_frames,
-    measure_at_rest,
-    rest_in_pauses,
-    share_short_pauses,
-    weigh_pauses,
-)
+from lipmotion.articulation.rest import REST, rest_in_pauses
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit, VoiceEvent
 from lipmotion.types.audio import BREATH, LAUGHTER
@@ -32,12 +19,12 @@ def motion(opening: list[float], name: str = "opening") -> Motion:
 
 
 def rests(*given) -> list[int]:
-    return np.flatnonzero(find_rest_frames(*given)).tolist()
+    return np.flatnonzero(rest.find_rest_frames(*given)).tolist()
 
 
 def test_silence_is_rest_unless_it_is_open_and_else_the_most_closed_frames_are():
     assert rests(motion([0.01] * 2 + [0.1] * 9), SILENCE) == [0, 1]
-    opening = [LARGEST_REST + 0.02] * 2 + [0.1] * 8 + [0.0]
+    opening = [rest.LARGEST_REST + 0.02] * 2 + [0.1] * 8 + [0.0]
     assert rests(motion(opening), SILENCE) == rests(motion(opening), Timeline(())) == [10]
 
 
@@ -49,10 +36,10 @@ def test_where_no_opening_is_known_silence_counts_or_else_everything():
 
 
 def test_sizes_at_rest_are_positive():
-    rest = np.array([True, False])
-    assert measure_at_rest("width", np.array([0.5, 0.6]), rest) == pytest.approx(0.5)
+    silent = np.array([True, False])
+    assert rest.measure_at_rest("width", np.array([0.5, 0.6]), silent) == pytest.approx(0.5)
     with pytest.raises(InputError, match="the width is 0 at rest, required more than 0"):
-        measure_at_rest("width", np.array([0.0, 0.6]), rest)
+        rest.measure_at_rest("width", np.array([0.0, 0.6]), silent)
 
 
 TIME_S = np.arange(301) / 100
@@ -68,7 +55,7 @@ LINE = said((0, 0.4, "sil"), (0.4, 1.0, "aa"), (1.0, 1.5, "sp"), (1.5, 2.0, "aa"
 
 
 def test_the_mouth_rests_in_pauses_and_at_both_ends_and_goes_on_in_short_ones():
-    weight = weigh_pauses(LINE, TIME_S)
+    weight = rest.weigh_pauses(LINE, TIME_S)
     assert weight[:25] == pytest.approx(1)
     assert weight[122:136] == pytest.approx(1)
     assert weight[300] == pytest.approx(1)
@@ -81,10 +68,10 @@ def test_nothing_moves_earlier_than_the_opening_time_before_a_phrase():
     moved = rest_in_pauses(generation(LINE), REST)
     opening = moved.motion["opening"]
     for start_s in (0.4, 1.5):
-        before = opening[round((start_s - 0.2) * 100) : round((start_s - OPENING_S) * 100)]
+        before = opening[round((start_s - 0.2) * 100) : round((start_s - rest.OPENING_S) * 100)]
         assert np.ptp(before) < 1e-9
         assert before.max() <= CLOSED_OPENING
-        assert opening[round(start_s * 100) - 4] >= BREATH_GAP - 1e-9
+        assert opening[round(start_s * 100) - 4] >= rest.BREATH_GAP - 1e-9
     assert opening[60] == pytest.approx(0.1)
     mouth = find_mouth(moved.motion, LINE)
     assert mouth.contact[[0, 20, 125, 135, 300]].all()
@@ -93,13 +80,12 @@ def test_nothing_moves_earlier_than_the_opening_time_before_a_phrase():
 
 def test_a_phrase_that_begins_with_closed_lips_takes_no_breath():
     units = said((0, 1, "sil"), (1, 1.2, "m"), (1.2, 2.5, "aa"), (2.5, 3.0, "sil"))
-    moved = rest_in_pauses(generation(units, 0.01), REST)
-    assert moved.motion["opening"][80:110].max() <= 0.0101
+    assert rest_in_pauses(generation(units, 0.01), REST).motion["opening"][80:110].max() <= 0.0101
 
 
 def test_natural_pauses_and_motion_without_pauses_stay_as_they_are():
-    assert rest_in_pauses(generation(LINE), NATURAL).motion is not None
-    for units, style in ((LINE, NATURAL), (said((0, 3, "aa")), REST), (Timeline(()), REST)):
+    assert rest_in_pauses(generation(LINE), rest.NATURAL).motion is not None
+    for units, style in ((LINE, rest.NATURAL), (said((0, 3, "aa")), REST), (Timeline(()), REST)):
         given = generation(units)
         assert rest_in_pauses(given, style) is given
 
@@ -108,12 +94,11 @@ def test_a_pin_in_a_pause_holds_and_all_silence_is_rest():
     moved = rest_in_pauses(generation(LINE), REST, [1.25])
     assert moved.motion["opening"][125] == pytest.approx(0.1)
     assert moved.motion["opening"][20] <= CLOSED_OPENING
-    silent = rest_in_pauses(generation(said((0, 3, "sil"))), REST)
-    assert silent.motion["opening"].max() <= CLOSED_OPENING
+    assert rest_in_pauses(generation(said((0, 3, "sil"))), REST).motion["opening"].max() <= CLOSED_OPENING
 
 
 def test_short_pauses_are_shared_by_the_phones_beside_them():
-    shared = share_short_pauses(LINE)
+    shared = rest.share_short_pauses(LINE)
     assert [span.label.phone for span in shared] == ["sil", "aa", "sp", "aa", "eh", "sil"]
     assert shared[3].end_s == pytest.approx(2.075)
     assert shared[4].start_s == pytest.approx(2.075)
@@ -126,20 +111,19 @@ QUIET = said((0, 2.0, "sil"), (2.0, 2.6, "aa"), (2.6, 3.0, "sil"))
 
 def test_a_breath_that_is_detected_parts_the_lips_and_they_close_after_it():
     opening = rest_in_pauses(generation(QUIET), REST, events=[VoiceEvent(0.8, 1.2, BREATH, 1.0)]).motion["opening"]
-    assert opening[90:111] == pytest.approx(INHALING_GAP)
+    assert opening[90:111] == pytest.approx(rest.INHALING_GAP)
     assert opening[[60, 140]].max() <= CLOSED_OPENING
     assert np.abs(np.diff(opening[60:140])).max() < 0.01
 
 
 def test_laughter_opens_the_mouth_with_its_calls_and_leaves_speech_alone():
     opening = rest_in_pauses(generation(QUIET), REST, events=[LAUGH]).motion["opening"]
-    assert opening[50] == pytest.approx(LAUGH_GAP, rel=0.02)
-    assert opening[100] == pytest.approx(LAUGH_SHARE * LAUGH_GAP, rel=0.02)
+    assert opening[50] == pytest.approx(rest.LAUGH_GAP, rel=0.02)
+    assert opening[100] == pytest.approx(rest.LAUGH_SHARE * rest.LAUGH_GAP, rel=0.02)
     assert opening[100] < opening[70] < opening[50]
     assert opening[160] <= CLOSED_OPENING
     assert opening[210:250] == pytest.approx(0.1)
-    speaking = rest_in_pauses(generation(LINE), REST, events=[LAUGH]).motion["opening"]
-    assert speaking[45:95] == pytest.approx(0.1)
+    assert rest_in_pauses(generation(LINE), REST, events=[LAUGH]).motion["opening"][45:95] == pytest.approx(0.1)
 
 
 def test_what_opens_with_the_mouth_in_speech_opens_with_it_in_laughter():
@@ -150,5 +134,4 @@ def test_what_opens_with_the_mouth_in_speech_opens_with_it_in_laughter():
     moving = of_motion(Motion(values, 100.0, plain.motion.channels), QUIET)
     moved = rest_in_pauses(moving, REST, events=[LAUGH]).motion
     assert moved["width"][50] == pytest.approx(0.6 - 0.5 * moved["opening"][50], abs=1e-6)
-    natural = rest_in_pauses(moving, NATURAL, events=[LAUGH])
-    assert natural is moving
+    assert rest_in_pauses(moving, rest.NATURAL, events=[LAUGH]) is moving

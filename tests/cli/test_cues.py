@@ -12,7 +12,7 @@ import pytest
 from children import LIPMOTION, child
 from cli.conftest import Done, RunCommand, check_refused
 from lipmotion import animate, cues, load_model, write_cues
-from lipmotion.pipeline.outputs.cues import format_cues
+from lipmotion.formats.cues import CUE_FORMATS
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ def test_without_a_file_it_is_printed(run, basics, here, toy_speech, toy_model_f
     sheet = cues(animate(toy_speech, model=load_model(toy_model_file)))
     for form in ("tsv", "xml", "json", "dat"):
         done = run(*basics, *(() if form == "tsv" else ("-f", form)))
-        assert done == (0, format_cues(sheet, speech=toy_speech, form=form).splitlines(), [])
+        assert done == (0, CUE_FORMATS[form].text(sheet, str(toy_speech)).splitlines(), [])
     assert list(here.iterdir()) == []
 
 
@@ -42,8 +42,9 @@ def test_it_is_the_functions_of_the_same_names(run, basics, here, toy_speech, to
 
 
 def test_a_format_whatever_the_suffix(run, basics, here):
-    assert run(*basics, "-o", "mouth.txt", "-f", "dat") == (0, ["mouth.txt"], [])
-    assert (here / "mouth.txt").read_text().startswith("MohoSwitch1\n1 ")
+    for words, begin in ((("-f", "dat"), "MohoSwitch1\n1 "), ((), "0.00\t")):  # of no known suffix, it is a table
+        assert run(*basics, "-o", "mouth.txt", *words) == (0, ["mouth.txt"], [])
+        assert (here / "mouth.txt").read_text().startswith(begin)
 
 
 def test_a_folder(run, basics, here, toy_speech):
@@ -113,10 +114,9 @@ def test_status_lines(run, basics, toy_speech):
 def test_warnings_are_status_lines_too(run, basics):
     handlers = list(logging.getLogger().handlers)
     done = run(*basics, "--machine-readable", "--transcript", "see bimab papa mama")
-    (said,) = [event["log"] for event in events(done) if event["type"] == "log"]
-    assert isinstance(said, dict)
-    assert said["level"] == "Warning"
-    assert "'bimab' is not in the dictionary" in said["message"]
+    (warning,) = [event["log"] for event in events(done) if event["type"] == "log"]
+    assert isinstance(warning, dict)
+    assert (warning["level"], "'bimab' is not in the dictionary" in warning["message"]) == ("Warning", True)
     assert logging.getLogger().handlers == handlers
 
 
@@ -174,11 +174,8 @@ def test_after_effects(rhubarb, here, dialogue):
 def test_after_effects_asks_for_the_version(rhubarb):
     for option in ("--version", "-v"):
         done = rhubarb(option)
-        found = re.search(r"Rhubarb Lip Sync version ((\d+)\.(\d+).(\d+)(-[0-9A-Za-z-.]+)?)", "\n".join(done.out))
-        assert done.code == 0
-        assert found is not None
-        assert found[2] == "1"
-        assert int(found[3]) >= 9
+        (version,) = re.findall(r"Rhubarb Lip Sync version 1\.(\d+).\d+", "\n".join(done.out))
+        assert (done.code, int(version) >= 9) == (0, True)
 
 
 @pytest.mark.parametrize("shapes", ["", "GHX"])
@@ -232,20 +229,9 @@ def test_cues_in_a_file(rhubarb, here, line):
     assert shapes_of((here / "out.json").read_text())
 
 
-def test_a_file_of_no_known_suffix_is_a_table(rhubarb, here):
-    assert rhubarb("-o", "output.txt", "take.wav").code == 0
-    assert (here / "output.txt").read_text().startswith("0.00\t")
-
-
-def test_names_of_shapes_for_moho(rhubarb, here):
-    """Rhubarb writes letters, unless it is asked for Preston Blair's names."""
-    line = ("-o", "out.dat", "take.wav", "-f", "dat", "--datFrameRate", "15")
-    names = {}
-    for more in ((), ("--datUsePrestonBlair",)):
-        assert rhubarb(*line, *more).code == 0
-        names[more] = {text.split()[1] for text in (here / "out.dat").read_text().splitlines()[1:]}
-    assert names[()] <= set("ABCDEFGHX")
-    assert names[("--datUsePrestonBlair",)] <= {"MBP", "etc", "E", "AI", "O", "U", "FV", "L", "rest"}
+def test_letters_of_shapes_for_moho(rhubarb, here):
+    assert rhubarb("-o", "out.dat", "take.wav", "-f", "dat", "--datFrameRate", "15").code == 0
+    assert {text.split()[1] for text in (here / "out.dat").read_text().splitlines()[1:]} <= set("ABCDEFGHX")
 
 
 def test_the_log_file(rhubarb, here):
@@ -260,22 +246,15 @@ def test_the_log_file(rhubarb, here):
     told = rhubarb(*line, "--machineReadable", "--logLevel", "warning")
     assert "log" in {json.loads(text)["type"] for text in told.err}
     assert len((here / "a.log").read_text().splitlines()) == 1
-
-
-def test_the_log_file_is_no_input(rhubarb, here):
     before = (here / "take.wav").read_bytes()
     assert rhubarb("take.wav", "--logFile", "take.wav").code == 7
     assert (here / "take.wav").read_bytes() == before
 
 
-def test_a_wrong_line_is_a_message_too(rhubarb):
-    (failure,) = map(json.loads, rhubarb("take.wav", "--machineReadable", "--bogus").err)
-    assert failure["type"] == "failure"
-    assert "--bogus" in failure["reason"]
-
-
-def test_under_its_name(run_outside):
+def test_a_wrong_line_is_a_message_too_and_so_under_its_name(rhubarb, run_outside):
     """As a link of that name, for programs that look for the program itself."""
+    (failure,) = map(json.loads, rhubarb("take.wav", "--machineReadable", "--bogus").err)
+    assert (failure["type"], "--bogus" in failure["reason"]) == ("failure", True)
     named = "import sys; sys.argv[0] = '/usr/bin/rhubarb'; from lipmotion.cli.main import main; sys.exit(main())"
     done = run_outside("--machineReadable", "missing.wav", program=(sys.executable, "-c", named))
     assert done.code == 3

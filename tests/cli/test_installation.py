@@ -48,10 +48,7 @@ def test_packages(declared):
     assert found["[study]"].state == "absent"
     assert f"{install_command('study')}; there is no no-such-package (required >=1)" in found["[study]"].text
     assert "not for this Python or system (required: sys_platform == 'none')" in found["[video]"].text
-
-
-def test_without_metadata(declared):
-    assert declared()["packages"].state == "absent"
+    assert declared()["packages"].state == "absent"  # without metadata
 
 
 def test_voices(monkeypatch):
@@ -72,27 +69,19 @@ def test_voices(monkeypatch):
     assert "no speech synthesiser is installed; install one: pip install" in found.text
 
 
-def test_whatever_a_part_raises(monkeypatch):
+def test_parts_that_fail_or_are_not_there(monkeypatch):
     def fails() -> str:
         raise OSError("libfoo.so: cannot open")
 
     monkeypatch.setitem(doctor_module._PARTS, "foo", fails)
     found = doctor_module.look_at("foo")
     assert found == InstalledPart("foo", "broken", "OSError: libfoo.so: cannot open; install lipmotion again")
-
-
-def test_no_face_tracking(monkeypatch):
     monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
-    found = doctor_module.look_at("face tracking")
-    assert found.state == "absent"
-    assert "MediaPipe" in found.text
-
-
-def test_no_microphone(monkeypatch):
     monkeypatch.setattr(doctor_module, "find_spec", lambda name: name == "sounddevice")
     monkeypatch.setattr(doctor_module, "find_library", lambda _: None)
-    found = doctor_module.look_at("microphone")
-    assert (found.state, "libportaudio2" in found.text) == ("absent", True)
+    for part, missing in (("face tracking", "MediaPipe"), ("microphone", "libportaudio2")):
+        found = doctor_module.look_at(part)
+        assert (found.state, missing in found.text) == ("absent", True)
 
 
 @pytest.mark.long
@@ -121,14 +110,11 @@ STATES = [("works", "lipmotion"), ("absent", "no-such-package"), ("works", "nump
 BROKEN = Requirement("pytest", "<1")
 
 
-def test_what_is_absent_is_no_failure(run, declared):
+def test_what_is_absent_is_no_failure_and_what_is_broken_is_exit_code_1(run, declared):
     declared(*GOOD)
     done = run("doctor")
     assert (done.code, done.err) == (0, [])
     assert [tuple(line.split()[:2]) for line in done.out[:-1]] == STATES
-
-
-def test_what_is_broken_is_exit_code_1(run, declared):
     declared(*GOOD, BROKEN)
     done = run("doctor")
     assert done.code == 1
@@ -167,7 +153,7 @@ def test_requirements_are_read(text, expected):
     assert parse_requirement(text) == expected
 
 
-def test_markers():
+def test_markers_and_versions():
     here = f"sys_platform == '{sys.platform}'"
     for marker, expected in (
         ("", True),
@@ -178,8 +164,6 @@ def test_markers():
     ):
         assert Requirement("a", "", marker).applies is expected, marker
 
-
-def test_versions():
     found = metadata.version("numpy")
     for versions, expected in (
         *[("", True), (">=1.9", True), (">=1.10,<999", True), ("<1.9", False)],

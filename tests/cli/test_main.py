@@ -21,16 +21,15 @@ STOPPED = "lipmotion: stopped; run the same command again to go on"
 VERBS = ["animate", "corpus", "train", "evaluate", "info"]
 
 
-def test_help_lists_verbs_and_exit_codes(run):
+def test_help(run):
     done = run("--help")
     assert (done.code, done.err) == (0, [])
+    assert run() == done
     text = " ".join(" ".join(done.out).split())
     for verb in VERBS:
         assert f" {verb} " in text
     assert "0 done, 1 a bug (doctor: a broken part), 2 wrong command line, 3 unusable input, 4 corpus, 5 align" in text
 
-
-def test_every_verb_has_help(run):
     for verb in (*VERBS, "corpus prepare", "corpus info"):
         done = run(*verb.split(), "--help")
         assert (done.code, done.err) == (0, [])
@@ -38,26 +37,14 @@ def test_every_verb_has_help(run):
 
 
 def test_the_version(run):
-    from importlib.metadata import version
-
     assert run("--version") == (0, [f"lipmotion {version('lipmotion')}"], [])
+    assert f"version = {{{version('lipmotion')}}}" in bibliography()["lipmotion"]
+    assert f"\nversion: {version('lipmotion')}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
 
 
-def test_the_package_is_a_program():
-    done = run_child([sys.executable, "-m", "lipmotion", "info", "--help"], check=True)
-    assert done.stdout.startswith("usage: lipmotion info ")
-
-
-def test_a_wrong_command_line(run):
+def test_a_wrong_command_line_and_a_misspelt_option(run):
     for arguments in (["bogus"], ["corpus"], ["corpus", "bogus"], ["--bogus"], ["train"], ["cues", "a.wav", "b.wav"]):
         check_refused(run(*arguments), 2, " --help")
-
-
-def test_without_a_word_there_is_help(run):
-    assert run() == run("--help")
-
-
-def test_a_misspelt_option(run):
     for misspelt, hint in (
         (["animate", "a.wav", "-o", "a.json", "--fase", "woman"], "did you mean --face? see: lipmotion animate --help"),
         (["animate", "a.wav", "--otput", "a.json"], "did you mean --output?"),
@@ -83,7 +70,11 @@ def test_words_of_other_tools_are_answered_with_a_verb(run):
         assert done.err[-1].startswith(f"lipmotion: error: {hint}")
 
 
-def test_an_error_is_one_line(run, make_info):
+def _fail(error: BaseException, _: object) -> None:
+    raise error
+
+
+def test_an_error_is_one_line_and_a_bug_is_not_hidden(run, make_info):
     errors: list[tuple[BaseException, int, str]] = [
         (LipMotionError("what"), 1, "lipmotion: error: what"),
         (AlignmentError("two\n  lines"), 5, "lipmotion: error: two\\n  lines"),
@@ -96,13 +87,6 @@ def test_an_error_is_one_line(run, make_info):
     for error, code, line in errors:
         make_info(partial(_fail, error))
         assert run("info") == (code, [], [line])
-
-
-def _fail(error: BaseException, _: object) -> None:
-    raise error
-
-
-def test_a_bug_is_not_hidden(make_info):
     make_info(partial(_fail, ZeroDivisionError()))
     with pytest.raises(ZeroDivisionError):
         main.main(["info"])
@@ -111,12 +95,8 @@ def test_a_bug_is_not_hidden(make_info):
 @pytest.mark.parametrize("arguments", [["info"], ["--help"]])
 def test_a_reader_that_has_gone_is_no_error(arguments):
     """As in ``lipmotion info | head -0``: the output is buffered, so it is found at the very end."""
-    program = [
-        sys.executable,
-        "-c",
-        "import sys; sys.stdin.read(); from lipmotion.cli.main import main; sys.exit(main())",
-    ]
-    with child([*program, *arguments], stdin=PIPE, stderr=PIPE) as process:
+    program = "import sys; sys.stdin.read(); from lipmotion.cli.main import main; sys.exit(main())"
+    with child([sys.executable, "-c", program, *arguments], stdin=PIPE, stderr=PIPE) as process:
         process.stdout.close()
         process.stdin.close()  # now it may begin
         assert process.stderr.read() == ""
@@ -142,7 +122,9 @@ def test_what_is_wrong_is_one_line_and_an_exit_code(run_outside, here):
     assert run_outside("animate", "a.wav").code == 2
 
 
-def test_the_console_script(run_outside):
+def test_the_package_is_a_program_and_has_a_script(run_outside):
+    done = run_child([sys.executable, "-m", "lipmotion", "info", "--help"], check=True)
+    assert done.stdout.startswith("usage: lipmotion info ")
     script = shutil.which("lipmotion", path=str(Path(sys.executable).parent))
     if script is None:
         pytest.skip("the package is not installed")
@@ -190,6 +172,9 @@ def test_a_model_says_whose_recordings_it_comes_from(run, toy_model_file):
     assert header["utterances"] == "8"
     assert "states=5" in header["configuration"]
     assert [line.split()[0] for line in done.out[1:]] == list(read_header(toy_model_file))
+    shipped = run("info")
+    assert shipped.out == run("info", find_shipped()).out
+    assert any(line.startswith("attribution") and "GRID" in line for line in shipped.out)
 
 
 def test_the_model_inside_is_named_with_its_rights(run, toy_model_file, here):
@@ -206,14 +191,11 @@ def test_the_model_inside_is_named_with_its_rights(run, toy_model_file, here):
     assert prior["attribution"].startswith("GRID corpus")
 
 
-def test_its_trees_can_be_printed(run, toy_model_file):
+def test_its_trees_or_chains_can_be_printed(run, toy_model_file, coupled_model_file):
     done = run("info", toy_model_file, "--structure")
     assert (done.code, done.err) == (0, [])
     assert done.out[0] == "speech.0"
     assert sum("leaf (" in line for line in done.out) >= 18
-
-
-def test_the_chains_of_a_coupled_model(run, coupled_model_file):
     done = run("info", coupled_model_file, "--structure")
     assert (done.code, done.err) == (0, [])
     assert done.out[0].startswith("coupled: chains whose transitions depend on all chains")
@@ -223,12 +205,6 @@ def test_the_chains_of_a_coupled_model(run, coupled_model_file):
     assert any(line.startswith("means of geometry: ") for line in done.out)
 
 
-def test_the_shipped_model_is_the_default(run):
-    done = run("info")
-    assert done.out == run("info", find_shipped()).out
-    assert any(line.startswith("attribution") and "GRID" in line for line in done.out)
-
-
 ROOT = Path(__file__).parents[2]
 
 
@@ -236,14 +212,11 @@ def keys(lines: list[str]) -> list[str]:
     return re.findall(r"^@\w+\{(\w+),$", "\n".join(lines), flags=re.MULTILINE)
 
 
-def test_the_shipped_model_is_cited_by_default(run):
+def test_the_shipped_model_is_cited_by_default(run, coupled_model_file):
     done = run("cite")
     assert (done.code, done.err) == (0, [])
     assert keys(done.out) == ["lipmotion", *ENGINE_KEYS["trajectory"], "cooke2006"]
     assert done.out == run("cite", find_shipped()).out
-
-
-def test_a_model_of_other_recordings(run, coupled_model_file):
     done = run("cite", coupled_model_file)
     assert (done.code, done.err) == (0, [])
     assert keys(done.out) == ["lipmotion", *ENGINE_KEYS["coupled"]]
@@ -257,9 +230,13 @@ def test_engines_and_keys(run):
         assert (done.code, done.err, keys(done.out)) == (0, [], [key])
 
 
-def test_every_built_in_engine_names_its_papers():
+def test_every_built_in_engine_names_its_papers_and_every_entry_is_whole():
     assert set(ENGINE_KEYS) == set(ENGINES.built_in)
     assert {key for named in ENGINE_KEYS.values() for key in named} <= set(bibliography())
+    for entry in bibliography().values():
+        assert entry.count("{") == entry.count("}")
+        assert {"author", "title", "year"} <= set(re.findall(r"^ {2}(\w+) +=", entry, flags=re.MULTILINE))
+        assert entry.endswith("\n}")
 
 
 def test_what_a_header_adds():
@@ -269,18 +246,6 @@ def test_what_a_header_adds():
     assert text.endswith("\n% recordings: a; b")
     assert "another package" in list_engine_citations("ridge")
     assert keys(list_model_citations({"engine": "ridge"}).splitlines()) == ["lipmotion"]
-
-
-def test_the_version_is_this_one():
-    assert f"version = {{{version('lipmotion')}}}" in bibliography()["lipmotion"]
-    assert f"\nversion: {version('lipmotion')}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-
-
-def test_every_entry_is_whole():
-    for entry in bibliography().values():
-        assert entry.count("{") == entry.count("}")
-        assert {"author", "title", "year"} <= set(re.findall(r"^ {2}(\w+) +=", entry, flags=re.MULTILINE))
-        assert entry.endswith("\n}")
 
 
 ASKED: dict[tuple[str, ...], set[str]] = {

@@ -74,12 +74,9 @@ def test_a_glb_plays_with_its_sound_wherever_its_folder_goes(run, toy_speech, to
     assert "is not there; give a sound" in run("render", "new/a.glb", "-o", "b.json").err[0]
 
 
-def test_motion_of_more_than_a_day_is_refused(run, here):
+def test_a_single_pose_is_written_and_motion_of_more_than_a_day_is_refused(run, here):
     (here / "long.csv").write_text("time_s,opening\n" + "".join(f"{second},0\n" for second in range(86_402)))
     check_refused(run("render", "long.csv", "-o", "a.json"), 3, "lasts 86401 s, required at most 86400; cut it")
-
-
-def test_a_single_pose_is_written(run, here):
     (here / "pose.csv").write_text("time_s,opening\n0,0.1\n0.01,0.1\n")
     assert run("render", "pose.csv", "-o", "a.livelink.csv", "a.mp4", "a%05d.png", "--size", "64").code == 0
     assert {path.name for path in here.glob("a*")} == {"a.livelink.csv", "a.mp4", "a00000.png"}
@@ -93,24 +90,25 @@ def test_the_rate_of_motion_can_be_given(run, here):
     assert is_one_error(run("render", "a.csv", "--motion-rate", "0", "-o", "b.json"), 3)
 
 
-def test_motion_files(run, basics, here):
+def test_motion_files_and_a_video(run, basics, here):
     done = run(*basics, "-o", "a.json", "a.csv", "-o", "a.npz", "--rate", "50")
     assert done == (0, ["a.json", "a.csv", "a.npz"], [])
     assert sorted(path.name for path in here.iterdir()) == ["a.csv", "a.json", "a.npz"]
     assert read_motion(Path("a.json"))[0].rate_hz == 50
+    assert run(*basics, "-o", "a.mp4", "--fps", "5", "--size", "160") == (0, ["a.mp4"], [])
+    assert (here / "a.mp4").stat().st_size > 5000
+    assert run(*basics, "-o", "b.csv", "--articulation").code == 0
+    header = (here / "b.csv").read_text().splitlines()[0].split(",")
+    assert header[-6:] == ["tongue", "lip_tuck", "protrusion", "spread", "lip_press", "teeth"]
 
 
 @pytest.mark.long
-def test_it_is_the_function_of_the_same_name(run, basics, here, toy_speech, toy_model_file):
+def test_it_is_the_function_of_the_same_name(run, basics, here, toy_speech, toy_model_file, toy_corpus):
+    assert run(*basics, "-o", "one.npz", "--onto", toy_corpus.path) == (0, ["one.npz"], [])
     run(*basics, "-o", "command.json")
     model = load_model(toy_model_file)
     write(animate(toy_speech, model=model), ["function.json"], speech=toy_speech, model=model)
     assert (here / "command.json").read_bytes() == (here / "function.json").read_bytes()
-
-
-def test_a_video(run, basics, here):
-    assert run(*basics, "-o", "a.mp4", "--fps", "5", "--size", "160") == (0, ["a.mp4"], [])
-    assert (here / "a.mp4").stat().st_size > 5000
 
 
 def test_a_transcript(run, basics, here):
@@ -140,19 +138,6 @@ def test_a_picture_of_the_posteriors(run, coupled_model_file, toy_speech, here):
     run(*basics, "b.json")
     assert (here / "a.json").read_bytes() == (here / "b.json").read_bytes()
     assert sorted(path.name for path in here.iterdir()) == ["a.json", "a.png", "b.json"]
-
-
-@pytest.mark.long
-def test_onto_another_person(run, here, toy_model_file, toy_speech, toy_corpus):
-    given = ["animate", toy_speech, "--model", toy_model_file, "-o", "one.npz"]
-    assert run(*given, "--onto", toy_corpus.path).code == 0
-    assert (here / "one.npz").is_file()
-
-
-def test_articulation_in_motion_files(run, basics, here):
-    assert run(*basics, "-o", "a.csv", "--articulation")[0] == 0
-    header = (here / "a.csv").read_text().splitlines()[0].split(",")
-    assert header[-6:] == ["tongue", "lip_tuck", "protrusion", "spread", "lip_press", "teeth"]
 
 
 def test_the_addon_is_written_or_one_line_says_why_not(run, here):
@@ -218,13 +203,10 @@ def test_a_mesh_without_blendshapes_is_bound_once(run, here, basics):
     write_obj(here / "head.obj", plain)
     rows = "".join(f"{point},{vertex}\n" for point, vertex in lip_points(plain).items())
     (here / "points.csv").write_text("point,vertex\n" + rows)
-    bound = run("character", "head.obj", "--lip-points", "points.csv", "--write-binding", "head.binding")
-    assert bound.code == 0
+    assert run("character", "head.obj", "--lip-points", "points.csv", "--write-binding", "head.binding").code == 0
     assert (here / "head.binding").exists()
-    done = run(
-        *basics, "--character", "head.obj", "--binding", "head.binding", "-o", "said.mp4", "--fps", "5", "--size", "90"
-    )
-    assert done == (0, ["said.mp4"], [])
+    character = ("--character", "head.obj", "--binding", "head.binding", "--fps", "5", "--size", "90")
+    assert run(*basics, *character, "-o", "said.mp4") == (0, ["said.mp4"], [])
 
 
 @pytest.mark.long

@@ -16,13 +16,18 @@ def touch(folder: Path, *names: str) -> None:
         (folder / name).touch()
 
 
-def test_videos_of_any_kind_are_found(tmp_path):
+def test_videos_of_any_kind_are_found_and_those_of_one_name_reported(tmp_path):
     touch(tmp_path, "b.MP4", "a.mov", "day 1/c.webm", "notes.pdf", "speech.wav", ".cache/d.mp4", ".part-e.mkv")
     found = discover(tmp_path)
     assert found.kind == "folder of videos"
     assert [item.name for item in found.recordings] == ["a", "b", "day 1-c"]
     assert [item.words for item in found.recordings] == [None, None, None]
     assert {item.split for item in found.recordings} == {"train"}
+    touch(tmp_path, "same/a.mp4", "same/a.mkv", "same/b.mp4", "same/anna/a.mp4", "same/anna-a.mp4")
+    found = discover(tmp_path / "same")
+    assert [item.name for item in found.recordings] == ["b"]
+    for name in ("a", "anna-a"):
+        assert "2 recordings share this name" in found.problems[name]
 
 
 def test_transcripts_lie_beside_the_videos(tmp_path):
@@ -50,14 +55,6 @@ def test_subtitles_and_recognised_words_are_transcripts(tmp_path):
     found = discover(tmp_path)
     assert [item.words for item in found.recordings] == [("hello", "there"), ("hello", "you")]
     assert "c.srt: line 2 is '00:00:00,500 --> 2'" in found.problems["c"]
-
-
-def test_recordings_of_the_same_name_are_reported(tmp_path):
-    touch(tmp_path, "a.mp4", "a.mkv", "b.mp4", "anna/a.mp4", "anna-a.mp4")
-    found = discover(tmp_path)
-    assert [item.name for item in found.recordings] == ["b"]
-    for name in ("a", "anna-a"):
-        assert "2 recordings share this name" in found.problems[name]
 
 
 def test_lists_give_the_splits_and_are_not_transcripts(tmp_path):
@@ -97,11 +94,8 @@ def test_sounds_with_motion_beside_them(tmp_path):
     read = [(item.file.name, item.motion_file and item.motion_file.file.name) for item in found.recordings]
     assert read == [("a.wav", "a.csv"), ("b.flac", "b.npz"), ("c.WAV", "c.json")]
     assert "2 motion files beside it" in found.problems["d"]
-
-
-def test_a_video_is_tracked_whatever_lies_beside_it(tmp_path):
-    touch(tmp_path, "a.mp4", "a.csv", "b.wav", "b.csv")
-    found = discover(tmp_path)
+    touch(tmp_path, "both/a.mp4", "both/a.csv", "both/b.wav", "both/b.csv")  # a video is tracked all the same
+    found = discover(tmp_path / "both")
     assert found.kind == "folder of videos, and of sounds with motion"
     assert [item.motion_file is None for item in found.recordings] == [True, False]
 
@@ -110,13 +104,9 @@ def test_a_folder_is_a_speaker(tmp_path):
     touch(tmp_path, "anna/a.mp4", "anna/day 2/a.mp4", "ben/a.mp4", "c.mp4", "ben/s.wav", "ben/s.json")
     (tmp_path / "test.txt").write_text("ben/a\n")
     found = discover(tmp_path)
-    assert [(item.name, item.speaker, item.split) for item in found.recordings] == [
-        ("anna-a", "anna", "train"),
-        ("anna-day 2-a", "anna", "train"),
-        ("ben-a", "ben", "test"),
-        ("ben-s", "ben", "train"),
-        ("c", "", "train"),
-    ]
+    items = [(item.name, item.speaker, item.split) for item in found.recordings]
+    assert items[:3] == [("anna-a", "anna", "train"), ("anna-day 2-a", "anna", "train"), ("ben-a", "ben", "test")]
+    assert items[3:] == [("ben-s", "ben", "train"), ("c", "", "train")]
 
 
 def test_labels_are_kept_and_bad_ones_are_reported(tmp_path):
@@ -272,12 +262,8 @@ def test_tcd_timit_from_the_front_with_its_scripts(tmp_path: Path) -> None:
 
 def test_mead_from_the_front(tmp_path: Path) -> None:
     views = "front", "down", "left_30", "left_60", "right_30", "right_60", "top"
-    touch(
-        tmp_path,
-        *(f"M003/video/{view}/happy/level_1/001.mp4" for view in views),
-        "W009/video/front/sad/level_2/001.mp4",
-    )
-    touch(tmp_path, "M003/audio/happy/level_1/001.m4a")
+    touch(tmp_path, *(f"M003/video/{view}/happy/level_1/001.mp4" for view in views))
+    touch(tmp_path, "W009/video/front/sad/level_2/001.mp4", "M003/audio/happy/level_1/001.m4a")
     (tmp_path / "M003/video/front/happy/level_1/001.txt").write_text("Hello there.")
     assert read(tmp_path) == [("M003-happy-level_1-001", "M003", "hello there"), ("W009-sad-level_2-001", "W009", None)]
 
@@ -424,27 +410,19 @@ def studio(tmp_path: Path) -> Path:
 def test_a_recorder_belongs_to_its_recording(studio):
     (studio / "offsets.csv").write_text("name,offset_ms\nanna/c, -12.5\n\ngone,3\n")
     found = add_separate_sounds(discover(studio), studio, 0.1)
-    assert [(item.name, item.recorder, item.offset_s) for item in found.recordings] == [
-        ("a", studio / "a.recorder.flac", 0.1),
-        ("anna-c", None, -0.0125),
-    ]
+    first, second = ((item.name, item.recorder, item.offset_s) for item in found.recordings)
+    assert (first, second) == (("a", studio / "a.recorder.flac", 0.1), ("anna-c", None, -0.0125))
     assert "2 recorders' sounds beside it: b.recorder.mp3, b.recorder.wav; keep one" in found.problems["b"]
     assert found.problems["gone"] == "in offsets.csv, but there is no such recording"
-
-
-def test_one_video_of_many_has_its_own_row(studio):
     (studio / "offsets.csv").write_text("name,offset_ms\na,7\nothers,3\n")
-    found = add_separate_sounds(discover(studio), studio, is_whole=False)
+    found = add_separate_sounds(discover(studio), studio, is_whole=False)  # one video of many has its own row
     assert found.recordings[0].offset_s == pytest.approx(0.007)
     assert "others" not in found.problems
 
 
-def test_a_spreadsheet_writes_its_own_marks(tmp_path):
+def test_what_is_wrong_with_a_table_is_said_but_not_a_spreadsheets_own_marks(tmp_path):
     (tmp_path / "offsets.csv").write_text("sep=;\nname;offset_ms;\nanna/c;-12,5\n;\n", encoding="utf-8-sig")
     assert read_offsets(tmp_path / "offsets.csv") == {"anna-c": pytest.approx(-0.0125)}
-
-
-def test_what_is_wrong_with_a_table_is_said(tmp_path):
     for text, message in (
         ("", "the columns are '', required name,offset_ms"),
         ("name,offset_ms\na\n", "line 2: 1 fields, required a name and milliseconds"),

@@ -66,11 +66,17 @@ def test_an_utterance_survives_the_round_trip(tmp_path, crops):
             assert getattr(found, name) == getattr(given, name)
 
 
-def test_large_arrays_stay_on_disk(corpus):
+def test_large_arrays_stay_on_disk_and_reading_needs_no_video_packages(corpus):
     found = corpus.utterance("one")
     assert isinstance(found.track.crops, np.memmap)
     assert isinstance(found.features.values, np.memmap)
     assert not found.features.values.flags.writeable
+    code = (
+        "import sys; sys.modules['cv2'] = sys.modules['mediapipe'] = sys.modules['av'] = None; "
+        "from pathlib import Path; from lipmotion.corpora import Corpus; "
+        f"Corpus.open(Path({str(corpus.path)!r})).utterance('one').track.crops.sum()"
+    )
+    run_child([sys.executable, "-c", code], check=True)
 
 
 def test_sixteen_bit_sound_is_kept_exactly():
@@ -100,12 +106,6 @@ def test_names_and_splits_also_of_utterances_written_by_others(corpus):
     assert manifest.read_bytes() == whole
 
 
-def test_an_utterance_is_replaced(corpus):
-    corpus.add(replace(utterance("two", "val"), words=("new",)))
-    assert Corpus.open(corpus.path).utterance("two").words == ("new",)
-    assert Corpus.open(corpus.path).splits == {"train": 1, "val": 1, "test": 1}
-
-
 def test_the_bytes_do_not_depend_on_the_order(corpus, tmp_path):
     other = Corpus.create(tmp_path / "other")
     for name, split in (("three", "test"), ("one", "train"), ("two", "train")):
@@ -116,7 +116,10 @@ def test_the_bytes_do_not_depend_on_the_order(corpus, tmp_path):
         assert (corpus.path / path).read_bytes() == (other.path / path).read_bytes()
 
 
-def test_leftovers_of_a_killed_run_are_removed(corpus):
+def test_an_utterance_is_replaced_and_leftovers_of_a_killed_run_are_removed(corpus):
+    corpus.add(replace(utterance("two", "val"), words=("new",)))
+    assert Corpus.open(corpus.path).utterance("two").words == ("new",)
+    assert Corpus.open(corpus.path).splits == {"train": 1, "val": 1, "test": 1}
     (corpus.path / ".part-0-corpus.json").touch()
     (corpus.path / "utterances" / ".part-1-four").mkdir()
     again = Corpus.create(corpus.path)
@@ -127,19 +130,15 @@ def test_leftovers_of_a_killed_run_are_removed(corpus):
 
 def test_something_else_is_not_overwritten(tmp_path):
     (tmp_path / "letter.txt").write_text("dear")
-    with pytest.raises(CorpusError, match="is not a corpus; give a new or an empty folder"):
-        Corpus.create(tmp_path)
-    with pytest.raises(CorpusError, match="is not a corpus"):
-        Corpus.create(tmp_path / "letter.txt")
-
-
-def test_names_must_be_those_of_folders(corpus):
-    for name in ("../two", "a/b", ".hidden", "", ".."):
-        with pytest.raises(InputError, match="cannot be named"):
-            corpus.add(replace(utterance(), name=name))
+    for path in (tmp_path, tmp_path / "letter.txt"):
+        with pytest.raises(CorpusError, match="is not a corpus; give a new or an empty folder"):
+            Corpus.create(path)
 
 
 def test_not_a_corpus(tmp_path):
+    for name in ("../two", "a/b", ".hidden", "", ".."):  # names must be those of folders
+        with pytest.raises(InputError, match="cannot be named"):
+            Corpus.create(tmp_path / "good").add(replace(utterance(), name=name))
     with pytest.raises(CorpusError, match="no such corpus; make one: lipmotion corpus prepare"):
         Corpus.open(tmp_path / "none")
     for content in (None, "", "[]", "{}", '{"format": "lipmotion.motion", "version": 1}'):
@@ -147,15 +146,6 @@ def test_not_a_corpus(tmp_path):
             (tmp_path / "corpus.json").write_text(content)
         with pytest.raises(CorpusError, match="give a prepared corpus"):
             Corpus.open(tmp_path)
-
-
-def test_reading_needs_no_video_packages(corpus):
-    code = (
-        "import sys; sys.modules['cv2'] = sys.modules['mediapipe'] = sys.modules['av'] = None; "
-        "from pathlib import Path; from lipmotion.corpora import Corpus; "
-        f"Corpus.open(Path({str(corpus.path)!r})).utterance('one').track.crops.sum()"
-    )
-    run_child([sys.executable, "-c", code], check=True)
 
 
 PHONES = Timeline((Span(0.0, 0.25, Unit("sil")), Span(0.25, 1.0, Unit("aa"))))
@@ -222,21 +212,15 @@ def recordings(count: int) -> RecordingFolder:
     return RecordingFolder("folder", tuple(found))
 
 
-def test_names_elsewhere_are_names_without_a_recording(tmp_path: Path) -> None:
+def test_names_without_a_recording_and_lists_of_another_folder(tmp_path: Path) -> None:
     (tmp_path / "train.txt").write_text("name0\n/etc/passwd\n../name1\n..\nname0\n")
     found = assign_splits(recordings(2), tmp_path)
     assert [(item.name, item.split) for item in found.recordings] == [("name0", "train")]
     assert sorted(found.problems) == ["-etc-passwd", "..", "..-name1", "name1"]
-
-
-def test_long_lists_of_many_recordings(tmp_path: Path) -> None:
     (tmp_path / "train.txt").write_text("".join(f"name{i}\n" for i in range(200)))
     found = assign_splits(recordings(50), tmp_path)
-    assert len(found.recordings) == 50
-    assert len(found.problems) == 150
-
-
-def test_a_list_of_another_folder_is_refused_in_one_line(tmp_path: Path) -> None:
+    assert (len(found.recordings), len(found.problems)) == (50, 150)
+    (tmp_path / "train.txt").unlink()
     (tmp_path / "val.txt").write_text("".join(f"other{i}\n" for i in range(MAX_MISSING_NAMES + 1)))
     with pytest.raises(CorpusError, match=f"name {MAX_MISSING_NAMES + 1} recordings .* at most {MAX_MISSING_NAMES}"):
         assign_splits(recordings(2), tmp_path)

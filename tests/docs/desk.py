@@ -41,16 +41,14 @@ def set_desk(folder: Path, models: dict[str, Path]) -> None:
     (folder / "my-units.txt").write_text(units, encoding="utf-8")
     (folder / "names.txt").write_text("anna AE N AH\n", encoding="utf-8")
     (folder / "lines.csv").write_text("file\nspeech.wav\n", encoding="utf-8")
-    (folder / "talk.json").write_text(
-        json.dumps({"segments": [{"start": 0.1, "end": 1.0, "text": words}]}), encoding="utf-8"
-    )
+    segments = [{"start": 0.1, "end": 1.0, "text": words}]
+    (folder / "talk.json").write_text(json.dumps({"segments": segments}), encoding="utf-8")
     for name in ("RECORDINGS", "takes"):
         _takes(folder / name)
     _motion(folder, words)
     _of_other_programs(folder, words)
     _characters(folder)
-    draw = np.random.default_rng(2)
-    judged = ratings(draw, np.array([3.0, 4.0]), (8, 6), Effects())
+    judged = ratings(np.random.default_rng(2), np.array([3.0, 4.0]), (8, 6), Effects())
     write_answers(folder / "answers.csv", rated_answers(replace(judged, conditions=("ph-HMM", "ph-CHMM"))))
 
 
@@ -93,9 +91,8 @@ def _motion(folder: Path, words: str) -> None:
 def _of_other_programs(folder: Path, words: str) -> None:
     """Write the timings of a voice, cues, and drawings of mouth shapes."""
     shutil.copy(folder / "speech.wav", folder / "line.mp3")
-    marks = [
-        {"time": time_ms, "type": "viseme", "value": name} for time_ms, name in ((0, "sil"), (100, "p"), (200, "a"))
-    ]
+    visemes = ((0, "sil"), (100, "p"), (200, "a"))
+    marks = [{"time": time_ms, "type": "viseme", "value": name} for time_ms, name in visemes]
     (folder / "line.marks").write_text("".join(f"{json.dumps(mark)}\n" for mark in marks))
     (folder / "line.json").write_text(json.dumps({"time": 100, "type": "word", "value": words}))
     (folder / "mouth.tsv").write_text("0.00\tX\n0.10\tA\n0.30\tD\n0.60\tX\n")

@@ -11,11 +11,9 @@ from types import ModuleType
 ROOT = Path(__file__).parents[2]
 FENCED = re.compile(
     r"(?:^ *<!--long: (?P<last>[^>]*?)-->\n)?^(?P<indent> *)```(?P<language>\w*)\n(?P<text>.*?)^(?P=indent)```$",
-    re.MULTILINE | re.DOTALL,
+    re.M | re.DOTALL,
 )
-INDENTED = re.compile(
-    r"(?:^<!--long: (?P<last>[^>]*?)-->\n|(?<=\n\n))(?P<text>(?:    \S.*\n(?:     .*\n)*)+)", re.MULTILINE
-)
+INDENTED = re.compile(r"(?:^<!--long: (?P<last>[^>]*?)-->\n|(?<=\n\n))(?P<text>(?:    \S.*\n(?:     .*\n)*)+)", re.M)
 LANGUAGES = {"sh": "sh", "py": "python", "python": "python"}
 COMMAND = re.compile(r"(?:lipmotion|python|make|pip|ffmpeg|dask|export) ")
 
@@ -60,7 +58,6 @@ def blocks(page: str) -> Iterator[Block]:
     bare = FENCED.sub(lambda match: re.sub(r"\S", "x", match[0]), text)
     found += [match for match in INDENTED.finditer(bare) if COMMAND.match(match["text"].strip())]
     for match in sorted(found, key=lambda match: match.start()):
-        given = match.groupdict()
-        language = LANGUAGES.get(given.get("language", "sh"))
+        language = LANGUAGES.get(match.groupdict().get("language", "sh"))
         if language:
             yield Block(page, language, dedent(match["text"]), match["last"] or "")

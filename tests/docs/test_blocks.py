@@ -19,8 +19,7 @@ TESTED = {
     "recipes/": "docs/test_corpus_recipes.py",
 }  # fmt: skip
 """Pages, or folders of pages, with a test of their own."""
-RESULTS = "docs/results/"
-"""Pages that are the output of the commands on them: their sheets have commit and date."""
+RESULTS = "docs/results/"  # pages that are the output of the commands on them: their sheets have commit and date
 ALL = [block for page in ("README", *pages()) for block in blocks(page)]
 HERE = [block for block in ALL if not block.last and not block.page.startswith((*TESTED, RESULTS))]
 
@@ -42,10 +41,9 @@ def test_every_command_is_understood():
 
 
 def test_what_runs_here_is_ours_and_markers_say_when_and_what():
-    foreign = [
+    assert [
         words for block in HERE if block.language == "sh" for words in commands(block) if words[0] != "lipmotion"
-    ]
-    assert foreign == []
+    ] == []
     for block in ALL:
         assert not block.last or re.match(r"(20\d\d-\d\d-\d\d[^:]*|not run): .", block.last), block
     for test in TESTED.values():

@@ -87,13 +87,12 @@ def test_no_page_uses_a_former_name_of_an_option():
     former = {old for config in configurations for old in config.aliases} - present - {*ENGINES.built_in}
     assert {"listens", "follows", "full_range", "crosses", "recognises"} <= former
     setting = re.compile(rf"`(?:--set )?({'|'.join(sorted(former))})`|\b({'|'.join(sorted(former))}) ?= ?\w")
-    found = {
+    assert {
         f"{page.relative_to(ROOT)}: {match.group()}"
         for page in PAGES
         if page.name != "CHANGELOG.md"
         for match in setting.finditer(page.read_text(encoding="utf-8"))
-    }
-    assert found == set()
+    } == set()
 
 
 def test_readme_is_short():
@@ -115,9 +114,7 @@ def test_all_pages_say_the_same_of_how_long_training_takes():
     said = [re.findall(r"(\w+ \w+ \w+) for 22 minutes of recordings", page) for page in pages]
     assert said == [["about three minutes"], ["about three minutes"]]
     speed = (DOCS / "results" / "figures.md").read_text(encoding="utf-8").split("## Speed")[1]
-    seconds, clips = re.findall(r"`train`, (\d+) clips .* about three minutes for the 452 .* \| (\d+) s \|", speed)[0][
-        ::-1
-    ]
+    ((clips, seconds),) = re.findall(r"`train`, (\d+) clips .* about three minutes for the 452 .* \| (\d+) s \|", speed)
     assert 150 <= float(seconds) * 452 / float(clips) <= 210
 
 

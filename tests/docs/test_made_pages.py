@@ -44,8 +44,7 @@ def test_sheets_are_stamped_and_shown():
 def test_a_figure_that_no_sheet_holds_is_found():
     text = "The gap is 0.256, not 0.257; `0.9`; the aim of 3.5 % was missed by 12 MB ([x](a0.77.md)).\n"
     assert FIGURES.not_held(PAGE, text, {"mouth": SHEET}) == ["0.257", "12"]
-    guide = ROOT / "docs" / "faces.md"
-    assert FIGURES.not_held(guide, text, {"mouth": SHEET}) == ["0.257"]
+    assert FIGURES.not_held(ROOT / "docs" / "faces.md", text, {"mouth": SHEET}) == ["0.257"]
 
 
 def test_a_figure_of_another_model_says_so():

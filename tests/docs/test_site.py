@@ -10,17 +10,12 @@ from children import environment, run_child
 from docs.site_pages import ROOT, SETTINGS, pages
 from docs.test_links import links
 
-TOOLS = Path(sys.prefix) / "site-tools"
-"""Where ``make site`` installs Sphinx."""
+TOOLS = Path(sys.prefix) / "site-tools"  # where ``make site`` installs Sphinx
 
 
 def test_the_sidebar_holds_every_page_once():
     listed = pages()
-    there = [
-        ROOT / "tests" / "robustness" / "table.md",
-        *(ROOT / "docs").rglob("*.md"),
-        *(ROOT / "recipes").glob("*.md"),
-    ]
+    there = [ROOT / "tests/robustness/table.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "recipes").glob("*.md")]
     there += [page for page in ROOT.glob("*.md") if page.name != "README.md"]
     assert len(set(listed)) == len(listed)
     assert {f"{page}.md" for page in listed} == {page.relative_to(ROOT).as_posix() for page in there}

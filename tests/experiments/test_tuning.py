@@ -3,7 +3,7 @@ import pytest
 
 from lipmotion import Corpus, Model, Selection, types
 from lipmotion.engines.coupled import engine, model
-from lipmotion.engines.coupled.chains.structures import SYSTEMS
+from lipmotion.engines.coupled.chains.product import SYSTEMS
 from lipmotion.measures import curves
 from lipmotion.testing import examples
 from lipmotion_lab.evaluation.held_out import HeldOutRecordings, generate_clips, load_held_out

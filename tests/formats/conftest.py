@@ -15,8 +15,7 @@ __all__ = ["generation", "run"]
 @pytest.fixture
 def generation() -> Generation:
     """A second of two curves, with phones."""
-    rng = np.random.default_rng(7)
-    values = rng.normal(0, 0.2, (101, 2))
+    values = np.random.default_rng(7).normal(0, 0.2, (101, 2))
     values[3] = [-1e-9, 0.123456789]
     motion = Motion(values, 100.0, (Channel("opening"), Channel("x_17", "metre")))
     units = Timeline((Span(0.0, 0.3, Unit("sil", "sil")), Span(0.3, 0.45, Unit("m", "m", word="mama"))))

@@ -50,8 +50,7 @@ def names() -> Iterator[str]:
 def generation(name: str, unit: str = "eye_distance", label: types.Unit | None = None) -> types.Generation:
     """Return three frames of a channel of that name."""
     motion = types.Motion(np.array([[0.0], [0.5], [0.25]]), 25.0, (types.Channel(name, unit),))
-    units = types.Timeline((types.Span(0.0, 0.1, label or types.Unit("aa")),))
-    return of_motion(motion, units)
+    return of_motion(motion, types.Timeline((types.Span(0.0, 0.1, label or types.Unit("aa")),)))
 
 
 def mesh(name: str) -> Mesh:
@@ -160,8 +159,7 @@ def _usda(folder: Path, name: str) -> None:
     found = re.search(r"filePath = (@@@(?:[^@\n]|@{1,2}(?!@)|\\@@@)*?@{0,2}@@@(?!@)|@[^@\n]*@)\n", text)
     assert found, text[text.index("filePath") :][:80]
     mark = 3 if found[1].startswith("@@@") else 1
-    stored = found[1][mark:-mark].replace("\\@@@", "@@@")
-    assert stored.removeprefix("./") == as_text(f"x{name}")
+    assert found[1][mark:-mark].replace("\\@@@", "@@@").removeprefix("./") == as_text(f"x{name}")
     assert not re.search(r"[\x00-\x09\x0b-\x1f]", text)
 
 

@@ -9,30 +9,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lipmotion import formats
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats import (
-    MotionFormat,
-    base,
-    find_suffix,
-    list_read_suffixes,
-    list_suffixes,
-    read_motion,
-    write_motion,
-)
 from lipmotion.formats.base import MOTION_FORMATS, format_rows, read_members
 from lipmotion.formats.sound import write_sound
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.resampling import resample_speech
 from lipmotion.types import Audio, Channel, Generation, Motion, ReducedVariance, Timeline, from_sixteen_bits
 
-EXACT = (".json", ".csv", ".npz", ".c3d")
-"""Formats that hold any channels."""
-UNITLESS = (".csv", ".c3d")
-"""Formats that hold no phones."""
+EXACT = (".json", ".csv", ".npz", ".c3d")  # formats that hold any channels
+UNITLESS = (".csv", ".c3d")  # formats that hold no phones
 
 
 def write(path: Path, generation: Generation) -> Path:
-    write_motion(path, generation, source={"file": "Größe.wav"}, model={"engine": "trajectory"})
+    formats.write_motion(path, generation, source={"file": "Größe.wav"}, model={"engine": "trajectory"})
     return path
 
 
@@ -42,21 +32,21 @@ def test_motion_comes_back(tmp_path, generation, suffix):
     for rate_hz in (25.0, 29.97, 100.0):
         moved = replace(generation, motion=replace(generation.motion, rate_hz=rate_hz))
         paths = [write(tmp_path / f"{name}{suffix.upper()}", moved) for name in "ab"]
-        motion, units = read_motion(paths[0])
+        motion, units = formats.read_motion(paths[0])
         assert (motion.names, motion.rate_hz) == (generation.motion.names, rate_hz)
         assert np.abs(motion.values - generation.motion.values).max() <= 5.1e-6
         assert len(units) == (0 if suffix in UNITLESS else 2)
         assert paths[0].read_bytes() == paths[1].read_bytes()
     if suffix in (".json", ".npz"):
         nothing = replace(generation, motion=Motion(np.zeros((0, 2)), 100.0, motion.channels), units=Timeline(()))
-        assert read_motion(write(tmp_path / f"none{suffix}", nothing))[0].values.shape == (0, 2)
+        assert formats.read_motion(write(tmp_path / f"none{suffix}", nothing))[0].values.shape == (0, 2)
 
 
 def _write_take(path, generation, _source, _model):
     path.write_text(f"take of {len(generation.motion.values)}\n")
 
 
-TAKE = MotionFormat(_write_take)
+TAKE = formats.MotionFormat(_write_take)
 
 
 def test_the_longest_suffix_chooses_the_format_and_one_without_reader_is_not_offered(tmp_path, generation, monkeypatch):
@@ -64,13 +54,13 @@ def test_the_longest_suffix_chooses_the_format_and_one_without_reader_is_not_off
     monkeypatch.setitem(MOTION_FORMATS.built_in, "take.csv", f"{__name__}:TAKE")
     names = {"a.take.csv": ".take.csv", "a.b.TAKE.Csv": ".take.csv", "a.mistake.csv": ".csv", "take.csv": ".csv"}
     for name, suffix in names.items():
-        assert find_suffix(Path(name)) == suffix
+        assert formats.find_suffix(Path(name)) == suffix
         text = write(tmp_path / name, generation).read_text()
         assert text.startswith("take of" if suffix == ".take.csv" else "time_s,")
-    assert ".take.csv" in list_suffixes()
-    assert ".take.csv" not in list_read_suffixes()
+    assert ".take.csv" in formats.list_suffixes()
+    assert ".take.csv" not in formats.list_read_suffixes()
     with pytest.raises(InputError, match=r"cannot read motion from '\.take\.csv'; use one of \.json, \.csv, \.npz"):
-        read_motion(tmp_path / "a.take.csv")
+        formats.read_motion(tmp_path / "a.take.csv")
 
 
 def test_an_unknown_suffix_names_the_known_ones(tmp_path, generation):
@@ -78,7 +68,7 @@ def test_an_unknown_suffix_names_the_known_ones(tmp_path, generation):
         with pytest.raises(ExportError, match=rf"{found}.*\.json, \.csv, \.npz"):
             write(tmp_path / name, generation)
         with pytest.raises(InputError, match=rf"{found}.*\.json, \.csv, \.npz"):
-            read_motion(tmp_path / name)
+            formats.read_motion(tmp_path / name)
         assert not list(tmp_path.iterdir())
 
 
@@ -90,19 +80,19 @@ def test_values_that_are_not_finite_are_not_written(tmp_path, generation, suffix
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("suffix", list_read_suffixes())
+@pytest.mark.parametrize("suffix", formats.list_read_suffixes())
 def test_a_missing_and_a_damaged_file_are_named(tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
     with pytest.raises(InputError, match=rf"a\{suffix}: cannot be read: No such file"):
-        read_motion(path)
+        formats.read_motion(path)
     for rubbish in (b"", b"\x00\xff\xfe", b"[1, 2]", b"time_s\n", b"{}"):
         path.write_bytes(rubbish)
         with pytest.raises(InputError, match=rf"a\{suffix}: "):
-            read_motion(path)
+            formats.read_motion(path)
 
 
 def test_rows_are_the_rounded_values():
-    for rows, precision in ((50, "f4"), (50, "f8"), (2 * base.BLOCK_ROWS + 7, "f8")):
+    for rows, precision in ((50, "f4"), (50, "f8"), (2 * formats.base.BLOCK_ROWS + 7, "f8")):
         values = np.random.default_rng(0).normal(0, 3, (rows, 7)).astype(precision)
         parsed = np.array([[float(number) for number in row.split(",")] for row in format_rows(values)])
         assert (parsed == np.round(values.astype(float), 5)).all()
@@ -146,7 +136,7 @@ def test_what_is_no_json_and_rows_of_other_things_are_refused() -> None:
 @pytest.fixture
 def path(tmp_path, generation):
     path = tmp_path / "a.json"
-    write_motion(path, generation, source={"file": "Größe.wav"}, model={"engine": "trajectory"})
+    formats.write_motion(path, generation, source={"file": "Größe.wav"}, model={"engine": "trajectory"})
     return path
 
 
@@ -190,27 +180,27 @@ WRONG: list[tuple[dict[str, object], str]] = [
 
 
 def test_what_is_wrong_is_said(path, generation):
-    assert read_motion(path)[1] == generation.units
+    assert formats.read_motion(path)[1] == generation.units
     document = json.loads(path.read_text(encoding="utf-8"))
     for change, message in WRONG:
         path.write_text(json.dumps({**document, **change}), encoding="utf-8")
         with pytest.raises(InputError, match=message):
-            read_motion(path)
+            formats.read_motion(path)
     for missing in ("rate_hz", "channels", "units"):
         path.write_text(json.dumps({key: document[key] for key in document if key != missing}), encoding="utf-8")
         with pytest.raises(InputError, match=f"{missing} is missing"):
-            read_motion(path)
+            formats.read_motion(path)
 
 
 @pytest.fixture
 def npz_path(tmp_path, generation):
     npz_path = tmp_path / "a.npz"
-    write_motion(npz_path, generation, source={"file": "Größe.wav"}, model={})
+    formats.write_motion(npz_path, generation, source={"file": "Größe.wav"}, model={})
     return npz_path
 
 
 def test_arrays_are_not_rounded_and_plain(npz_path, generation):
-    motion, _ = read_motion(npz_path)
+    motion, _ = formats.read_motion(npz_path)
     assert (motion.values == generation.motion.values).all()
     assert motion.channels == generation.motion.channels
     with np.load(npz_path, allow_pickle=False) as arrays:
@@ -223,22 +213,21 @@ def test_arrays_are_not_rounded_and_plain(npz_path, generation):
 def test_every_value_has_a_standard_deviation(tmp_path, generation):
     spread = np.random.default_rng(3).uniform(0.01, 4, generation.motion.values.shape)
     npz_path = tmp_path / "b.npz"
-    write_motion(npz_path, replace(generation, spread=spread), source={}, model={})
+    formats.write_motion(npz_path, replace(generation, spread=spread), source={}, model={})
     with np.load(npz_path, allow_pickle=False) as arrays:
         np.testing.assert_allclose(arrays["standard_deviations"], np.sqrt(spread), rtol=1e-6)
     reduced = ReducedVariance(spread[:, :1], np.array([[1.0, 4.0]]))
-    write_motion(npz_path, replace(generation, spread=reduced), source={}, model={})
+    formats.write_motion(npz_path, replace(generation, spread=reduced), source={}, model={})
     with np.load(npz_path, allow_pickle=False) as arrays:
         np.testing.assert_allclose(arrays["standard_deviations"], np.sqrt(spread[:, :1] * [1, 4]), rtol=1e-6)
-    assert (read_motion(npz_path)[0].values == generation.motion.values).all()
+    assert (formats.read_motion(npz_path)[0].values == generation.motion.values).all()
 
 
 RATE_HZ = 22_050
 
 
 def tone(duration_s: float = 2.0, level: float = 0.5) -> Audio:
-    count = round(duration_s * RATE_HZ)
-    return Audio((level * np.sin(np.arange(count) * 0.1)).astype(np.float32), RATE_HZ)
+    return Audio((level * np.sin(np.arange(round(duration_s * RATE_HZ)) * 0.1)).astype(np.float32), RATE_HZ)
 
 
 @pytest.mark.parametrize("rate_hz", [16_000, 22_050, 44_100])

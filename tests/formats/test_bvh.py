@@ -14,21 +14,20 @@ from children import run_child
 from formats.examples import generation, of_motion, written
 from formats.examples import written as write
 from lipmotion import read_motion
+from lipmotion import write as write_outputs
 from lipmotion.articulation.lip_points import build_mouth
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.bvh import CENTIMETRES
-from lipmotion.formats.live2d import TOLERANCE, measure_mouth_form, measure_mouth_open
+from lipmotion.formats.c3d import CENTIMETRES
+from lipmotion.formats.game_engines import TOLERANCE, measure_mouth_form, measure_mouth_open
 from lipmotion.formats.vmd import MORPHS
 from lipmotion.meshes.fitting.blendshape_motion import move_points, with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import gaze_to_weights, weights_to_gaze
 from lipmotion.meshes.model.mesh import ANGLES, turn_head
-from lipmotion.pipeline.outputs.motion_files import check_rate
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
 from lipmotion_faces.characters.gltf_document import read_gltf_document
 
 BVH_FRAMES = 60
-BLENDER = os.environ.get("LIPMOTION_BPY_PYTHON", "")
-"""A Python that has the package ``bpy``."""
+BLENDER = os.environ.get("LIPMOTION_BPY_PYTHON", "")  # a Python that has the package ``bpy``
 IN_BLENDER = """
 import bpy, json, sys
 bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -50,8 +49,7 @@ def talking_bvh() -> Generation:
     opening = 0.01 + 0.15 * (time_s > 0.3) * np.sin(2 * np.pi * 2 * time_s) ** 2
     width = 0.6 + 0.03 * np.sin(2 * np.pi * time_s)
     motion = Motion(np.stack([opening, width], axis=1), 50.0, (Channel("opening"), Channel("width")))
-    units = Timeline((Span(0.0, 0.3, Unit("sil")), Span(0.3, 1.2, Unit("aa"))))
-    return of_motion(motion, units)
+    return of_motion(motion, Timeline((Span(0.0, 0.3, Unit("sil")), Span(0.3, 1.2, Unit("aa")))))
 
 
 @pytest.fixture
@@ -107,30 +105,17 @@ def test_what_cannot_be_placed_is_refused(tmp_path, talking_bvh):
 
 
 VMD_FRAMES = 31
-VMD_NAMES = (
-    "aa",
-    "ih",
-    "ou",
-    "ee",
-    "oh",
-    "closed",
-    "eyeBlinkLeft",
-    "eyeBlinkRight",
-    "headYaw",
-    "headPitch",
-    "headRoll",
-)
+NAMES = ("aa", "ih", "ou", "ee", "oh", "closed", "eyeBlinkLeft", "eyeBlinkRight", *ANGLES)
 
 BROWS = tuple(Channel(name, WEIGHT) for name in ("browDownLeft", "browDownRight", "a", "b", "c"))
 
 
 @pytest.fixture
 def vmd_generation() -> Generation:
-    values = np.random.default_rng(5).random((VMD_FRAMES, len(VMD_NAMES)))
-    values[:, 7], values[:, 8:] = values[:, 6], values[:, 8:] - 0.5
-    values[5:25, 1] = 0.25
-    channels = tuple(Channel(name, "radian" if name.startswith("head") else WEIGHT) for name in VMD_NAMES)
-    return of_motion(Motion(values, 30.0, channels))
+    made = generation(*NAMES, frames=VMD_FRAMES)
+    made.motion.values[:, 7] = made.motion.values[:, 6]
+    made.motion.values[5:25, 1] = 0.3
+    return made
 
 
 @pytest.fixture
@@ -159,8 +144,8 @@ def test_the_bytes_are_those_of_the_format(vmd_path: Path, vmd_generation: Gener
 
 def test_what_is_written_is_read(vmd_path: Path, vmd_generation: Generation) -> None:
     motion, units = read_motion(vmd_path)
-    assert (motion.rate_hz, len(units), set(motion.names)) == (30.0, 0, set(VMD_NAMES))
-    for name in VMD_NAMES:
+    assert (motion.rate_hz, len(units), set(motion.names)) == (30.0, 0, set(NAMES))
+    for name in NAMES:
         assert motion[name] == pytest.approx(vmd_generation.motion[name], abs=1e-6)
     assert with_mouth(motion)["lip_gap"].max() > 0.1
     lowered = replace(
@@ -182,7 +167,7 @@ def test_eyes_turn_in_one_bone(tmp_path: Path, vmd_generation: Generation) -> No
 
 def test_the_head_turns_to_its_left_and_up(tmp_path: Path, vmd_generation: Generation) -> None:
     """MikuMikuDance's x is to the character's left, y up, z into its face."""
-    values = np.zeros((2, len(VMD_NAMES)))
+    values = np.zeros((2, len(NAMES)))
     values[1, 8] = 0.3
     vmd_path = written(tmp_path / "a.vmd", of_motion(replace(vmd_generation.motion, values=values)))
     x, y, z, w = struct.unpack_from("<4f", vmd_path.read_bytes(), 54 + 111 + 31)
@@ -191,15 +176,15 @@ def test_the_head_turns_to_its_left_and_up(tmp_path: Path, vmd_generation: Gener
 
 
 def test_held_poses_change_from_one_frame_to_the_next(tmp_path: Path, vmd_generation: Generation) -> None:
-    values = np.repeat([[0.1] * len(VMD_NAMES), [0.6] * len(VMD_NAMES)], [10, 21], axis=0)
-    held = of_motion(replace(vmd_generation.motion, values=values), stepped=VMD_NAMES)
+    values = np.repeat([[0.1] * len(NAMES), [0.6] * len(NAMES)], [10, 21], axis=0)
+    held = of_motion(replace(vmd_generation.motion, values=values), stepped=NAMES)
     assert read_motion(written(tmp_path / "a.vmd", held))[0]["aa"] == pytest.approx(values[:, 0], abs=1e-6)
 
 
-def test_it_has_one_rate() -> None:
-    check_rate(Path("a.vmd"), 30.0)
+def test_it_has_one_rate(tmp_path: Path, vmd_generation: Generation) -> None:
+    write_outputs(vmd_generation, tmp_path / "a.vmd", rate_hz=30)
     with pytest.raises(ExportError, match=r"a\.vmd: 60 frames a second in \.vmd, required 30: leave --rate out"):
-        check_rate(Path("a.vmd"), 60.0)
+        write_outputs(vmd_generation, tmp_path / "a.vmd", rate_hz=60)
 
 
 def _damaged(content: bytes, at: int, new: bytes) -> bytes:
@@ -209,15 +194,14 @@ def _damaged(content: bytes, at: int, new: bytes) -> bytes:
 def test_damaged_files_are_refused(vmd_path: Path) -> None:
     good = vmd_path.read_bytes()
     morphs = 50 + 4 + 111 * VMD_FRAMES + 4
-    cases = {
+    for message, content in {
         "its first bytes are not those of the format": b"PK" + good[2:],
         "is cut short": good[:-200],
         "a key of '頭' at frame 4294967295 is none": _damaged(good, 54 + 15, b"\xff" * 4),
         "a rotation of the bone 頭 is none": _damaged(good, 54 + 31, bytes(16)),
         "a key of 'あ' at frame 0 is none": _damaged(good, morphs + 19, struct.pack("<f", np.nan)),
         "has none of the morphs あ い う え お; its morphs are: none": good[:50] + bytes(20),
-    }
-    for message, content in cases.items():
+    }.items():
         vmd_path.write_bytes(content)
         with pytest.raises(InputError, match=message):
             read_motion(vmd_path)
@@ -245,8 +229,7 @@ def talking_live2d() -> Generation:
     opening = 0.01 + 0.15 * speaking * np.sin(2 * np.pi * 2 * time_s) ** 2
     width = 0.6 + 0.08 * speaking * np.sin(2 * np.pi * time_s)
     motion = Motion(np.stack([opening, width], axis=1), 100.0, (Channel("opening"), Channel("width")))
-    units = Timeline((Span(0.0, 1.0, Unit("sil")), Span(1.0, 3.0, Unit("aa"))))
-    return of_motion(motion, units)
+    return of_motion(motion, Timeline((Span(0.0, 1.0, Unit("sil")), Span(1.0, 3.0, Unit("aa")))))
 
 
 def read(path: Path) -> tuple[dict, dict[str, tuple[np.ndarray, np.ndarray]]]:
@@ -293,9 +276,8 @@ def test_curves_through_the_keys_are_those_of_the_mouth(tmp_path, talking_live2d
 def test_held_poses_change_at_once(tmp_path, talking_live2d):
     values = np.repeat([[0.01, 0.6], [0.16, 0.6], [0.01, 0.65]], 100, axis=0)
     steps = replace(talking_live2d, motion=replace(talking_live2d.motion, values=values), stepped=("opening", "width"))
-    paths = [
-        written(tmp_path / f"{n}.motion3.json", each) for n, each in enumerate((steps, replace(steps, stepped=())))
-    ]
+    both = enumerate((steps, replace(steps, stepped=())))
+    paths = [written(tmp_path / f"{number}.motion3.json", each) for number, each in both]
     assert read(paths[0])[1]["ParamMouthOpenY"][0].tolist() == [0, 1, 2, 2.99]
     held, smooth = (json.loads(path.read_text())["Curves"][0]["Segments"][2::3] for path in paths)
     assert (held, set(smooth)) == ([2, 2, 2], {0})
@@ -331,9 +313,6 @@ def test_what_does_not_open_is_refused(tmp_path, talking_live2d):
     assert not list(tmp_path.iterdir())
 
 
-NAMES = ("aa", "ih", "ou", "ee", "oh", "closed", "eyeBlinkLeft", "eyeBlinkRight", *ANGLES)
-
-
 @pytest.fixture
 def talking_vrm() -> Generation:
     return generation(*NAMES)
@@ -344,9 +323,7 @@ def path(talking_vrm: Generation, tmp_path: Path) -> Path:
     return written(tmp_path / "a.vrma", talking_vrm, path="a.wav")
 
 
-def test_what_is_written_is_read_with_moods_where_there_are_some(
-    path: Path, talking_vrm: Generation, tmp_path: Path
-) -> None:
+def test_what_is_written_is_read_with_moods_where_there_are_some(path, talking_vrm, tmp_path):
     motion, _ = read_motion(path)
     assert motion.rate_hz == 30
     for name in ("aa", "oh", "eyeBlinkLeft", "eyeBlinkRight", *ANGLES):

@@ -10,8 +10,7 @@ from formats.examples import of_motion
 from formats.examples import written as write
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats import read_motion
-from lipmotion.formats.c3d import BLOCK, C3dFile, read_c3d, write_c3d
-from lipmotion.formats.markers import MILLIMETRES, to_head_frame
+from lipmotion.formats.c3d import BLOCK, MILLIMETRES, C3dFile, read_c3d, to_head_frame, write_c3d
 from lipmotion.types import WEIGHT, Channel, Generation, Motion
 
 RNG = np.random.default_rng(11)
@@ -133,8 +132,7 @@ def test_axes_with_z_up_and_faces_that_look_the_other_way_are_turned(tmp_path):
     z_up = {name: np.stack([p[:, 0], -p[:, 2], p[:, 1]], axis=1) * 90 for name, p in still.items()}
     write_c3d(tmp_path / "a.c3d", capture(z_up))
     motion = read_motion(tmp_path / "a.c3d")[0]
-    place = np.stack([motion[f"{axis}_13"] for axis in "xyz"], axis=1)
-    np.testing.assert_allclose(place, still["LIP_13"], atol=1e-5)
+    np.testing.assert_allclose(np.stack([motion[f"{axis}_13"] for axis in "xyz"], axis=1), still["LIP_13"], atol=1e-5)
     behind = {name.split(":")[-1]: p * [-90.0, 90, -90] for name, p in still.items()}
     np.testing.assert_allclose(to_head_frame(behind, "mm")["LIP_13"], still["LIP_13"], atol=1e-9)
     mouth = {name: p * 90 for name, p in still.items() if ":" not in name}  # no eyes: an eye distance is stated
@@ -234,8 +232,7 @@ def test_files_of_other_processors(tmp_path, processor):
         (step,) = struct.unpack_from("<h", content, body)
         kind, sizes = struct.unpack_from("bB", content, body + 2)
         if content[at + 1] < 128 and kind in {2, 4}:
-            count = math.prod(content[body + 4 : body + 4 + sizes])
-            for number in range(count):
+            for number in range(math.prod(content[body + 4 : body + 4 + sizes])):
                 turned_number(body + 4 + sizes + number * kind, "h" if kind == 2 else "f")
         turned_number(body, "h")
         at = body + step
@@ -263,8 +260,7 @@ def long_capture(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
-TWO = b"\x02\x01\x02"
-"""What stands before a parameter of two whole numbers."""
+TWO = b"\x02\x01\x02"  # what stands before a parameter of two whole numbers
 NO_LONG, NO_END = {b"LONG_FRAMES": b"XXXX_FRAMES"}, {b"ACTUAL_END_FIELD": b"XXXXXX_END_FIELD"}
 
 

@@ -122,15 +122,13 @@ def test_drop_frame_over_minutes_and_midnight(tmp_path: Path, rate: int, mark: s
     """Numbers 0 and 1 (0 to 3 of 60) are left out in every minute but each tenth; a colon does not say so."""
     numbered = (n for n in range(rate * (86_400 - 2), rate * (86_400 + 62)))
     kept = [n for n in numbered if n % rate >= rate // 15 or n // rate % 60 or n // rate % 600 == 0]
-    rows = [f"{code(n, rate, 0, mark)},2,{n % 7 / 10},0" for n in kept]
-    motion = read(tmp_path / "a.csv", take(rows))
+    motion = read(tmp_path / "a.csv", take([f"{code(n, rate, 0, mark)},2,{n % 7 / 10},0" for n in kept]))
     assert motion.rate_hz == pytest.approx(rate / 1.001)
     assert motion["jawOpen"] == pytest.approx(np.array([n % 7 / 10 for n in kept]))
 
 
 def test_timecodes_without_frames_are_counted(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    rows = [f"10:00:{n // 30:02d},2,{n / 200},0" for n in range(17, 137)]
-    motion = read(tmp_path / "a.csv", take(rows))
+    motion = read(tmp_path / "a.csv", take([f"10:00:{n // 30:02d},2,{n / 200},0" for n in range(17, 137)]))
     assert motion.rate_hz == pytest.approx(30)
     assert "120 rows" in caplog.text
     with pytest.raises(InputError, match=r"begins with '00:00\.0', required a timecode"):
@@ -152,8 +150,7 @@ def test_timecodes_without_frames_are_counted(tmp_path: Path, caplog: pytest.Log
 )
 @pytest.mark.parametrize("names", ["jawOpen,mouthClose", "blendShapes.JawOpen,blendShapes.MouthClose", "JAW_OPEN,x_9"])
 def test_columns_of_times(tmp_path: Path, head: str, first: Any, names: str) -> None:
-    rows = [f"{first(n)},{jaw},0" for n, jaw in enumerate(JAW)]
-    motion = read(tmp_path / "a.csv", take(rows, f"{head},{names}"))
+    motion = read(tmp_path / "a.csv", take([f"{first(n)},{jaw},0" for n, jaw in enumerate(JAW)], f"{head},{names}"))
     assert len(motion.values) == 60
     assert motion.rate_hz == pytest.approx(30, abs=0.02)
     assert motion["jawOpen"] == pytest.approx(JAW)
@@ -236,9 +233,7 @@ def test_frames_of_weights_that_contradict_one_another(tmp_path: Path, caplog: p
 
 
 @pytest.mark.parametrize("counted", [24, 30, 60])
-def test_timecodes_that_count_whole_frames_of_television(
-    tmp_path: Path, counted: int, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_timecodes_that_count_whole_frames_of_television(tmp_path, counted, caplog):
     duration_s, rate_hz = 120.0, counted / 1.001
     jaw = (np.arange(int(duration_s * rate_hz)) / rate_hz > 118).astype(int)
     (tmp_path / "a.csv").write_text(take([f"{code(n, counted)},2,{each},0" for n, each in enumerate(jaw)]))

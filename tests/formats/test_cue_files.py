@@ -15,8 +15,7 @@ from lipmotion import CueSheet, read_motion
 from lipmotion.articulation.cue_sheets import choose_cues
 from lipmotion.articulation.mouth import find_mouth
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.cues import CUE_FORMATS, convert_cues, format_of, read_cues, write_cue_file
-from lipmotion.formats.papagayo import UNKNOWN
+from lipmotion.formats.cues import CUE_FORMATS, UNKNOWN, convert_cues, format_of, read_cues, write_cue_file
 from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 from lipmotion.units.phones import SHAPES
@@ -92,8 +91,7 @@ def test_what_is_written_is_read(sheet: CueSheet, tmp_path: Path) -> None:
         assert list(document) == ["metadata", "mouthCues"]
         root = ElementTree.fromstring(CUE_FORMATS["xml"].text(sheet, name))  # noqa: S314
         assert float(root.findtext("metadata/duration") or "") == sheet.duration_s
-        said = root.findtext("metadata/soundFile") or ""
-        assert said == name.replace("\x07", "\\x07").replace("\x00", "\\x00")
+        assert (root.findtext("metadata/soundFile") or "") == name.replace("\x07", "\\x07").replace("\x00", "\\x00")
     for name, kind in CUE_FORMATS.items():
         path = tmp_path / f"Größe.{name.upper()}"
         write_cue_file(path, sheet, "a.wav", format_of(path))
@@ -194,8 +192,7 @@ def test_every_frame_shows_the_cue_and_words_follow_each_other(toy_sentence: Toy
 def test_words_of_less_than_a_frame_are_joined() -> None:
     base = spoken("b aa b aa b")
     words = Timeline(tuple(Span(0.3 + 0.01 * n, 0.31 + 0.01 * n, f"w{n}") for n in range(4)))
-    sheet = replace(choose_cues(base), words=words)
-    _, phrases = read_project(CUE_FORMATS["pgo"].text(sheet, ""))
+    _, phrases = read_project(CUE_FORMATS["pgo"].text(replace(choose_cues(base), words=words), ""))
     found = [word for *_, words in phrases for word, *_ in words]
     assert len(found) < 4
     assert "-".join(found) == "w0-w1-w2-w3"
@@ -272,8 +269,7 @@ def test_motion_of_cues_that_are_written(form: str, motion_sheet: CueSheet, tmp_
     assert [cue.end_s for cue in again.cues] == pytest.approx(ends_s, abs=1 / 24 if form == "pgo" else 0.011)
     motion, units = read_motion(tmp_path / f"a.{form}")
     assert [span.label.phone for span in units] == "sil p aa f eh uw l s ao sil".split()
-    spoken = {span.label.word for span in units}
-    assert spoken == ({"", "map", "well"} if form == "pgo" else {""})
+    assert {span.label.word for span in units} == ({"", "map", "well"} if form == "pgo" else {""})
     assert motion.time_s[-1] == pytest.approx(2.5, abs=1 / 24)
 
 

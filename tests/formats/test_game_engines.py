@@ -143,8 +143,7 @@ def test_parameters_come_back(tmp_path, rate_hz):
     motion, units = read_motion(tmp_path / "a.fap")
     assert (motion.channels, motion.rate_hz, len(units)) == (written.motion.channels, rate_hz, 0)
     np.testing.assert_array_equal(motion.values, written.motion.values)
-    first = (tmp_path / "a.fap").read_text().splitlines()[0]
-    assert first == f"2.1 my_talk {rate_hz:g} 50"
+    assert (tmp_path / "a.fap").read_text().splitlines()[0] == f"2.1 my_talk {rate_hz:g} 50"
 
 
 def marks(*numbers: int) -> str:

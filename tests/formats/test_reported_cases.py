@@ -27,8 +27,7 @@ def words(path: Path, **choice: str) -> str:
 
 
 def phones(path: Path, **choice: str) -> list[str]:
-    units = read_phones(path, **choice)
-    return [span.label.phone or span.label.unit for span in units]
+    return [span.label.phone or span.label.unit for span in read_phones(path, **choice)]
 
 
 def times(path: Path) -> list[tuple[float | None, float | None]]:
@@ -201,7 +200,7 @@ def test_no_form_of_words_speaks_what_is_no_word(write: Any) -> None:
     whisper = [{"word": text, "start": a, "end": b} for a, b, text in rows]
     mfa = {"words": {"entries": [list(row) for row in rows]}}
     clock = "00:00:{:06.3f} --> 00:00:{:06.3f}\n{}\n\n"
-    forms = {
+    for name, content in {
         "a.TextGrid": grid(9, words=rows),
         "b.json": {"segments": [{"start": 0, "end": 9, "text": "", "words": whisper}]},
         "c.json": {"tiers": mfa},
@@ -209,8 +208,7 @@ def test_no_form_of_words_speaks_what_is_no_word(write: Any) -> None:
         "e.txt": "".join(f"{a:.2f}\t{b:.2f}\t{text}\n" for a, b, text in rows),
         "f.ctm": "".join(f"take 1 {a:.2f} {b - a:.2f} {text}\n" for a, b, text in rows),
         "g.vtt": "WEBVTT\n\n" + "".join(clock.format(*row) for row in rows if row[2] not in ("sil", "spn")),
-    }
-    for name, content in forms.items():
+    }.items():
         assert words(write(content, name)) == "mama uh", name
 
 
@@ -354,8 +352,7 @@ def test_phones_are_no_words(write: Any, name: str) -> None:
 def test_times_that_are_none_are_missing(write: Any) -> None:
     for start, end in ((math.nan, math.nan), (None, None), (math.inf, -math.inf), ("NaN", ""), (-5, None)):
         word = {"word": "big", "start": start, "end": end}
-        found = times(write({"segments": [{"start": 0, "end": 2, "text": "", "words": [word]}]}))
-        assert found == [(None, None)]
+        assert times(write({"segments": [{"start": 0, "end": 2, "text": "", "words": [word]}]})) == [(None, None)]
     assert times(CASES / "word-time-nan.json")[1] == (None, None)
 
 

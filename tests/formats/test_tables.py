@@ -82,8 +82,7 @@ def test_names_that_other_separators_would_part_are_refused_and_odd_ones_come_ba
 
 
 def test_uneven_times_of_other_programs_are_evened_out(tmp_path):
-    chance = np.random.default_rng(4)
-    times_s = np.sort(np.arange(300) / 60 + chance.uniform(-0.004, 0.004, 300))
+    times_s = np.sort(np.arange(300) / 60 + np.random.default_rng(4).uniform(-0.004, 0.004, 300))
     path = tmp_path / "a.csv"
     path.write_text("time,jaw\n" + "".join(f"{t},{t - times_s[0]}\n" for t in times_s))
     motion, _ = read_motion(path)
@@ -205,8 +204,7 @@ def test_uneven_times_and_lost_frames_are_evened_out(tmp_path, curves, caplog):
 
 def test_curves_that_speech_moves(curves, tmp_path):
     write_take(tmp_path / "take.csv", curves)
-    kept = read_speech_curves(read_motion(tmp_path / "take.csv")[0])
-    assert set(kept.names) == SPEECH_CURVES
+    assert set(read_speech_curves(read_motion(tmp_path / "take.csv")[0]).names) == SPEECH_CURVES
     with pytest.raises(InputError, match="none of its curves is one of mouth or jaw"):
         read_speech_curves(Motion(np.zeros((3, 1)), 60.0, (Channel("browInnerUp", WEIGHT),)))
 
@@ -296,7 +294,6 @@ def test_damaged_files_are_refused(tmp_path: Path, name: str) -> None:
     document, message = ERRORS[name]
     with pytest.raises(InputError, match=message):
         read_motion(file(tmp_path, document))
-    text = json.dumps(OWN).replace('"exportFps"', '"fps"')
-    (tmp_path / "b.a2f.json").write_text(text, encoding="utf-8")
+    (tmp_path / "b.a2f.json").write_text(json.dumps(OWN).replace('"exportFps"', '"fps"'), encoding="utf-8")
     with pytest.raises(InputError, match="exportFps is missing"):
         read_motion(tmp_path / "b.a2f.json")

@@ -19,13 +19,37 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # of the processes that read
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from fuzz.campaign import CampaignRecord, campaign
-from fuzz.good import good_in, make_good
+from fuzz.campaign import CampaignRecord, campaign, keep, row
 from fuzz.inputs import Good, picked_up
 from fuzz.judge import READ, REFUSED
 from fuzz.readers import READERS
-from fuzz.report import keep, row
 from fuzz.worker import Worker
+from lipmotion import Corpus, save_model, train
+from lipmotion.engines import engine_named
+from testing.toy import SMALL, toy_utterances
+
+SENTENCES = 6
+ENGINES: dict[str, dict[str, object]] = {
+    "trajectory": {},
+    "coupled": {"chains": "sVis 2vis", "mixtures": 1, "states": 2},
+    "joint": {},
+}
+
+
+def make_good(folder: Path) -> Good:
+    """Prepare a corpus, and train a model of every engine on it."""
+    corpus = Corpus.create(folder / "corpus")
+    for utterance in toy_utterances(SENTENCES):
+        corpus.add(utterance)
+    for name, options in ENGINES.items():
+        engine = engine_named(name, options)
+        model, _ = train(corpus, recogniser=SMALL, engine=engine)
+        save_model(model, folder / f"{name}.lipmotion")
+    return good_in(folder)
+
+
+def good_in(folder: Path) -> Good:
+    return Good(folder / "corpus", tuple(folder / f"{name}.lipmotion" for name in ENGINES))
 
 
 def main() -> int:

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from fuzz.campaign import CampaignRecord, campaign
+from fuzz.campaign import CampaignRecord, campaign, keep, row, smallest
 from fuzz.inputs import Files, Good, Reader, picked_up
 from fuzz.judge import CRASH, ERROR, HANG, IMPLAUSIBLE, LEFT, MEMORY, READ, REFUSED, Result, read_result
 from fuzz.planted import MEGABYTES, readers, seeds
-from fuzz.report import keep, row, smallest
 from fuzz.worker import Worker
 from lipmotion.errors import InputError
 

@@ -106,6 +106,11 @@ def align(hmm: UnitHmm, features: np.ndarray, units: Sequence[str]) -> np.ndarra
     return align_units(hmm, network.compute_log_likelihoods(hmm, features), units)
 
 
+def decode(hmm: UnitHmm, features: np.ndarray, inventory: Sequence[str]) -> tuple[tuple[str, ...], np.ndarray]:
+    loop = network.build_unit_loop(hmm, inventory)
+    return network.decode_path(loop, loop.network.best_path(network.compute_log_likelihoods(hmm, features)))
+
+
 def choose(hmm: UnitHmm, features: np.ndarray, words: Sequence[Sequence[Sequence[str]]]):
     return choose_pronunciations(hmm, network.compute_log_likelihoods(hmm, features), words, PAUSE)
 

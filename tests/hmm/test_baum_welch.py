@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 
 from hmm.synthetic import known_hmm, random_hmm, recordings, speaker
 from lipmotion.hmm import align, model, network, unit_training
-from lipmotion.hmm import baum_welch as module
-from lipmotion.hmm.baum_welch import accumulate_statistics, adapt_contexts, baum_welch, reestimate_states
+from lipmotion.hmm.unit_training import accumulate_statistics, adapt_contexts, baum_welch, reestimate_states
 from oracles import paths
 
 
@@ -66,7 +65,7 @@ def test_the_e_step_agrees_with_the_enumeration_of_all_paths():
         np.add.at(stays, chain.plain, stay)
         total += log_likelihood
     statistics = accumulate_statistics(hmm, data, said)
-    assert statistics.frames_of_densities == pytest.approx(occupied, abs=len(data) * 4 * module.MIN_POSTERIOR)
+    assert statistics.frames_of_densities == pytest.approx(occupied, abs=len(data) * 4 * unit_training.MIN_POSTERIOR)
     assert statistics.mean_log_likelihood == pytest.approx(total / sum(map(len, data)), abs=1e-4)
     keep = np.exp(reestimate_states(hmm, statistics).log_stay[visits > 0])
     assert keep == pytest.approx(np.clip(stays[visits > 0] / visits[visits > 0], 0.05, 11 / 12), abs=1e-4)
@@ -87,11 +86,11 @@ def test_utterances_together_are_as_each_alone_in_any_order():
 @given(sizes=st.lists(st.tuples(st.integers(1, 3000), st.integers(1, 600)), min_size=1, max_size=20))
 def test_long_utterances_do_not_fill_the_memory(sizes):
     frames, states = zip(*sizes, strict=True)
-    batches = list(module.group_by_length(frames, states))
+    batches = list(unit_training.group_by_length(frames, states))
     assert sorted(i for batch in batches for i in batch) == list(range(len(sizes)))
     for batch in batches:
         padded = len(batch) * max(frames[i] for i in batch) * max(states[i] for i in batch)
-        assert len(batch) == 1 or padded <= module.CELLS
+        assert len(batch) == 1 or padded <= unit_training.CELLS
 
 
 def test_an_utterance_too_short_for_its_units_counts_for_nothing():
@@ -111,8 +110,9 @@ def test_no_state_may_last_longer_than_its_limit():
     hmm = known_hmm(who)
     better, _ = step(hmm, data, [("sil", "a", "sil")] * 3)
     lasting = {name: 1 / -np.expm1(float(stay)) for name, stay in zip(hmm.table.names, better.log_stay, strict=True)}
-    assert [lasting[f"a.{state}"] for state in range(3)] == pytest.approx([module.LONGEST_STATE_FRAMES] * 3, rel=1e-4)
-    assert module.LONGEST_STATE_FRAMES < lasting["sil.0"] < module.LONGEST_SILENCE_FRAMES
+    longest = [lasting[f"a.{state}"] for state in range(3)]
+    assert longest == pytest.approx([unit_training.LONGEST_STATE_FRAMES] * 3, rel=1e-4)
+    assert unit_training.LONGEST_STATE_FRAMES < lasting["sil.0"] < unit_training.LONGEST_SILENCE_FRAMES
 
 
 def coarticulated(count: int):

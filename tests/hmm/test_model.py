@@ -9,6 +9,7 @@ from hmm.synthetic import (
     UNITS,
     align,
     choose,
+    decode,
     known_hmm,
     random_hmm,
     sentences,
@@ -18,7 +19,7 @@ from hmm.synthetic import (
 from lipmotion.errors import AlignmentError, ModelFormatError
 from lipmotion.hmm.align import align_units, expand_states, place_words, spread_windows
 from lipmotion.hmm.model import HmmConfig, hmm_from_arrays, hmm_to_arrays, make_plain_states
-from lipmotion.hmm.network import build_unit_loop, compute_log_likelihoods, decode_units
+from lipmotion.hmm.network import compute_log_likelihoods
 from lipmotion.kernels.paths import Windows
 from oracles import sequences
 
@@ -77,7 +78,7 @@ INVENTORY = (SILENCE, "a", "b")
 
 
 def decoded(hmm, features, inventory=INVENTORY):
-    units, bounds = decode_units(build_unit_loop(hmm, inventory), compute_log_likelihoods(hmm, features))
+    units, bounds = decode(hmm, features, inventory)
     return units, bounds.tolist()
 
 
@@ -150,7 +151,7 @@ def test_a_price_on_units_leaves_fewer():
 def test_chains_name_states_in_context_and_fall_back_where_unseen():
     hmm = random_hmm(1, contexts=8)
     chain = expand_states(hmm, ("sil", "a", "b", "sp", "a"))
-    names = [name for name, _ in chain.names]
+    names = list(chain.names)
     assert names[3:6] == ["a.0<sil", "a.1", "a.2>b"]
     assert names[6:9] == ["b.0<a", "b.1", "b.2>sil"]  # as a neighbour, a pause is silence
     assert names[10:] == ["a.0<sil", "a.1", "a.2>sil"]  # as beyond the end

@@ -10,6 +10,7 @@ from hmm.synthetic import (
     UNITS,
     align,
     chosen_units,
+    decode,
     recordings,
     sentences,
     speaker,
@@ -17,7 +18,6 @@ from hmm.synthetic import (
 )
 from lipmotion.errors import CorpusError
 from lipmotion.hmm import model, unit_training
-from lipmotion.hmm.network import build_unit_loop, compute_log_likelihoods, decode_units
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.types import silent_monitor
 
@@ -70,7 +70,7 @@ def test_new_sentences_are_recognised(trained):
     for number, words in enumerate(sentences(99, 15)):
         units = within_silence(words)
         features, edges = who.say(np.random.default_rng([99, number]), units)
-        found, bounds = decode_units(build_unit_loop(hmm, (SILENCE, *UNITS)), compute_log_likelihoods(hmm, features))
+        found, bounds = decode(hmm, features, (SILENCE, *UNITS))
         assert found == units, f"{set(pairwise(units)) - seen} were never seen in training"
         assert bounds == pytest.approx(edges, abs=2)
 

@@ -12,7 +12,7 @@ def network_posteriors(log_emission, emission, arc_from, arc_log, arc_start, log
     """
     network = ForwardBackwardNetwork.of(arc_from, arc_log, arc_start, log_initial, log_final)
     order, place = network.layout.order, network.layout.place
-    found = network.posteriors(log_emission, emission[order], np.array([len(log_emission)]))
+    found = network.posteriors([log_emission], [emission[order]], np.array([len(log_emission)]))
     return found.posterior[:, place], found.counts, float(found.log_likelihood[0])
 
 

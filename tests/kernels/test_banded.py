@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from kernels.conftest import load_numba
 from lipmotion.kernels.banded import build_equations, pin, solve, solve_mlpg
-from oracles import trajectories
+from oracles.statistics import generate_trajectory, window_matrix
 
 SEEDS = st.integers(0, 2**32 - 1)
 LENGTHS = st.integers(1, 24)
@@ -19,7 +19,7 @@ def statistics(seed: int, frames: int, channels: int = 2) -> tuple[np.ndarray, n
 def dense(mean, precision, pins=()) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return trajectory and variance of every channel; pins are (frame, channel, value)."""
     return [
-        trajectories.generate(mean[:, :, c], precision[:, :, c], [(t, v) for t, channel, v in pins if channel == c])
+        generate_trajectory(mean[:, :, c], precision[:, :, c], [(t, v) for t, channel, v in pins if channel == c])
         for c in range(mean.shape[2])
     ]
 
@@ -65,7 +65,7 @@ def test_static_windows_alone_generate_the_means(seed, frames):
 @settings(max_examples=25)
 def test_means_of_a_real_curve_generate_that_curve(seed, frames):
     curve = np.random.default_rng(seed).normal(0, 1, frames)
-    mean = (trajectories.window_matrix(frames) @ curve).reshape(3, frames).T[:, :, None]
+    mean = (window_matrix(frames) @ curve).reshape(3, frames).T[:, :, None]
     values, _ = solve(build_equations(mean, statistics(seed, frames, 1)[1]))
     assert values[:, 0] == pytest.approx(curve, abs=1e-10)
 

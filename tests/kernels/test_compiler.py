@@ -13,7 +13,7 @@ from kernels.conftest import load_numba
 from kernels.networks import network_posteriors, phone_loop
 from lipmotion.kernels import banded, compiler, factorial, factorial_loops, forward_backward
 from lipmotion.kernels.compiler import limit_threads, list_blas_kernels
-from lipmotion_faces.kernels import affine, normals, painting, raster, shading
+from lipmotion_faces.kernels import affine, painting, raster, shading
 from lipmotion_faces.kernels.textured import CLEAR, SOLID, TexturedTriangles, draw_textured
 
 TESTS = Path(__file__).parents[1]
@@ -43,7 +43,8 @@ def sequences() -> list[np.ndarray]:
     logs = [random.normal(-20, 2, (4, 6)).astype(np.float32) for _ in range(2)]
     found: list[Any] = []
     for kind in (np.float32, np.float64):
-        given = factorial_loops.FactorialLogLikelihoods.of(*(log.astype(kind) for log in logs))
+        pairs = np.empty((4, 0), kind), np.empty((0, 2), np.intp)
+        given = factorial_loops.FactorialLogLikelihoods(*(log.astype(kind) for log in logs), *pairs)
         posteriors = factorial.infer_factorial(loop, loop, given, 2)
         found += [*posteriors[:2], *posteriors.audio_counts, posteriors.log_likelihood]
         found += factorial_loops.find_factorial_path(loop, loop, given)
@@ -81,7 +82,7 @@ def pictures() -> list[np.ndarray]:
     stacked = np.zeros((12, 16, 4), np.uint16)
     painting.stack(layer, layer, np.dstack([layer, layer[..., 0]]) / 255, target, stacked)
     drawn = [light, plain, textured, opacity, frame, layer, target, moved, stacked]
-    return [*drawn, affine.resample(plain[None], to_source, (5, 6)), normals.sum_normals(points, triangles)]
+    return [*drawn, affine.resample(plain[None], to_source, (5, 6)), shading.sum_normals(points, triangles)]
 
 
 @pytest.mark.long

@@ -124,7 +124,7 @@ def of_network(draw, spread, extreme, kind=np.float64, chains_of=1, block=False)
     logs = [log_densities(draw, frames, size, spread).astype(kind) for size in sizes]
     columns = [draw.integers(size, size=states) for size in sizes]
     order, place = prepared.layout.order, prepared.layout.place
-    found = prepared.product_posteriors(logs, [column[order] for column in columns], np.array([frames]))
+    found = prepared.posteriors(logs, [column[order] for column in columns], np.array([frames]))
     joint = sum(log.astype(np.longdouble)[:, column] for log, column in zip(logs, columns, strict=True))
     ends = arrays["log_initial"], arrays["log_final"]
     posterior, counts, log_likelihood = paths.posteriors(joint, np.arange(states), arcs, *ends)

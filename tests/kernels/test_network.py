@@ -45,7 +45,7 @@ def test_no_path_says_so():
     expectation, factors, columns = chained(8, 5, 1.0)  # chains that allow nothing together
     for factor in factors:
         factor[2] = -np.inf
-    found = expectation.product_posteriors(factors, columns, np.array([5]))
+    found = expectation.posteriors(factors, columns, np.array([5]))
     assert log_likelihood == found.log_likelihood[0] == -np.inf
     assert not any(values.any() for values in (posterior, counts, found.posterior, found.counts))
 
@@ -56,7 +56,7 @@ def test_many_recordings_are_as_each_alone(frames):
     emission = arrays.pop("emission")
     expectation = ForwardBackwardNetwork.of(**arrays)
     log_emission = random_emission(3, sum(frames), len(emission))
-    together = expectation.posteriors(log_emission, emission[expectation.layout.order], np.array(frames))
+    together = expectation.posteriors([log_emission], [emission[expectation.layout.order]], np.array(frames))
     counts, start = np.zeros(len(arrays["arc_log"])), 0
     for number, count in enumerate(frames):
         mine = slice(start, start + count)
@@ -91,8 +91,8 @@ def test_recordings_left_by_single_precision_spoil_no_others():
     factors = [factor.astype(np.float32) for factor in factors]
     factors[0][40:50] *= 300
     frames = np.array([30, 30, 30])
-    found = expectation.product_posteriors(factors, columns, frames)
-    exact = expectation.product_posteriors([factor.astype(float) for factor in factors], columns, frames)
+    found = expectation.posteriors(factors, columns, frames)
+    exact = expectation.posteriors([factor.astype(float) for factor in factors], columns, frames)
     assert found.posterior == pytest.approx(exact.posterior, abs=1e-4)
     assert found.counts == pytest.approx(exact.counts, abs=1e-3)
     assert found.log_likelihood == pytest.approx(exact.log_likelihood, rel=1e-6)
@@ -108,7 +108,7 @@ def test_other_probabilities_on_the_same_arcs(seed):
     initial = np.random.default_rng(seed).normal(-3, 1, len(columns))
     changed = ForwardBackwardNetwork.of(*(old[name] for name in arrays)).with_arcs(new["arc_log"], initial)
     fresh = ForwardBackwardNetwork.of(*((new | {"log_initial": initial})[name] for name in arrays))
-    one, other = (network.posteriors(log_emission, columns, frames) for network in (changed, fresh))
+    one, other = (network.posteriors([log_emission], [columns], frames) for network in (changed, fresh))
     for found, expected in zip(one, other, strict=True):
         np.testing.assert_array_equal(found, expected)
 

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from lipmotion_faces.kernels import affine, painting
-from oracles import resampling
-from oracles.painting import paint_band
+from oracles import drawing
 
 WITHOUT_NUMBA = SimpleNamespace(
-    paint_band=paint_band, warp=painting.warp_arrays, stack=painting.stack_arrays,
+    paint_band=drawing.paint_band, warp=painting.warp_arrays, stack=painting.stack_arrays,
     warp_bytes=lambda source, *rest: painting.warp_packed_arrays(source.view(np.uint64)[..., 0], *rest),
 )  # fmt: skip
 
@@ -89,7 +88,7 @@ def test_every_pixel_is_that_of_the_definition(seed):
     picture, to_source = noise((9, 13, 3), seed), random_map(seed, 9) if seed else TURNED
     made = affine.resample(picture[None], to_source, (10, 8))
     assert made.dtype == np.float32
-    assert made[0] == pytest.approx(resampling.resample(picture, to_source, (10, 8), "cubic"), abs=2e-3)
+    assert made[0] == pytest.approx(drawing.resample(picture, to_source, (10, 8), "cubic"), abs=2e-3)
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -97,7 +96,7 @@ def test_every_blended_pixel_is_that_of_the_definition(seed):
     frame, patch = noise((14, 15, 3), seed), noise((9, 11, 3), seed + 10)
     weight = np.random.default_rng(seed).uniform(0, 1, (9, 11)).astype(np.float32)
     to_patch = random_map(seed, 9) if seed else TURNED
-    wanted = resampling.blended(frame[2:12, 3:11], patch, weight, to_patch, "cubic")
+    wanted = drawing.blended(frame[2:12, 3:11], patch, weight, to_patch, "cubic")
     result = frame.copy()
     affine.blend(result, (2, 3), (10, 8), patch, weight, to_patch)
     assert np.abs(result[2:12, 3:11] - wanted).max() <= 0.501

@@ -3,7 +3,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion_faces.kernels import raster
-from oracles import raster as oracle
+from oracles import drawing as oracle
 
 TONE = np.arange(256).astype(np.uint8)
 HEIGHT, WIDTH = 40, 56

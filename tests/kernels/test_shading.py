@@ -4,8 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion_faces.kernels import shading
-from lipmotion_faces.kernels.normals import sum_normals
-from oracles import shading as oracle
+from oracles import drawing as oracle
 
 
 def unit(vectors):
@@ -34,7 +33,7 @@ def test_every_bit_is_that_of_the_definition(seed):
 @pytest.mark.usefixtures("form")
 def test_normals_are_those_of_the_triangles_around_a_vertex():
     places = np.array([[0, 0, 0], [2, 0, 0], [0, 3, 0], [0, 0, 5], [9, 9, 9]], float)
-    sums = sum_normals(places, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    sums = shading.sum_normals(places, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
     assert sums == pytest.approx(np.array([[15, 0, 6], [0, 0, 6], [15, 0, 6], [15, 0, 0], [0, 0, 0]], float))
 
 

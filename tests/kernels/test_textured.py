@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion_faces.kernels.textured import SOLID, TexturedTriangles, draw_textured
-from oracles import raster as oracle
+from oracles import drawing as oracle
 
 TONE = np.arange(256).astype(np.uint8)
 HEIGHT, WIDTH = 40, 56

@@ -3,6 +3,7 @@
 import asyncio
 import copy
 import gc
+import itertools
 import socket
 import struct
 import tracemalloc
@@ -30,12 +31,15 @@ def sound() -> np.ndarray:
 
 
 def all_of(stream: Stream, samples: np.ndarray, sizes: list[int]) -> list[LiveFrame]:
-    frames, place, number = [], 0, 0
-    while place < len(samples):
-        size = sizes[number % len(sizes)]
-        frames += stream.push(samples[place : place + size])
-        place, number = place + size, number + 1
+    frames, coming = list[LiveFrame](), itertools.cycle(sizes)
+    while len(samples):
+        pieces = np.split(samples, [next(coming)])
+        frames, samples = frames + stream.push(pieces[0]), pieces[1]
     return frames + stream.flush()
+
+
+def opening_of(frames: list[LiveFrame]) -> np.ndarray:
+    return np.array([frame["opening"] for frame in frames])
 
 
 def values_of(frames: list[LiveFrame]) -> np.ndarray:
@@ -76,8 +80,7 @@ def test_without_a_limit_it_is_what_animate_makes(sound: np.ndarray) -> None:
     assert stream.push(sound[:48_000]) == []
     frames = stream.flush()
     expected = animate(Request(Audio(sound[:48_000], 16_000))).motion.resampled(50.0)
-    made = np.array([frame["opening"] for frame in frames])
-    assert made == pytest.approx(expected["opening"][: len(made)], abs=1e-9)
+    assert opening_of(frames) == pytest.approx(expected["opening"][: len(frames)], abs=1e-9)
     assert {frame.known_s for frame in frames} == {3.0}
 
 
@@ -86,14 +89,14 @@ def test_it_follows_the_whole_recording(sound: np.ndarray, look_ahead_ms: float)
     whole = animate(Request(Audio(sound, 16_000))).motion
     frames = all_of(Stream(look_ahead_ms=look_ahead_ms), sound, [640])
     time_s = np.array([frame.time_s for frame in frames])
-    opening = np.array([frame["opening"] for frame in frames])
+    opening = opening_of(frames)
     assert np.corrcoef(opening, np.interp(time_s, whole.time_s, whole["opening"]))[0, 1] > 0.6
 
 
 def test_it_rests_in_silence_and_within_100_ms_after_it(sound: np.ndarray) -> None:
     line = np.concatenate([np.zeros(16_000), sound[:40_000], np.zeros(16_000)]).astype(np.float32)
     frames = all_of(Stream(), line, [640])
-    opening = np.array([frame["opening"] for frame in frames])
+    opening = opening_of(frames)
     assert opening[:45].max() < 0.01
     assert opening[-35:].max() < 0.01
     assert opening.max() > 0.08
@@ -114,7 +117,7 @@ def test_an_interruption_rests_and_time_goes_on(sound: np.ndarray, turns: int) -
             frames += rested
     frames += stream.flush()
     assert [frame.number for frame in frames] == list(range(len(frames)))
-    opening = np.array([frame["opening"] for frame in frames])
+    opening = opening_of(frames)
     assert np.isfinite(values_of(frames)).all()
     assert np.abs(np.diff(opening)).max() < 0.12
 
@@ -123,7 +126,7 @@ def test_the_mouth_goes_on_from_where_it_was(sound: np.ndarray) -> None:
     """A line that ends in the middle of a word, and the next one."""
     stream = Stream()
     frames = stream.push(sound[:30_400]) + stream.flush() + stream.push(sound[20_000:60_000]) + stream.flush()
-    opening = np.array([frame["opening"] for frame in frames])
+    opening = opening_of(frames)
     assert [frame.number for frame in frames] == list(range(len(frames)))
     assert np.abs(np.diff(opening)).max() < 0.0801
     assert max(frame.known_s for frame in frames[:95]) <= 1.9 + 1e-9
@@ -138,7 +141,7 @@ def test_an_interruption_takes_back_what_is_not_heard_yet(sound: np.ndarray) -> 
     assert stream.push(sound[:16_000])[0].time_s == pytest.approx(frames[-1].time_s + STEP_S)
 
 
-def test_a_copy_goes_on_by_itself(sound: np.ndarray) -> None:
+def test_a_copy_goes_on_by_itself_and_sound_may_come_while_others_work(sound: np.ndarray) -> None:
     stream = Stream()
     stream.push(sound[:20_000])
     other = copy.deepcopy(stream)
@@ -146,8 +149,6 @@ def test_a_copy_goes_on_by_itself(sound: np.ndarray) -> None:
     stream.push(sound)
     assert np.array_equal(values_of(other.push(sound[20_000:40_000])), first)
 
-
-def test_sound_that_comes_while_others_work(sound: np.ndarray) -> None:
     async def pieces() -> AsyncIterator[np.ndarray]:
         for first in range(0, 32_000, 640):
             await asyncio.sleep(0)
@@ -199,10 +200,7 @@ def test_what_cannot_be_heard_is_refused_and_the_stream_goes_on(sound: np.ndarra
 
 def test_natural_pauses_stay_as_people_s_do(sound: np.ndarray) -> None:
     line = np.concatenate([sound[:40_000], np.zeros(16_000)]).astype(np.float32)
-    rested, natural = (
-        np.array([frame["opening"] for frame in all_of(Stream(pauses=pauses), line, [640])])
-        for pauses in ("rest", "natural")
-    )
+    rested, natural = (opening_of(all_of(Stream(pauses=pauses), line, [640])) for pauses in ("rest", "natural"))
     assert rested[-20:].max() < 0.005
     assert 0.005 < natural[-20:].max() < 0.08
     with pytest.raises(InputError, match="'none'"):
@@ -306,18 +304,15 @@ def read_osc(packet: bytes) -> list[tuple[str, list[str | float]]]:
     return [(message.address, message.params) for message in osc.OscBundle(packet)]
 
 
-def test_vmc_receivers_get_vowels_and_perfect_sync() -> None:
+def test_vmc_receivers_get_vowels_and_perfect_sync_and_osc_has_an_address_for_every_value() -> None:
     *values, last = read_osc(vmc_packet(frame()))
     assert last == ("/VMC/Ext/Blend/Apply", [])
     assert {address for address, _ in values} == {"/VMC/Ext/Blend/Val"}
     named = {name: value for _, (name, value) in values}
     assert named["A"] == pytest.approx(frame()["viseme_aa"])
     assert named["jawOpen"] == pytest.approx(frame()["jawOpen"])
-
-
-def test_osc_has_an_address_for_every_value() -> None:
-    values = dict(read_osc(osc_packet(frame())))
-    assert (len(values), values["/lipmotion/opening"]) == (2 + len(WEIGHT_NAMES), [0.125])
+    by_address = dict(read_osc(osc_packet(frame())))
+    assert (len(by_address), by_address["/lipmotion/opening"]) == (2 + len(WEIGHT_NAMES), [0.125])
 
 
 def test_live_link_packets_are_read_as_by_the_app() -> None:
@@ -337,19 +332,16 @@ def test_live_link_packets_are_read_as_by_the_app() -> None:
     assert read.get_blendshape(face.FaceBlendShape.JawOpen) == pytest.approx(frame()["jawOpen"])
 
 
-def test_frames_reach_a_receiver() -> None:
+def test_frames_reach_a_receiver_and_what_takes_none_is_refused() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))
         receiver.settimeout(20)
         with open_consumer(f"vmc:127.0.0.1:{receiver.getsockname()[1]}", print) as take:
             take(frame())
         assert receiver.recv(65_536) == vmc_packet(frame())
-
-
-@pytest.mark.parametrize("to", ["nothing", "vmc:here:x", "osc:127.0.0.1:700000"])
-def test_what_takes_no_frames_is_refused(to: str) -> None:
-    with pytest.raises(InputError, match=f"--to {to}"), open_consumer(to, print):
-        pass
+    for to in ("nothing", "vmc:here:x", "osc:127.0.0.1:700000"):
+        with pytest.raises(InputError, match=f"--to {to}"), open_consumer(to, print):
+            pass
 
 
 def test_words_with_odd_times_do_no_harm() -> None:

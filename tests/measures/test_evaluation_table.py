@@ -64,14 +64,13 @@ def figures():
             },
         }
 
-    result = {
+    return {
         "split": "val",
         "clips": int(figure(".0f", 1)),
         "closed_under": figure(".4f", 0.0001),
         "still_channels": [],
         "conditions": {"audio only": condition(), "with transcript": condition()},
-    }
-    return result, printed
+    }, printed
 
 
 def test_every_figure_is_printed_as_often_as_it_is_there():
@@ -79,8 +78,7 @@ def test_every_figure_is_printed_as_often_as_it_is_there():
     text = format_figures(result)
     assert len(set(printed)) == len(printed)
     words = text.replace(",", " ").replace(";", " ").replace(")", " ").replace("(", " ").split()
-    missing = [number for number in printed if number not in words]
-    assert not missing
+    assert not [number for number in printed if number not in words]
     for name in ("split val", "audio only", "with transcript", "opening", "width"):
         assert name in text
 

@@ -48,8 +48,7 @@ def with_skin(content: dict, binary: bytes, joints: np.ndarray, weights: np.ndar
     return binary
 
 
-UV = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]], "<f4")
-"""Of the square, v goes down."""
+UV = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]], "<f4")  # of the square, v goes down
 
 
 def textured_document(picture: bytes, material=None, extension=None) -> tuple[dict, bytes]:
@@ -123,8 +122,7 @@ def packed_attributes(elements: np.ndarray) -> bytes:
     for first in range(0, count, rows):
         block = elements[first : first + rows]
         for column in range(stride):
-            values = np.concatenate([[last[column]], block[:, column]]).astype(int)
-            deltas = np.diff(values) & 255
+            deltas = np.diff(np.concatenate([[last[column]], block[:, column]]).astype(int)) & 255
             signed = np.where(deltas > 127, deltas - 256, deltas)
             coded = np.where(signed < 0, -2 * signed - 1, 2 * signed).astype(np.uint8)
             groups = -(-len(coded) // 16)

@@ -11,12 +11,10 @@ from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
 from lipmotion.types import Motion
 from lipmotion_faces.characters import gltf_writer, scene
 
-SEAM, HALF = -0.86, 0.3
-"""Height of the mouth and half its width, in eye distances."""
+SEAM, HALF = -0.86, 0.3  # height of the mouth and half its width, in eye distances
 COLUMNS = np.linspace(-1.2, 1.2, 49)
 ROWS = np.linspace(0.34, -2.06, 49)
-SIZE = 10.0
-"""Units of the mesh in an eye distance."""
+SIZE = 10.0  # units of the mesh in an eye distance
 
 
 def head(*, shapes: bool = True, slit: bool = True, size: float = SIZE) -> Mesh:
@@ -38,8 +36,7 @@ def lip_points(mesh: Mesh, size: float = SIZE) -> dict[int, int]:
     names = {}
     for point, x in ((61, -HALF), (291, HALF)):
         names[point] = int(np.abs(places - [x, SEAM, _depth(x, SEAM)]).sum(axis=1).argmin())
-    middle = np.flatnonzero(np.abs(places[:, 0]) + np.abs(places[:, 1] - SEAM) < 1e-6)
-    upper, lower = middle[:2].tolist()
+    upper, lower = np.flatnonzero(np.abs(places[:, 0]) + np.abs(places[:, 1] - SEAM) < 1e-6)[:2].tolist()
     return names | {13: upper, 14: lower}
 
 

@@ -24,8 +24,7 @@ HEAD = ",".join(["Timecode", "BlendShapeCount", *COLUMNS])
 
 def timecode(time_s: float, rate: float = 60.0, mark: str = ":") -> str:
     """Return a time as ``HH:MM:SS:FF.mmm``."""
-    thousandths = round(time_s * rate * 1000)
-    frames, thousandth = divmod(thousandths, 1000)
+    frames, thousandth = divmod(round(time_s * rate * 1000), 1000)
     seconds, frame = divmod(frames, round(rate))
     minutes, second = divmod(seconds, 60)
     return f"{minutes // 60 % 24:02d}:{minutes % 60:02d}:{second:02d}{mark}{frame:02d}.{thousandth:03d}"

@@ -7,8 +7,7 @@ from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 
 PHONES = (("sil", 0.0, 0.5), ("m", 0.5, 0.6), ("aa", 0.6, 0.9), ("p", 0.9, 1.0), ("uw", 1.0, 1.3), ("sil", 1.3, 2.0))
 OPENINGS = (0.005, 0.0, 0.2, 0.0, 0.06, 0.005)
-JAWS = (0.0, 0.03, 0.15, 0.08, 0.05, 0.0)
-"""How far the chin is down: in p the jaw is still open behind closed lips."""
+JAWS = (0.0, 0.03, 0.15, 0.08, 0.05, 0.0)  # how far the chin is down: in p the jaw is still open behind closed lips
 WIDTHS = (0.59, 0.58, 0.60, 0.57, 0.50, 0.59)
 
 
@@ -25,8 +24,7 @@ def motion(*, points: bool = True, rate_hz: float = 100.0) -> Motion:
     """Curves through the middles of the phones; with points, the lips open about the seam and the chin follows."""
     time_s = np.arange(int(2.0 * rate_hz) + 1) / rate_hz
     middles = [start + share * (end - start) for _, start, end in PHONES for share in (0.3, 0.5, 0.7)]
-    curves = (np.interp(time_s, middles, np.repeat(values, 3)) for values in (OPENINGS, WIDTHS, JAWS))
-    opening, width, jaw = curves
+    opening, width, jaw = (np.interp(time_s, middles, np.repeat(values, 3)) for values in (OPENINGS, WIDTHS, JAWS))
     channels = [Channel("opening"), Channel("width")]
     columns = [opening, width]
     if points:

@@ -9,7 +9,6 @@ from lipmotion import errors, types
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, build_mouth
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.meshes.fitting import blendshape_motion, shape_weights
-from lipmotion.meshes.fitting.driven import skin_vertices
 from lipmotion.meshes.fitting.shape_weights import OPPOSED, CurveCosts, cancel_opposed, fit_bounded_curves, round_lips
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion_faces.characters import binding as binding_files
@@ -47,8 +46,7 @@ def test_the_lower_lip_does_not_drag_the_upper_and_teeth_follow_the_jaw(binding,
     lower = binding.placement.vertices[template.lower & middle]
     assert np.abs(moved[upper]).max() < 0.02
     assert moved[lower, 1].max() < -0.9
-    chin = binding.placement.vertices[template.row(152)]
-    assert moved[chin, 1] < -0.9
+    assert moved[binding.placement.vertices[template.row(152)], 1] < -0.9
     teeth = next(part for part in mesh.parts if part.name == "teeth")
     rows = np.unique(mesh.triangles[teeth.first : teeth.stop])
     moved = _moved(binding, mesh, template.jaw, [0, -0.5, 0])
@@ -71,9 +69,7 @@ def test_skinning_is_the_weighted_sum_of_the_transformed_vertices(binding, mesh)
     rng = np.random.default_rng(3)
     matrices = np.tile(np.eye(3, 4), (len(binding.placement.points), 1, 1)) + 0.1 * rng.normal(size=(52, 3, 4))
     rows = binding.rows[:40]
-    fast = skin_vertices(binding.matrix[:40], matrices, mesh.vertices[rows])
     slow = skinned_vertex_by_vertex(binding.matrix[:40].toarray(), matrices, mesh.vertices[rows])
-    np.testing.assert_allclose(fast, slow, atol=1e-9)
     np.testing.assert_allclose(binding.transformed(mesh, matrices)[rows], slow, atol=1e-9)
 
 
@@ -142,8 +138,7 @@ def test_paint_is_checked(binding, mesh, tmp_path):
             paint_weights(binding, mesh, binding_files.read_weights(tmp_path / "paint.csv"))
 
 
-GRID = 0.05 * SIZE
-"""The distance between vertices."""
+GRID = 0.05 * SIZE  # the distance between vertices
 
 
 def _named(mesh):
@@ -237,9 +232,8 @@ def shapes(request):
 @pytest.fixture(scope="module")
 def weights(shapes):
     """Of motion with points for the mesh, of distances alone for the reference."""
-    return shape_weights.solve_shape_weights(
-        motion(points=shapes is not blendshape_motion.arkit_mouth()), units(), shapes
-    )
+    of_mesh = shapes is not blendshape_motion.arkit_mouth()
+    return shape_weights.solve_shape_weights(motion(points=of_mesh), units(), shapes)
 
 
 def test_weights_are_between_0_and_1_and_smooth_and_pucker_in_oo(weights):
@@ -304,8 +298,7 @@ def test_visemes_are_used_where_there_is_no_jaw_shape():
     assert found["viseme_aa"][75] > 0.2
     assert found["viseme_aa"][:40].max() < 0.02
     assert found["viseme_U"][115] > found["viseme_U"][75]
-    gap = found.values @ shapes.gap
-    assert gap[[55, 95]].max() < 1e-6
+    assert (found.values @ shapes.gap)[[55, 95]].max() < 1e-6
 
 
 _EXACT = CurveCosts(ridge=1e-7, smooth=0.0)
@@ -315,8 +308,7 @@ def _of(displacements, gap):
     """Motion whose points are displaced so."""
     template = build_mouth()
     places = template.places + displacements
-    rest = np.tile(template.places, (30, 1, 1))
-    places = np.concatenate([rest, places])
+    places = np.concatenate([np.tile(template.places, (30, 1, 1)), places])
     channels = [types.Channel(f"{axis}_{point}") for point in template.points for axis in "xyz"]
     opening = np.concatenate([np.zeros(30), np.maximum(gap, 0)])[:, None]
     values = np.concatenate([opening, opening, places.reshape(len(places), -1)], axis=1)
@@ -342,8 +334,7 @@ def test_all_frames_together_are_the_exact_solution():
     near, smooth = np.kron(np.eye(frames), [[0.3, -0.3, 0.0]]), np.kron(np.diff(np.eye(frames), 2, axis=0), np.eye(3))
     rows = np.concatenate([fit, ridge, near, np.sqrt(0.7) * smooth])
     wanted = np.concatenate([targets.reshape(-1), np.zeros(len(rows) - targets.size)])
-    exact = lsq_linear(rows, wanted, (0, 1), tol=1e-12).x.reshape(frames, 3)
-    np.testing.assert_allclose(found, exact, atol=1e-4)
+    np.testing.assert_allclose(found, lsq_linear(rows, wanted, (0, 1), tol=1e-12).x.reshape(frames, 3), atol=1e-4)
 
 
 def test_more_cost_is_smoother():
@@ -358,8 +349,7 @@ def test_more_cost_is_smoother():
 
 def test_the_weights_are_never_less_round_than_before():
     shapes = blendshape_motion.arkit_mouth()
-    weights = np.full((3, len(shapes.names)), 0.3)
-    result = round_lips(weights, shapes, np.array([0.0, 0.5, 1.0]))
+    result = round_lips(np.full((3, len(shapes.names)), 0.3), shapes, np.array([0.0, 0.5, 1.0]))
     pucker, smile = shapes.row("mouthPucker"), shapes.row("mouthSmileLeft")
     assert result[:2, pucker] == pytest.approx([0.3, 0.3])
     assert 0.3 <= result[2, pucker] <= 0.5

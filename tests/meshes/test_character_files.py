@@ -34,8 +34,7 @@ def test_polygons_become_triangles_and_materials_parts(tmp_path):
 
 
 def test_parts_that_are_written_alternately_are_put_together(tmp_path):
-    text = QUAD + "usemtl teeth\nf 1 2 3\nusemtl skin\nf 2 3 4\n"
-    mesh = character_files.read_obj(_obj(tmp_path, text))
+    mesh = character_files.read_obj(_obj(tmp_path, QUAD + "usemtl teeth\nf 1 2 3\nusemtl skin\nf 2 3 4\n"))
     assert [(part.name, part.stop - part.first) for part in mesh.parts] == [("skin", 3), ("teeth", 1)]
     assert mesh.uv[1].tolist() == [[0, 0], [1, 1], [0, 1]]  # of corners, not of vertices
 

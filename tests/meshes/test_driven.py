@@ -11,14 +11,8 @@ from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import find_mouth
 from lipmotion.errors import InputError
-from lipmotion.meshes.fitting import driven, eyes_and_brows, shape_weights
-from lipmotion.meshes.fitting.blendshape_motion import (
-    arkit_mouth,
-    arkit_weights,
-    find_own_weights,
-    is_of_blendshapes,
-    with_mouth,
-)
+from lipmotion.meshes.fitting import blendshape_motion, driven, eyes_and_brows, shape_weights
+from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, with_mouth
 from lipmotion.meshes.model import face_shapes, rig_tables, shape_names
 from lipmotion.meshes.model.mesh import ANGLES, HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE, Bone
 from lipmotion.types import WEIGHT, Channel, Motion, Span, Timeline, Unit, delivery
@@ -64,8 +58,7 @@ def test_the_lips_follow_the_motion(files, by):
         character = load_character(files / "head.glb", by_points=by == "control points")
     assert (character.shapes is None) == (by != "blendshapes")
     gaps = [_gap(character, vertices) for vertices in character.vertices(motion(), units(), TIME_S)]
-    opening = motion().at(TIME_S)[:, 0]
-    assert np.corrcoef(gaps, opening)[0, 1] > 0.98
+    assert np.corrcoef(gaps, motion().at(TIME_S)[:, 0])[0, 1] > 0.98
     assert max(gaps[14], gaps[24]) < 0.004  # m and p
     assert max(gaps[:10]) < 0.004
 
@@ -73,8 +66,7 @@ def test_the_lips_follow_the_motion(files, by):
 def test_only_the_moving_vertices_move_and_finer_shapes_show_no_whole_expressions(files):
     character = load_character(files / "head.glb")
     still = np.setdiff1d(np.arange(len(character.mesh.vertices)), character.moving)
-    others = {"eyeBlinkLeft": np.linspace(0, 1, len(TIME_S))}
-    for vertices in character.vertices(motion(), units(), TIME_S, others):
+    for vertices in character.vertices(motion(), units(), TIME_S, {"eyeBlinkLeft": np.linspace(0, 1, len(TIME_S))}):
         np.testing.assert_allclose(vertices[still], character.mesh.vertices[still], atol=1e-12)
     eyes = character.mesh.vertices[:, 1] > 2.1
     assert np.abs(vertices - character.mesh.vertices)[eyes, 1].max() == pytest.approx(0.5, abs=1e-5)
@@ -115,8 +107,7 @@ def test_whole_expressions_stand_for_moods_where_there_are_no_finer_shapes(tmp_p
     write_glb(tmp_path / "head.glb", _expressive("Happy", "surprised"))
     character = load_character(tmp_path / "head.glb")
     moved = with_moods(motion(), parse_moods("happy:0.5, afraid at 1.5"))
-    mouth = find_mouth(moved, units())
-    weights = character.expressions(moved, mouth)
+    weights = character.expressions(moved, find_mouth(moved, units()))
     assert {*weights} == {"Happy", "surprised"}
     assert weights["Happy"][:100] == pytest.approx(0.5)
     assert weights["surprised"][-1] == pytest.approx(0.5)
@@ -138,8 +129,7 @@ def test_control_points_raise_the_corners_in_a_smile(files):
 
 
 COLUMNS = "control,source,gain,offset\n"
-CLOSED = [20, 55, 95]
-"""Frames of silence, m and p."""
+CLOSED = [20, 55, 95]  # frames of silence, m and p
 
 
 @pytest.fixture
@@ -321,19 +311,19 @@ def test_motion_that_became_weights_comes_back() -> None:
 
 
 def test_weights_that_are_given_are_taken_and_other_motion_stays_as_it_is() -> None:
-    given = find_own_weights(weights(head_jawOpen=[0.2, 1.4], mouthPucker=[0.1, 0.2]), arkit_mouth())
+    given = blendshape_motion.find_own_weights(weights(head_jawOpen=[0.2, 1.4], mouthPucker=[0.1, 0.2]), arkit_mouth())
     assert given.names == arkit_mouth().names
     assert given["jawOpen"].tolist() == [0.2, 1.0]
     assert given["mouthFunnel"].tolist() == [0.0, 0.0]
     for other in (motion(), weights(mouthPucker=[0.1, 0.2])):  # without a jaw
-        assert find_own_weights(other, arkit_mouth()) is None
+        assert blendshape_motion.find_own_weights(other, arkit_mouth()) is None
         assert with_mouth(other) is other
-        assert not is_of_blendshapes(other)
+        assert not blendshape_motion.is_of_blendshapes(other)
     facegood = weights(mouth_stretch_c=[0.0, 0.6], mouth_pucker_l=[0.4, 0.0], mouth_pucker_r=[0.4, 0.0])
-    found = arkit_weights(facegood)
+    found = blendshape_motion.arkit_weights(facegood)
     assert found["jawOpen"].tolist() == [0.0, 0.6]
     assert found["mouthPucker"].tolist() == pytest.approx([0.4, 0.0])
-    assert is_of_blendshapes(facegood)
+    assert blendshape_motion.is_of_blendshapes(facegood)
 
 
 def test_a_mesh_shows_the_weights_that_are_given() -> None:

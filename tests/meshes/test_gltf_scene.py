@@ -60,8 +60,7 @@ def test_quantised_positions(tmp_path):
     content["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": 32, "byteStride": 8})
     content["accessors"][0] = {"bufferView": 4, "componentType": 5122, "count": 4, "type": "VEC3", "normalized": True}
     content["nodes"][0]["scale"] = [3, 3, 3]
-    mesh = _read(tmp_path, content, binary + small.tobytes())
-    np.testing.assert_allclose(mesh.vertices, 3 * POSITIONS, atol=1e-6)
+    np.testing.assert_allclose(_read(tmp_path, content, binary + small.tobytes()).vertices, 3 * POSITIONS, atol=1e-6)
 
 
 def test_sparse_targets(tmp_path):
@@ -71,20 +70,17 @@ def test_sparse_targets(tmp_path):
     binary, _ = with_array(content, binary, moved, "VEC3")
     sparse = {"count": 2, "indices": {"bufferView": 4, "componentType": 5123}, "values": {"bufferView": 5}}
     content["accessors"][1] = {"componentType": 5126, "count": 4, "type": "VEC3", "sparse": sparse}
-    mesh = _read(tmp_path, content, binary)
-    np.testing.assert_allclose(shaped(mesh, {"jawOpen": 1}), POSITIONS + OPEN, atol=1e-7)
+    np.testing.assert_allclose(shaped(_read(tmp_path, content, binary), {"jawOpen": 1}), POSITIONS + OPEN, atol=1e-7)
 
 
 def test_compressed_attributes(tmp_path):
     content, binary = document()
-    stored = np.ascontiguousarray(POSITIONS).view(np.uint8).reshape(4, 12)
-    packed = packed_attributes(stored)
+    packed = packed_attributes(np.ascontiguousarray(POSITIONS).view(np.uint8).reshape(4, 12))
     extension = {"buffer": 0, "byteOffset": len(binary), "byteLength": len(packed), "byteStride": 12, "count": 4}
     content["bufferViews"][0]["extensions"] = {"EXT_meshopt_compression": extension | {"mode": "ATTRIBUTES"}}
     content["bufferViews"][0]["buffer"] = 1
     content["buffers"].append({"byteLength": 48})
-    mesh = _read(tmp_path, content, binary + packed)
-    np.testing.assert_allclose(mesh.vertices, POSITIONS, atol=1e-7)
+    np.testing.assert_allclose(_read(tmp_path, content, binary + packed).vertices, POSITIONS, atol=1e-7)
 
 
 def test_skins_at_rest(tmp_path):
@@ -163,8 +159,7 @@ def test_attributes_come_back():
         np.testing.assert_array_equal(meshopt.decode_attributes(packed_attributes(elements), count, stride), elements)
 
 
-TAIL = bytes.fromhex("76 87 56 67 78 a9 86 65 89 68 98 01 69 00 00")
-"""The table at the end of each stream of triangles."""
+TAIL = bytes.fromhex("76 87 56 67 78 a9 86 65 89 68 98 01 69 00 00")  # the table at the end of each stream of triangles
 
 
 @pytest.mark.parametrize(
@@ -233,9 +228,7 @@ def test_what_is_written_of_a_character_is_read(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_uneven_keys_are_sampled(
-    tmp_path: Path, kind: str, values: Any, expected: dict[float, tuple[float, float]]
-) -> None:
+def test_uneven_keys_are_sampled(tmp_path, kind, values, expected):
     motion, _ = read_motion(animated(tmp_path, [0.5, 1.0, 2.0], values, kind))
     assert motion.rate_hz == 60
     for time_s, row in expected.items():
@@ -445,9 +438,7 @@ def test_held_weights_change_at_once(original: Path, tmp_path: Path) -> None:
     assert stored["jawOpen"] == pytest.approx([0, 0, 0, 1])
 
 
-def test_what_is_no_morph_target_and_buffers_elsewhere_are_left_to_another_writer(
-    original: Path, tmp_path: Path
-) -> None:
+def test_what_is_no_morph_target_and_buffers_elsewhere_are_left_to_another_writer(original, tmp_path):
     content, binary = gltf.document()
     content["buffers"][0]["uri"] = gltf.data_uri(binary)
     (tmp_path / "elsewhere.gltf").write_text(json.dumps(content))

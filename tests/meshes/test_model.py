@@ -3,7 +3,7 @@ import pytest
 
 from lipmotion import errors, types
 from lipmotion.errors import InputError
-from lipmotion.formats.keys import EVERY_KEY, Thinning, place_keys
+from lipmotion.formats.base import EVERY_KEY, Thinning, place_keys
 from lipmotion.meshes.model import shape_names
 from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
 from lipmotion.meshes.model.rig_tables import apply_rig, read_rig_table
@@ -63,12 +63,11 @@ def test_a_part_with_both_sides_is_held_once():
 
 
 def test_other_meshes_stay_as_they_are():
-    parts = (MeshPart("front", 0, 2), MeshPart("back", 2, 4))
     for triangles, of in (
         (FRONT, None),
         (np.concatenate([FRONT, FRONT]), None),
         (np.concatenate([FRONT, BACK[:1]]), None),
-        (np.concatenate([FRONT, BACK]), parts),
+        (np.concatenate([FRONT, BACK]), (MeshPart("front", 0, 2), MeshPart("back", 2, 4))),
     ):
         mesh = Mesh(PLACES, triangles, of or ())
         assert surface.drop_back_sides(mesh) is mesh
@@ -141,8 +140,7 @@ def test_coarser_keys_are_fewer_and_closed_lips_stay_closed() -> None:
 
 
 def test_a_held_pose_still_changes_at_once() -> None:
-    stepped = (False, False, True)
-    time_s, rows = place_keys(TIME_S, ROWS, stepped, Thinning(0.05))
+    time_s, rows = place_keys(TIME_S, ROWS, (False, False, True), Thinning(0.05))
     rise = np.flatnonzero(np.diff(rows[:, 2]) > 0.3)
     assert len(rise) == 1
     assert time_s[rise[0] + 1] - time_s[rise[0]] == pytest.approx(0.001)
@@ -177,10 +175,8 @@ def _table(tmp_path, text):
 
 
 def test_controls_follow_their_sources_or_are_constant(tmp_path):
-    text = (
-        "control,source,gain,offset,low,high\nJaw.rz,jawOpen,-25,,-20,0\nLips,mouthPucker,0.5\nLips,jawOpen,-0.25,0.1\n"
-    )
-    motion = apply_rig(_table(tmp_path, text), SOURCES, 25.0)
+    rows = "Jaw.rz,jawOpen,-25,,-20,0\nLips,mouthPucker,0.5\nLips,jawOpen,-0.25,0.1\n"
+    motion = apply_rig(_table(tmp_path, f"control,source,gain,offset,low,high\n{rows}"), SOURCES, 25.0)
     assert motion.names == ("Jaw.rz", "Lips")
     np.testing.assert_allclose(motion["Jaw.rz"], [0, -12.5, -20])
     np.testing.assert_allclose(motion["Lips"], [0.1, 0.475, -0.15])

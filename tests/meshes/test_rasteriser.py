@@ -40,8 +40,7 @@ def picture_of(mesh: Mesh, camera: Camera) -> np.ndarray:
 
 
 def test_the_height_of_the_picture_is_as_stated_and_nearer_things_are_larger():
-    centre = np.array([[0.5, -0.25, 0.0]])
-    assert CAMERA.project(centre)[0][:2] == pytest.approx((60, 50))
+    assert CAMERA.project(np.array([[0.5, -0.25, 0.0]]))[0][:2] == pytest.approx((60, 50))
     low, high, near = CAMERA.project(np.array([[0.5, -1.25, 0.0], [0.5, 0.75, 0.0], [0.5, 0.75, 1.0]]))
     assert low[1] - high[1] == pytest.approx(100)
     assert near[1] < high[1]
@@ -66,8 +65,7 @@ def test_a_mesh_is_seen_in_its_colour_at_its_place():
     picture = picture_of(ball(), Camera(100, 100, across=2.0)).astype(int)
     red, green, blue = picture[50, 50]
     assert red > 2 * max(green, blue)
-    reddish = (picture[..., 0] > 1.5 * picture[..., 2]).sum()
-    assert reddish == pytest.approx(np.pi * 25**2, rel=0.06)
+    assert (picture[..., 0] > 1.5 * picture[..., 2]).sum() == pytest.approx(np.pi * 25**2, rel=0.06)
 
 
 def test_the_edge_of_what_is_cut_out_is_as_light_as_its_middle():
@@ -97,8 +95,7 @@ def test_drawing_the_moving_part_alone_gives_the_whole_picture():
 
 def test_marked_vertices_are_found_where_they_can_be_seen():
     mesh, canvas = ball(), Canvas(Camera(100, 100, across=2.0))
-    marked = mesh.vertices[:, 0] > 0
-    seen = canvas.mark_shown(mesh.vertices, marked, mesh.triangles)
+    seen = canvas.cover(mesh.vertices, mesh.vertices[:, 0] > 0, mesh.triangles) > 127
     assert seen[50, 60]
     assert not seen[50, 40]
     assert seen.sum() == pytest.approx(0.5 * np.pi * 25**2, rel=0.1)
@@ -158,8 +155,7 @@ def test_the_picture_of_a_gltf_lies_upright(tmp_path):
 
 @pytest.mark.parametrize(("mode", "shown"), [(OPAQUE, True), (MASK, False), (BLEND, False)])
 def test_opacity_counts_as_the_material_says(tmp_path, mode, shown):
-    picture = square_picture(textured(tmp_path, material={"alphaMode": mode}))
-    assert (picture[42, 42].min() > 120) == shown
+    assert (square_picture(textured(tmp_path, material={"alphaMode": mode}))[42, 42].min() > 120) == shown
 
 
 def test_the_place_of_a_picture_is_moved_by_its_extension(tmp_path):
@@ -238,8 +234,7 @@ def test_opacity_in_a_box_is_never_less_or_more_than_said():
 @pytest.mark.parametrize("content", [b"", b"GIF89a", encoded()[:40]])
 def test_what_is_no_picture_is_none_and_large_ones_are_reduced(content):
     assert textures.read_texture(content) is None
-    texture = textures.read_texture(encoded(np.zeros((10, 3000, 4), np.uint8)))
-    assert texture.pixels.shape[1] == 1024
+    assert textures.read_texture(encoded(np.zeros((10, 3000, 4), np.uint8))).pixels.shape[1] == 1024
     with pytest.raises(InputError, match=r"required \(H, W, 4\)"):
         Texture(np.zeros((2, 2, 3), np.uint8))
 
@@ -268,8 +263,7 @@ def _coloured(tmp_path, colours, material=None, *, normalised=False):
 @pytest.mark.parametrize(("kind", "normalised"), [("<f4", False), ("u1", True), ("<u2", True), ("u1", False)])
 def test_colours_of_every_kind_are_read_as_light(tmp_path, kind, normalised, width):
     given = np.concatenate([LIGHT, np.ones((4, 1))], axis=1)[:, :width] * FULL[kind]
-    stored = (given if kind == "<f4" else np.rint(given)).astype(kind)
-    mesh = _coloured(tmp_path, stored, normalised=normalised)
+    mesh = _coloured(tmp_path, (given if kind == "<f4" else np.rint(given)).astype(kind), normalised=normalised)
     np.testing.assert_allclose(textures.decode_srgb(mesh.colours), LIGHT, atol=0.003)
 
 

@@ -3,29 +3,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lipmotion.motion.frame_labels import (
-    StateLayout,
-    find_digital_silence,
-    is_away_from_speech,
-    label_full_context,
-    list_speech_intervals,
-    with_neighbours,
-)
+from lipmotion.motion import frame_labels
 from lipmotion.testing import timeline
 from lipmotion.types import ENERGY_FEATURE, Timeline, Unit
 from meshes.speech import said
 
-LAYOUT = StateLayout(5, 7, 0.1)
+LAYOUT = frame_labels.StateLayout(5, 7, 0.1)
 REST = LAYOUT.rest
 
 
 def states_of(units: Timeline[Unit], phone: str, states: int = 5, edge_s: float = 0.08) -> list[int]:
-    labels = label_full_context(units, 200, StateLayout(states, 1, edge_s))
+    labels = frame_labels.label_full_context(units, 200, frame_labels.StateLayout(states, 1, edge_s))
     return [label.state for label in labels if label.unit == phone]
 
 
 def test_beyond_the_ends_lies_silence():
-    found = list(with_neighbours(said((0, 0.1, "p"), (0.1, 0.2, "aa"))))
+    found = list(frame_labels.with_neighbours(said((0, 0.1, "p"), (0.1, 0.2, "aa"))))
     assert [(left, span.label.phone, right) for left, span, right in found] == [("sil", "p", "aa"), ("p", "aa", "sil")]
 
 
@@ -67,20 +60,22 @@ def test_states_mirror_in_time(start, length, edge):
 
 
 def test_silence_rests_away_from_speech_only():
-    states = label_full_context(said((0, 0.595, "sil"), (0.595, 0.695, "aa"), (0.695, 1.5, "sil")), 151, LAYOUT)
+    states = frame_labels.label_full_context(
+        said((0, 0.595, "sil"), (0.595, 0.695, "aa"), (0.695, 1.5, "sil")), 151, LAYOUT
+    )
     rests = np.array([state == REST for state in states])
     margin = round(LAYOUT.rest_s * 100)
     assert margin == 30
     assert np.flatnonzero(~rests).tolist() == [*range(60 - margin, 70 + margin)]
     assert (states[50].unit, states[50].right) == ("sil", "aa")
     between_words = said((0, 0.1, "aa"), (0.1, 0.6, "sil"), (0.6, 0.7, "aa"))
-    assert REST not in label_full_context(between_words, 70, LAYOUT)
+    assert REST not in frame_labels.label_full_context(between_words, 70, LAYOUT)
 
 
 def test_frames_belong_to_the_unit_that_has_begun_and_rest_outside_of_all():
-    states = label_full_context(said((0.1, 0.2, "aa"), (0.3, 0.4, "t")), 60, LAYOUT)
+    states = frame_labels.label_full_context(said((0.1, 0.2, "aa"), (0.3, 0.4, "t")), 60, LAYOUT)
     assert [frame for frame in range(60) if states[frame] != REST] == [*range(10, 20), *range(30, 40)]
-    states = label_full_context(said((0.0, 0.105, "aa"), (0.105, 0.2, "t")), 20, LAYOUT)
+    states = frame_labels.label_full_context(said((0.0, 0.105, "aa"), (0.105, 0.2, "t")), 20, LAYOUT)
     assert [state.unit for state in states] == ["aa"] * 11 + ["t"] * 9
 
 
@@ -92,15 +87,17 @@ def test_it_is_farther_than_the_margin_from_every_interval(edges: list[int], mar
     wanted = np.ones(400, bool)
     for start, end in speech:
         wanted &= (times < start - margin) | (times > end + margin)
-    assert is_away_from_speech(times, speech, float(margin)).tolist() == wanted.tolist()
+    assert frame_labels.is_away_from_speech(times, speech, float(margin)).tolist() == wanted.tolist()
 
 
 def test_intervals_are_those_of_phones() -> None:
     units = timeline(("t", "aa"))
-    assert list_speech_intervals(units) == [(0.6, 0.7), (0.7, 0.8)]
-    away = is_away_from_speech(np.array([0.0, 0.2, 0.45, 0.65, 1.0, 1.2]), list_speech_intervals(units), 0.3)
+    assert frame_labels.list_speech_intervals(units) == [(0.6, 0.7), (0.7, 0.8)]
+    away = frame_labels.is_away_from_speech(
+        np.array([0.0, 0.2, 0.45, 0.65, 1.0, 1.2]), frame_labels.list_speech_intervals(units), 0.3
+    )
     assert away.tolist() == [True, True, False, False, False, True]
-    assert is_away_from_speech(np.arange(3.0), [], 1.0).all()
+    assert frame_labels.is_away_from_speech(np.arange(3.0), [], 1.0).all()
 
 
 def test_the_mouth_rests_in_digital_silence_of_some_length() -> None:
@@ -108,5 +105,5 @@ def test_the_mouth_rests_in_digital_silence_of_some_length() -> None:
     for first, stop in ((5, 10), (20, 24), (50, 62), (75, 90)):  # 50 ms, 40 ms, beside speech, in speech
         features[first:stop, ENERGY_FEATURE] = -9.0
     features[30:40, ENERGY_FEATURE] = -8.9  # a breath
-    silent = find_digital_silence(features, timeline(("t", "aa", "t")))
+    silent = frame_labels.find_digital_silence(features, timeline(("t", "aa", "t")))
     assert np.flatnonzero(silent).tolist() == [*range(5, 10), *range(50, 55)]

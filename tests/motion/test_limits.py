@@ -9,42 +9,26 @@ from lipmotion import types
 from lipmotion.engines import engine_named
 from lipmotion.errors import ModelFormatError
 from lipmotion.kernels.banded import solve_mlpg
+from lipmotion.motion import closure, space
 from lipmotion.motion import generation as module
-from lipmotion.motion.closure import (
-    Closure,
-    choose_closed_frames,
-    estimate_closed_opening,
-    estimate_closure,
-    find_closable_ranges,
-)
 from lipmotion.motion.generation import LARGEST_FACTOR, VarianceScaling
 from lipmotion.motion.modulation_filter import REACH as TAPS
 from lipmotion.motion.modulation_filter import ModulationFilter
-from lipmotion.motion.space import (
-    MotionLimits,
-    MotionSpace,
-    check_poses,
-    check_rest,
-    check_spread,
-    fit_space,
-    measure_limits,
-    resample_to_model,
-)
 from lipmotion.stats.pca import Pca
 from lipmotion.testing import PHONES, examples, speech, timeline
 from lipmotion.types import GREY, WEIGHT, Channel, Constraints, Pin, Span, Timeline, Unit, silent_monitor
 
 POSES = np.array([[0.0, 0.5], [0.3, 0.6], [0.1, 0.55]])
-REACH = measure_limits(POSES)
-CLOSURE = Closure(0, 0.02, np.array([1.0, 0.2]))
+REACH = space.measure_limits(POSES)
+CLOSURE = closure.Closure(0, 0.02, np.array([1.0, 0.2]))
 
 
-def space(*units: str) -> MotionSpace:
+def space_of(*units: str) -> space.MotionSpace:
     channels = tuple(Channel(name, unit) for name, unit in zip(("opening", "width"), units, strict=True))
-    return MotionSpace(channels, np.arange(2), None)
+    return space.MotionSpace(channels, np.arange(2), None)
 
 
-FACE = space("eye_distance", "eye_distance")
+FACE = space_of("eye_distance", "eye_distance")
 
 
 def test_reach_is_what_poses_span() -> None:
@@ -72,12 +56,12 @@ def test_pins_lead_farther_and_what_follows_the_opening_with_them() -> None:
 
 
 def test_rest_is_near_the_poses_and_dimensions_may_not_move() -> None:
-    check_rest(np.array([0.0, 0.45]), REACH)
+    space.check_rest(np.array([0.0, 0.45]), REACH)
     with pytest.raises(ValueError, match=r"rest pose of 550 in dimension 1, whose poses are 0.5 to 0.6"):
-        check_rest(np.array([0.0, 550.0]), REACH)
-    still = measure_limits(np.full((3, 2), 0.5))
+        space.check_rest(np.array([0.0, 550.0]), REACH)
+    still = space.measure_limits(np.full((3, 2), 0.5))
     still.check(np.full((4, 2), 0.501), None, {})
-    check_rest(np.full(2, 0.5), still)
+    space.check_rest(np.full(2, 0.5), still)
 
 
 def test_poses_of_no_face() -> None:
@@ -89,32 +73,34 @@ def test_poses_of_no_face() -> None:
         ([0.0, 0.5], [0.3, 1e5], 0.0),
     ):
         with pytest.raises(ValueError, match=r"opening|width"):
-            check_poses(MotionLimits(np.array(low), np.array(high)), FACE, Closure(0, closed, np.zeros(2)))
+            space.check_poses(
+                space.MotionLimits(np.array(low), np.array(high)), FACE, closure.Closure(0, closed, np.zeros(2))
+            )
 
 
 def test_each_unit_has_its_largest_value() -> None:
     for unit, largest in ((WEIGHT, 255), (GREY, 1e5), ("mm", 1e6)):
         high = np.array([largest, 0.6])
-        check_poses(MotionLimits(REACH.low, high), space(unit, unit), None)
+        space.check_poses(space.MotionLimits(REACH.low, high), space_of(unit, unit), None)
         with pytest.raises(ValueError, match="'opening' goes from 0 to"):
-            check_poses(MotionLimits(REACH.low, high * 1.01), space(unit, unit), None)
+            space.check_poses(space.MotionLimits(REACH.low, high * 1.01), space_of(unit, unit), None)
 
 
 def test_points_far_from_the_face() -> None:
     near, far = (
-        MotionSpace((Channel("x_1"), Channel("y_1")), np.array([], int), Pca(np.array(mean), np.eye(2)))
+        space.MotionSpace((Channel("x_1"), Channel("y_1")), np.array([], int), Pca(np.array(mean), np.eye(2)))
         for mean in ([0.3, -1.2], [300.0, -1200.0])
     )
-    check_poses(REACH, near, None)
+    space.check_poses(REACH, near, None)
     with pytest.raises(ValueError, match=r"points_mean as large as 1200 of points that move by 0.3"):
-        check_poses(REACH, far, None)
+        space.check_poses(REACH, far, None)
 
 
 def test_poses_lie_as_far_apart_as_their_deviations_let_them() -> None:
     variances = np.full(POSES.shape, 0.01**2)
-    check_spread(POSES, variances)
+    space.check_spread(POSES, variances)
     with pytest.raises(ValueError, match=r"means that span \d+ of their deviations, required at most 1000"):
-        check_spread(POSES * 1000, variances)
+        space.check_spread(POSES * 1000, variances)
 
 
 ENGINE = engine_named("trajectory", {})
@@ -145,7 +131,7 @@ def test_the_lips_meet_in_every_p_b_and_m_that_the_user_left_alone(units, pins):
     constraints = Constraints(tuple(Pin(frame / 100, "opening", value) for frame, value in wanted))
     opening = ENGINE.generate(MODEL, talk, constraints).motion["opening"]
     pinned = {frame for frame, _ in wanted}
-    for frames in find_closable_ranges(units, len(opening)):
+    for frames in closure.find_closable_ranges(units, len(opening)):
         if not pinned & set(range(frames.start, frames.stop)):
             assert opening[frames].min() <= MODEL.closure.closed + 1e-12
     assert opening.min() >= 0
@@ -155,7 +141,7 @@ def test_closures_can_be_left_to_the_model_and_what_is_pinned_does_not_follow_th
     pure = engine_named("trajectory", {"closures": False})
     talk = speech(spoken(("aa", "p", "aa"), (12, 3, 12)))
     free, closed = (engine.generate(MODEL, talk).motion["opening"] for engine in (pure, ENGINE))
-    frames = find_closable_ranges(talk.units, len(free))[0]
+    frames = closure.find_closable_ranges(talk.units, len(free))[0]
     assert free[frames].min() > MODEL.closure.closed
     assert closed[frames].min() <= MODEL.closure.closed
     for channel, value in (("width", 0.5), ("opening", 0.3)):
@@ -165,19 +151,19 @@ def test_closures_can_be_left_to_the_model_and_what_is_pinned_does_not_follow_th
 
 def test_spans_reach_two_frames_beyond_the_phone_and_stay_inside():
     units = Timeline((Span(0.0, 0.05, Unit("p")), Span(0.1, 0.15, Unit("aa")), Span(0.995, 1.01, Unit("m"))))
-    assert find_closable_ranges(units, 101) == [slice(0, 8), slice(98, 101)]
-    assert find_closable_ranges(units, 90) == [slice(0, 8)]
+    assert closure.find_closable_ranges(units, 101) == [slice(0, 8), slice(98, 101)]
+    assert closure.find_closable_ranges(units, 90) == [slice(0, 8)]
     syllabic = Timeline((Span(0.1, 0.2, Unit("em")), Span(0.2, 0.3, Unit("en"))))  # only an em closes
-    assert len(find_closable_ranges(syllabic, 50)) == 1
+    assert len(closure.find_closable_ranges(syllabic, 50)) == 1
 
 
 def test_only_frames_that_do_not_close_anyway_are_chosen():
     units = Timeline((Span(0.1, 0.2, Unit("p")), Span(0.3, 0.4, Unit("b")), Span(0.5, 0.6, Unit("m"))))
     opening = np.full(80, 0.2)
     opening[[15, 34, 55]] = 0.01, 0.06, 0.07
-    closure = Closure(0, 0.05, np.ones(1))
-    assert choose_closed_frames(closure, opening, find_closable_ranges(units, 80), []) == [34, 55]
-    assert choose_closed_frames(closure, opening, find_closable_ranges(units, 80), [52]) == [34]
+    lips = closure.Closure(0, 0.05, np.ones(1))
+    assert closure.choose_closed_frames(lips, opening, closure.find_closable_ranges(units, 80), []) == [34, 55]
+    assert closure.choose_closed_frames(lips, opening, closure.find_closable_ranges(units, 80), [52]) == [34]
 
 
 def test_how_closed_is_the_median_of_the_least_openings():
@@ -186,27 +172,29 @@ def test_how_closed_is_the_median_of_the_least_openings():
     x[[15, 35, 55], 0] = 0.01, 0.02, 0.05
     x[:, 1] = 1 - 2 * x[:, 0]
     seen = np.ones(60, bool)
-    closure = estimate_closure([x], [seen], [units], column=0)
-    assert closure.closed == 0.02
-    assert closure.follow == pytest.approx([1, -2])
+    lips = closure.estimate_closure([x], [seen], [units], column=0)
+    assert lips.closed == 0.02
+    assert lips.follow == pytest.approx([1, -2])
     seen[5:25] = False
-    assert estimate_closure([x], [seen], [units], column=0).closed == pytest.approx((0.02 + 0.05) / 2)
+    assert closure.estimate_closure([x], [seen], [units], column=0).closed == pytest.approx((0.02 + 0.05) / 2)
     x[:, 0] -= 0.1  # a spline through the camera's frames may swing below zero; the lips cannot
-    assert estimate_closure([x], [seen], [units], column=0).closed == 0
+    assert closure.estimate_closure([x], [seen], [units], column=0).closed == 0
     vowel, line = Timeline((Span(0.0, 1.0, Unit("aa")),)), np.linspace(0, 1, 101)[:, None]
-    without = estimate_closure([line], [np.ones(101, bool)], [vowel], column=0)
+    without = closure.estimate_closure([line], [np.ones(101, bool)], [vowel], column=0)
     assert without.closed == pytest.approx(0.02)  # the second percentile, without p, b or m
 
 
 def test_lips_that_a_wrong_phone_shows_open_are_closed_as_far_as_the_frames_say():
     rng = np.random.default_rng(0)
     frames = np.concatenate([rng.uniform(0.0, 0.01, 40), rng.uniform(0.05, 0.2, 960)])
-    assert estimate_closed_opening([0.126], frames) <= 0.01
-    assert estimate_closed_opening([], frames) <= 0.01
-    assert estimate_closed_opening([0.003, 0.004, 0.005], frames) == 0.004
-    assert estimate_closed_opening([0.126], frames + 0.1, frames) == estimate_closed_opening([0.126], frames)
-    assert estimate_closed_opening([-0.02], frames) == 0
-    assert estimate_closed_opening([], np.empty(0)) == 0
+    assert closure.estimate_closed_opening([0.126], frames) <= 0.01
+    assert closure.estimate_closed_opening([], frames) <= 0.01
+    assert closure.estimate_closed_opening([0.003, 0.004, 0.005], frames) == 0.004
+    assert closure.estimate_closed_opening([0.126], frames + 0.1, frames) == closure.estimate_closed_opening(
+        [0.126], frames
+    )
+    assert closure.estimate_closed_opening([-0.02], frames) == 0
+    assert closure.estimate_closed_opening([], np.empty(0)) == 0
 
 
 CHANNELS = tuple(map(Channel, ("x_1", "opening", "y_1", "jaw_open", "z_1")))
@@ -217,19 +205,18 @@ def motion(frames: int = 50) -> np.ndarray:
 
 
 def test_distances_are_modelled_as_they_are_points_in_components_and_variance_is_carried_through():
-    space = fit_space(CHANNELS, motion(), components=2)
-    assert space.direct_names == ("opening", "jaw_open")
-    assert space.reduce(motion()).shape == (50, 4)
-    assert np.array_equal(space.reduce(motion())[:, :2], motion()[:, [1, 3]])
-    values, _ = space.restore(space.reduce(motion()), np.ones((50, 4)))
+    fitted = space.fit_space(CHANNELS, motion(), components=2)
+    assert fitted.direct_names == ("opening", "jaw_open")
+    assert fitted.reduce(motion()).shape == (50, 4)
+    assert np.array_equal(fitted.reduce(motion())[:, :2], motion()[:, [1, 3]])
+    values, _ = fitted.restore(fitted.reduce(motion()), np.ones((50, 4)))
     least = np.linalg.eigvalsh(np.cov(motion()[:, [0, 2, 4]].T, bias=True))[0]  # that any two components lose
     assert np.square(motion() - values).sum(axis=1).mean() == pytest.approx(least)
     variance = np.random.default_rng(2).uniform(0.1, 1, (1, 4))
-    _, spread = space.restore(np.zeros((1, 4)), variance)
+    _, spread = fitted.restore(np.zeros((1, 4)), variance)
     assert spread[0, [1, 3]] == pytest.approx(variance[0, :2])
-    assert spread[0, [0, 2, 4]] == pytest.approx(
-        np.diag(space.points.basis.T @ np.diag(variance[0, 2:]) @ space.points.basis)
-    )
+    basis = fitted.points.basis
+    assert spread[0, [0, 2, 4]] == pytest.approx(np.diag(basis.T @ np.diag(variance[0, 2:]) @ basis))
 
 
 def seen(count: int) -> np.ndarray:
@@ -246,37 +233,36 @@ def test_a_cubic_comes_back_exactly(seed, rate_hz, count):
     cubic = np.polynomial.Polynomial(np.random.default_rng(seed).normal(0, 1, 4))
     camera_s = np.arange(count) / rate_hz
     frames = int(camera_s[-1] * 100) + 1
-    values, valid = resample_to_model(cubic(camera_s)[:, None], seen(count), rate_hz, frames, 100.0)
+    values, valid = space.resample_to_model(cubic(camera_s)[:, None], seen(count), rate_hz, frames, 100.0)
     assert values[:, 0] == pytest.approx(cubic(np.arange(frames) / 100), abs=1e-9)
     assert valid.all()
 
 
 def test_camera_frames_keep_their_values():
     values = np.random.default_rng(1).normal(0, 1, (10, 3))
-    curves, _ = resample_to_model(values, seen(10), 25.0, 37, 100.0)
+    curves, _ = space.resample_to_model(values, seen(10), 25.0, 37, 100.0)
     assert curves[::4] == pytest.approx(values, abs=1e-12)
 
 
 def test_frames_beyond_the_end_or_nearest_to_an_unseen_camera_frame_are_not_valid():
     values = np.arange(5.0)[:, None]
-    curves, valid = resample_to_model(values, seen(5), 25.0, 30, 100.0)
+    curves, valid = space.resample_to_model(values, seen(5), 25.0, 30, 100.0)
     assert curves[17:, 0] == pytest.approx(np.full(13, 4.0))  # the last value holds
     assert np.nonzero(~valid)[0].tolist() == [*range(18, 30)]  # the last camera frame is at 16; 18 is half a frame on
-    mask = np.array([True, True, False, True, True])
-    _, valid = resample_to_model(values, mask, 25.0, 17, 100.0)
+    _, valid = space.resample_to_model(values, np.array([True, True, False, True, True]), 25.0, 17, 100.0)
     assert np.nonzero(~valid)[0].tolist() == [6, 7, 8, 9]
 
 
 def test_one_and_two_camera_frames():
     for count, wanted in ((1, [7.0] * 9), (2, [7.0, 7.25, 7.5, 7.75, 8.0, 8.0, 8.0, 8.0, 8.0])):
-        curves, valid = resample_to_model(np.array([[7.0], [8.0]])[:count], seen(count), 25.0, 9, 100.0)
+        curves, valid = space.resample_to_model(np.array([[7.0], [8.0]])[:count], seen(count), 25.0, 9, 100.0)
         assert curves[:, 0] == pytest.approx(wanted)
         assert valid.sum() == 4 * count - 2
 
 
 def test_curvature_does_not_jump():
     """Linear interpolation would make the second difference 0 nearly everywhere, and large at camera frames."""
-    curves, _ = resample_to_model(np.sin(9 * np.arange(30) / 25)[:, None], seen(30), 25.0, 110, 100.0)
+    curves, _ = space.resample_to_model(np.sin(9 * np.arange(30) / 25)[:, None], seen(30), 25.0, 110, 100.0)
     bend, wanted = (np.diff(curve, 2)[8:-8] for curve in (curves[:, 0], np.sin(9 * np.arange(110) / 100)))
     assert bend == pytest.approx(wanted, abs=0.05 * np.abs(wanted).max())
 
@@ -287,8 +273,7 @@ SENTENCE = speech(timeline(["sil", *(list(PHONES) * 30)[:40], "sil"]), seed=5)
 PINNED = Constraints((Pin(3.3, "opening", 0.2), Pin(5.01, "opening", 0.1)))
 
 
-BEFORE = 5750
-"""Frames of silence after which the sentence lies on the border of two blocks."""
+BEFORE = 5750  # frames of silence after which the sentence lies on the border of two blocks
 
 
 def delayed():
@@ -343,13 +328,12 @@ def test_the_modulation_filter_keeps_pins_closures_and_blocks(whole):
     assert np.abs(np.diff(filtered, 3)).mean() > 1.5 * np.abs(np.diff(plain, 3)).mean()
     assert filtered[330] == 0.2
     assert filtered.min() >= 0
-    ranges = find_closable_ranges(SENTENCE.units, len(filtered))
+    ranges = closure.find_closable_ranges(SENTENCE.units, len(filtered))
     assert len(ranges) > 5
     for each in ranges:
         assert filtered[each].min() <= plain[each].min()
-    assert ENGINE.generate(model, *delayed()).motion["opening"][BEFORE + 100 :] == pytest.approx(
-        filtered[100:], abs=1e-7
-    )
+    late = ENGINE.generate(model, *delayed()).motion["opening"]
+    assert late[BEFORE + 100 :] == pytest.approx(filtered[100:], abs=1e-7)
 
 
 OPTIONS = {"articulation": False, "states": 3, "silent_states": 7, "components": 2, "acoustic_components": 20}
@@ -377,9 +361,8 @@ def noisy_clips():
 
 @pytest.mark.long
 def test_the_full_range_is_nearer_to_the_original(noisy_clips):
-    engines = [
-        engine_named("trajectory", {**OPTIONS, "variance_scaling": on, "closures": False}) for on in (False, True)
-    ]
+    options = {**OPTIONS, "closures": False}
+    engines = [engine_named("trajectory", {**options, "variance_scaling": on}) for on in (False, True)]
     learned = engines[0].fit(noisy_clips, silent_monitor).model
     assert 1 < learned.variance_factors[0] <= LARGEST_FACTOR
     spreads = [

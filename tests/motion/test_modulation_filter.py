@@ -4,16 +4,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from lipmotion.errors import ModelFormatError
 from lipmotion.measures.curves import measure_modulation_distance
-from lipmotion.motion.modulation_filter import (
-    HOLD_FRAMES,
-    MODULATION,
-    REACH,
-    ModulationFilter,
-    filter_from_arrays,
-    filter_to_arrays,
-    fit_modulation_filter,
-    learn_filter,
-)
+from lipmotion.motion import modulation_filter
+from lipmotion.motion.modulation_filter import REACH, fit_modulation_filter
 from lipmotion.storage.schema import format_errors
 from lipmotion.testing import examples
 from lipmotion.types import FRAME_RATE_HZ
@@ -27,10 +19,8 @@ FILTER = fit_modulation_filter(RECORDED, GENERATED)
 def test_the_filtered_motion_has_the_spectrum_of_the_recorded_motion() -> None:
     filtered = [FILTER.apply(clip) for clip in GENERATED]
     before = measure_modulation_distance(GENERATED, RECORDED, FRAME_RATE_HZ)
-    after = measure_modulation_distance(filtered, RECORDED, FRAME_RATE_HZ)
-    assert (after < 0.25 * before).all()
-    same = fit_modulation_filter(RECORDED, RECORDED).apply(RECORDED[0])
-    assert same == pytest.approx(RECORDED[0], abs=1e-9)
+    assert (measure_modulation_distance(filtered, RECORDED, FRAME_RATE_HZ) < 0.25 * before).all()
+    assert fit_modulation_filter(RECORDED, RECORDED).apply(RECORDED[0]) == pytest.approx(RECORDED[0], abs=1e-9)
 
 
 def test_each_dimension_has_its_own_filter_without_delay() -> None:
@@ -56,17 +46,16 @@ def test_an_engine_learns_it_with_the_noise_of_its_examples_and_only_if_it_is_wa
     smooth = [gaussian_filter1d(x, 2.0, axis=0) for x in values]
     noise = [still for x in values for still in (x[:28], x[-28:])]  # at rest, and 0.3 s away from speech
     noisy, freed = fit_modulation_filter(values, smooth), fit_modulation_filter(values, smooth, noise)
-    found = learn_filter(0.5, zip(values, smooth, strict=True), training, values)
+    found = modulation_filter.learn_filter(0.5, zip(values, smooth, strict=True), training, values)
     errors = [np.abs(found.taps - each.scale_to(0.5).taps).max() for each in (noisy, freed)]
     assert errors[1] < 0.1 * errors[0]
-    nothing = learn_filter(1.0, [], training, values)
-    assert nothing.apply(values[0]) == pytest.approx(values[0])
+    assert modulation_filter.learn_filter(1.0, [], training, values).apply(values[0]) == pytest.approx(values[0])
 
     def unwanted():
         pytest.fail("motion is generated for a filter of no strength")
         yield
 
-    assert learn_filter(0.0, unwanted(), training, values) is None
+    assert modulation_filter.learn_filter(0.0, unwanted(), training, values) is None
 
 
 def test_a_mouth_at_rest_stays_there() -> None:
@@ -83,7 +72,7 @@ def test_held_frames_are_what_they_were_and_their_neighbours_lead_to_them() -> N
     assert np.array_equal(pinned[:, 1], held[:, 1])
     assert np.array_equal(pinned[:, 0], free[:, 0])
     assert np.array_equal(held[frames], GENERATED[0][frames])
-    far = np.abs(np.arange(600)[:, None] - frames).min(axis=1) >= HOLD_FRAMES
+    far = np.abs(np.arange(600)[:, None] - frames).min(axis=1) >= modulation_filter.HOLD_FRAMES
     assert np.array_equal(held[far], free[far])
     assert (np.abs(held - GENERATED[0]) <= np.abs(free - GENERATED[0]) + 1e-12).all()
 
@@ -94,8 +83,7 @@ def test_noise_of_the_tracker_is_not_learned() -> None:
     noisy, freed = fit_modulation_filter(tracked, GENERATED), fit_modulation_filter(tracked, GENERATED, resting)
     error = [np.abs(each.taps - FILTER.taps).max() for each in (noisy, freed)]
     assert error[1] < 0.5 * error[0]
-    short = [resting[0][:REACH]] * 100
-    assert np.array_equal(fit_modulation_filter(tracked, GENERATED, short).taps, noisy.taps)
+    assert np.array_equal(fit_modulation_filter(tracked, GENERATED, [resting[0][:REACH]] * 100).taps, noisy.taps)
 
 
 def test_what_never_moves_is_left_as_it_is() -> None:
@@ -105,12 +93,13 @@ def test_what_never_moves_is_left_as_it_is() -> None:
 
 
 def test_it_is_stored() -> None:
-    stored = filter_from_arrays(filter_to_arrays(FILTER), 2)
-    assert np.array_equal(stored.taps, FILTER.taps)
-    nothing = filter_to_arrays(None)
-    assert filter_from_arrays(nothing, 2) is None
-    too_large = np.full_like(FILTER.taps, MODULATION["modulation"].maximum + 1)
-    damaged = [ModulationFilter(taps) for taps in (FILTER.taps[:-1], FILTER.taps[:, :1], too_large)]
-    for arrays, needed in ((nothing, True), *((filter_to_arrays(each), False) for each in damaged)):
+    assert np.array_equal(
+        modulation_filter.filter_from_arrays(modulation_filter.filter_to_arrays(FILTER), 2).taps, FILTER.taps
+    )
+    nothing = modulation_filter.filter_to_arrays(None)
+    assert modulation_filter.filter_from_arrays(nothing, 2) is None
+    too_large = np.full_like(FILTER.taps, modulation_filter.MODULATION["modulation"].maximum + 1)
+    damaged = [modulation_filter.ModulationFilter(taps) for taps in (FILTER.taps[:-1], FILTER.taps[:, :1], too_large)]
+    for arrays, needed in ((nothing, True), *((modulation_filter.filter_to_arrays(each), False) for each in damaged)):
         with pytest.raises(ModelFormatError), format_errors("the model"):
-            filter_from_arrays(arrays, 2, needed=needed)
+            modulation_filter.filter_from_arrays(arrays, 2, needed=needed)

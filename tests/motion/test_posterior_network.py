@@ -12,8 +12,7 @@ from lipmotion.motion.posterior_network import RECURRENT, PosteriorNetwork
 from lipmotion.motion.predictors import PredictorTraining, predictor_from_arrays, predictor_to_arrays
 from lipmotion.types import Channel, ConditionSpectrum, Example, Features, Motion, Speech, Timeline, TokenPosteriors
 
-TRAINED_RECURRENT = posterior_network._train_recurrent
-"""The tests of all else train none (``conftest``)."""
+TRAINED_RECURRENT = posterior_network._train_recurrent  # the tests of all else train none (``conftest``)
 TOKENS, FRAMES, SOURCE = 30, 200, "hama 1.7.0 abc"
 
 
@@ -21,8 +20,7 @@ def posteriors(number: int, source: str = SOURCE) -> TokenPosteriors:
     """Return posteriors in which one of three tokens is probable for 0.2 s each."""
     rng = np.random.default_rng(number)
     values = rng.normal(-8, 0.5, (FRAMES // 2, TOKENS))
-    said = np.repeat(rng.integers(3, size=FRAMES // 20), 10)
-    values[np.arange(len(values)), said] = -0.1
+    values[np.arange(len(values)), np.repeat(rng.integers(3, size=FRAMES // 20), 10)] = -0.1
     return TokenPosteriors(values.astype(np.float16), source, 0.95)
 
 

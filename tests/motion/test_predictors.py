@@ -27,10 +27,8 @@ from lipmotion.testing import example, examples, speech, timeline
 from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Example, PriorOutput, TokenPosteriors, silent_monitor
 
 PAGE = Path(__file__).parents[2] / "docs" / "extend" / "predictor.md"
-SMALL = {
-    "trajectory": {"acoustic_regression": False, "joint_recogniser": False},
-    "selection": {"joint_recogniser": False},
-}
+ALONE = {"joint_recogniser": False}
+SMALL = {"trajectory": {"acoustic_regression": False, **ALONE}, "selection": ALONE}
 PREFIX = "predictor.frames."
 
 
@@ -270,8 +268,7 @@ def test_a_useless_prior_is_left_out() -> None:
 
 def test_folds_part_all_examples() -> None:
     for count in (1, 2, 5, 9):
-        outside = [number for _, out in split_folds(count) for number in out]
-        assert sorted(outside) == list(range(count))
+        assert sorted([number for _, out in split_folds(count) for number in out]) == list(range(count))
     assert all(not set(inside) & set(out) for inside, out in split_folds(5))
 
 

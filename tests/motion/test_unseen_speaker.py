@@ -7,10 +7,9 @@ import pytest
 
 from lipmotion import Request, load_model
 from lipmotion.motion import articulation
-from lipmotion.motion import articulation as unseen_speaker
-from lipmotion.motion.articulation import ARTICULATORS
+from lipmotion.motion.articulation import ARTICULATORS, UnseenSpeaker
 from lipmotion.motion.closure import REACH_S, find_closable_ranges
-from lipmotion.motion.general_motion import hear_articulators
+from lipmotion.motion.network_steps import hear_articulators
 from lipmotion.motion.space import MotionSpace, fit_reduced_motion
 from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.model import with_prior
@@ -20,8 +19,7 @@ from lipmotion.types import Constraints, Generation, Pin, Span, Speech, Timeline
 from lipmotion.units import VOWELS
 
 WELCOME = Path(__file__).parent.parent.parent / "examples" / "welcome.flac"
-SHUT_OPENING = 0.015
-"""Eye distances; people do not say a vowel through lips that are so close."""
+SHUT_OPENING = 0.015  # eye distances; people do not say a vowel through lips that are so close
 CONFIDENCES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
@@ -50,52 +48,46 @@ def shut_share(generation: Generation) -> float:
     return float((np.concatenate(vowels) < SHUT_OPENING).mean())
 
 
+def changed(step: str, speaker: UnseenSpeaker, frames: slice, *arguments: np.ndarray) -> np.ndarray:
+    """What a step makes of means of 0 in some frames; precisions stay."""
+    means = np.zeros((speaker.frames, 3, len(speaker.prior.centre)))
+    statistics = getattr(speaker, step)(lambda chosen: (means[chosen], means[chosen] + 1), *arguments)
+    made, precisions = statistics(frames)
+    np.testing.assert_array_equal(precisions, np.ones_like(made))
+    return made
+
+
 @pytest.mark.parametrize(("voice", "change"), [(0.0, 1.0), (0.75, 0.5), (1.0, 0.0)])
 def test_long_vowels_are_more_open_short_ones_and_consonants_less(voice: float, change: float) -> None:
     prior = load_model().learned.motion.prior
-    seconds = np.cumsum([0, 0.5, 0.5, 0.5, 0.04, 0.46, unseen_speaker.VOWEL_S, 0.4]).tolist()
+    seconds = np.cumsum([0, 0.5, 0.5, 0.5, 0.04, 0.46, articulation.VOWEL_S, 0.4]).tolist()
     phones = ("t", "aa", "t", "aa", "t", "aa", "t")
     units = Timeline(tuple(Span(*edges, Unit(phone)) for edges, phone in zip(pairwise(seconds), phones, strict=True)))
-    means, precisions = np.zeros((250, 3, prior.matrix.shape[1])), np.ones((250, 3, prior.matrix.shape[1]))
-    statistics = unseen_speaker.UnseenSpeaker(prior, units, 250, 1.0, voice).raise_contrast(
-        lambda frames: (means[frames], precisions[frames])
-    )
-    deviation = prior.matrix[0, 0]
-    changed, kept = statistics(slice(20, 240))
-    opening = changed[:, 0, 0] / deviation
-    assert opening[75 - 20] == pytest.approx(change * unseen_speaker.OPENING_BY_DURATION * np.log(5), rel=0.01)
-    assert opening[[5, 215]] == pytest.approx(-change * unseen_speaker.CONSONANT_CLOSING, rel=0.01)
-    shortest = unseen_speaker.OPENING_BY_DURATION * np.log(0.04 / unseen_speaker.VOWEL_S)
-    assert change * shortest <= opening[152 - 20] <= -change * unseen_speaker.CONSONANT_CLOSING
-    np.testing.assert_array_equal(kept, precisions[20:240])
+    made = changed("raise_contrast", UnseenSpeaker(prior, units, 250, 1.0, voice), slice(20, 240))
+    opening = made[:, 0, 0] / prior.matrix[0, 0]
+    assert opening[75 - 20] == pytest.approx(change * articulation.OPENING_BY_DURATION * np.log(5), rel=0.01)
+    assert opening[[5, 215]] == pytest.approx(-change * articulation.CONSONANT_CLOSING, rel=0.01)
+    shortest = articulation.OPENING_BY_DURATION * np.log(0.04 / articulation.VOWEL_S)
+    assert change * shortest <= opening[152 - 20] <= -change * articulation.CONSONANT_CLOSING
 
 
 @pytest.mark.parametrize(("voice", "share"), [(0.0, 0.5), (0.5, 0.5), (1.0, 0.0)])
 def test_voices_not_known_to_training_open_before_they_speak(voice: float, share: float) -> None:
     prior = load_model().learned.motion.prior
     units = Timeline((Span(0.0, 1.5, Unit("sil")), Span(1.5, 1.8, Unit("aa")), Span(1.8, 2.5, Unit("sil"))))
-    means, precisions = np.zeros((250, 3, prior.matrix.shape[1])), np.ones((250, 3, prior.matrix.shape[1]))
-    statistics = unseen_speaker.UnseenSpeaker(prior, units, 250, 0.5, voice).open_before_speech(
-        lambda frames: (means[frames], precisions[frames])
-    )
-    changed, kept = statistics(slice(10, 250))
-    assert changed[130 - 10, 0] == pytest.approx(share * prior.centre, rel=1e-3)
-    assert np.abs(changed[[10, 60, 170, 230], 0]).max() < 1e-3
-    assert not changed[:, 1:].any()
-    np.testing.assert_array_equal(kept, precisions[10:250])
+    made = changed("open_before_speech", UnseenSpeaker(prior, units, 250, 0.5, voice), slice(10, 250))
+    assert made[130 - 10, 0] == pytest.approx(share * prior.centre, rel=1e-3)
+    assert np.abs(made[[10, 60, 170, 230], 0]).max() < 1e-3
+    assert not made[:, 1:].any()
 
 
 def test_a_model_of_few_phones_opens_no_mouth_before_speech() -> None:
     """Such a model half knows its own speaker's voice."""
     prior, units = load_model().learned.prior, timeline(("p", "aa"), 0.2)
     few = replace(prior, contexts=dict.fromkeys(list(prior.contexts)[:10], 1))
-    means, precisions = np.zeros((250, 3, len(prior.centre))), np.ones((250, 3, len(prior.centre)))
-    changes = []
-    for each in (prior, few):
-        speaker = unseen_speaker.UnseenSpeaker(each, units, 250, 1.0, 0.8)
-        statistics = speaker.open_before_speech(lambda frames: (means[frames], precisions[frames]))
-        changes.append(np.abs(statistics(slice(250))[0]).max())
-    assert changes[1] == pytest.approx(changes[0] * 10 / 5000)
+    speakers = [UnseenSpeaker(each, units, 250, 1.0, 0.8) for each in (prior, few)]
+    known, half_known = (np.abs(changed("open_before_speech", each, slice(250))).max() for each in speakers)
+    assert half_known == pytest.approx(known * 10 / 5000)
 
 
 @pytest.mark.parametrize("confidence", CONFIDENCES)
@@ -120,7 +112,7 @@ def test_movements_are_those_of_typical_talkers_about_the_same_rest(welcome: Spe
     assert np.percentile(own, 98) < 0.18
     assert 0.2 < np.percentile(typical, 98) < 0.3
     assert np.abs(typical[-10:] - own[-10:]).max() < 0.01
-    for frames in find_closable_ranges(unknown.units, len(typical), reach_s=unseen_speaker.choose_closing_reach(0.0)):
+    for frames in find_closable_ranges(unknown.units, len(typical), reach_s=articulation.choose_closing_reach(0.0)):
         assert typical[frames].min() <= load_model().learned.closure.closed + 1e-9
     ratio = np.sqrt(unknown.variance[:, 0] / np.maximum(known.variance[:, 0], 1e-12))
     assert 1.2 < np.median(ratio) < 2
@@ -141,20 +133,16 @@ def test_a_model_that_stands_on_another_gets_the_same_of_it_whoever_speaks(welco
 @pytest.mark.parametrize(
     ("voice", "reliability", "share"), [(0.0, 0.0, 0.75), (0.0, 1.0, 0.35), (1.0, 0.0, 0.3), (1.0, 1.0, 0.0)]
 )
-def test_motion_follows_the_sound_in_speech_the_less_phones_are_relied_on(
-    voice: float, reliability: float, share: float
-) -> None:
+def test_motion_follows_the_sound_in_speech_the_less_phones_are_relied_on(voice, reliability, share):
     prior = load_model().learned.motion.prior
     units = Timeline((Span(0.0, 1.0, Unit("sil")), Span(1.0, 2.0, Unit("aa")), Span(2.0, 3.0, Unit("sil"))))
-    means, precisions = np.zeros((300, 3, len(prior.centre))), np.ones((300, 3, len(prior.centre)))
-    heard = np.tile(np.eye(len(ARTICULATORS))[0], (300, 1))
-    statistics = unseen_speaker.UnseenSpeaker(prior, units, 300, reliability, voice).follow_sound(
-        lambda frames: (means[frames], precisions[frames]), heard
+    speaker, heard = (
+        UnseenSpeaker(prior, units, 300, reliability, voice),
+        np.tile(np.eye(len(ARTICULATORS))[0], (300, 1)),
     )
-    changed, kept = statistics(slice(10, 300))
-    assert changed[150 - 10, 0] == pytest.approx(share * (prior.centre + prior.matrix[0]), rel=1e-3)
-    assert np.abs(changed[[10, 280]]).max() < 1e-3
-    np.testing.assert_array_equal(kept, precisions[10:300])
+    made = changed("follow_sound", speaker, slice(10, 300), heard)
+    assert made[150 - 10, 0] == pytest.approx(share * (prior.centre + prior.matrix[0]), rel=1e-3)
+    assert np.abs(made[[10, 280]]).max() < 1e-3
 
 
 def test_doubtful_closures_are_confirmed_by_the_sound() -> None:
@@ -162,8 +150,8 @@ def test_doubtful_closures_are_confirmed_by_the_sound() -> None:
     heard = np.zeros((100, len(ARTICULATORS)))
     heard[:20, 0] = -1
     ranges = [slice(5, 15), slice(50, 60)]
-    assert unseen_speaker.UnseenSpeaker(prior, units, 100, 1.0, 0.0).confirm_closures(ranges, heard) == ranges
-    assert unseen_speaker.UnseenSpeaker(prior, units, 100, 0.2, 0.0).confirm_closures(ranges, heard) == ranges[:1]
+    assert UnseenSpeaker(prior, units, 100, 1.0, 0.0).confirm_closures(ranges, heard) == ranges
+    assert UnseenSpeaker(prior, units, 100, 0.2, 0.0).confirm_closures(ranges, heard) == ranges[:1]
 
 
 def test_jaw_and_lips_go_with_the_opening(welcome: Speech) -> None:
@@ -184,28 +172,27 @@ def test_pins_are_in_delivered_units(welcome: Speech) -> None:
 
 def test_the_range_grows_with_what_is_not_known() -> None:
     learned = load_model().learned
-    factors = [unseen_speaker.widen_range(learned.prior, learned.space, voice, 1.0) for voice in (1.0, 0.7, 0.3, 0.0)]
+    factors = [articulation.widen_range(learned.prior, learned.space, voice, 1.0) for voice in (1.0, 0.7, 0.3, 0.0)]
     assert factors[0] == pytest.approx(1)
     assert np.diff(factors).min() > 0
-    doubtful = unseen_speaker.widen_range(learned.prior, learned.space, 0.0, 0.0)
+    doubtful = articulation.widen_range(learned.prior, learned.space, 0.0, 0.0)
     assert 1 < doubtful < factors[-1]  # the general network, which moves as far as people do, has more of it
     weights = tuple(replace(channel, unit="weight") for channel in learned.space.channels)
     other = MotionSpace(weights, learned.space.direct, learned.space.points)
-    assert unseen_speaker.widen_range(learned.prior, other, 0.0, 1.0) == pytest.approx(1)
+    assert articulation.widen_range(learned.prior, other, 0.0, 1.0) == pytest.approx(1)
 
 
 def test_lips_close_within_the_phones_of_unknown_voices() -> None:
-    assert unseen_speaker.choose_closing_reach(1.0) == pytest.approx(REACH_S)
-    assert unseen_speaker.choose_closing_reach(0.0) == pytest.approx(-unseen_speaker.INSET_S)
+    assert articulation.choose_closing_reach(1.0) == pytest.approx(REACH_S)
+    assert articulation.choose_closing_reach(0.0) == pytest.approx(-articulation.INSET_S)
     for duration_s in (0.02, 0.1):
         span = timeline(("b",), duration_s)[1]
-        (frames,) = find_closable_ranges(timeline(("b",), duration_s), 200, reach_s=-unseen_speaker.INSET_S)
+        (frames,) = find_closable_ranges(timeline(("b",), duration_s), 200, reach_s=-articulation.INSET_S)
         assert span.start_s - 1e-9 <= frames.start / 100 <= (frames.stop - 1) / 100 <= span.end_s + 1e-9
 
 
 def test_a_voice_is_known_as_well_with_its_phones_given(welcome: Speech) -> None:
-    with_units = analyse(load_model(), Request(WELCOME, units=welcome.units))
-    assert with_units.voice == pytest.approx(welcome.voice)
+    assert analyse(load_model(), Request(WELCOME, units=welcome.units)).voice == pytest.approx(welcome.voice)
 
 
 @pytest.mark.long
@@ -215,24 +202,21 @@ def test_the_models_own_voice_is_known(recordings: Path) -> None:
     assert [analyse(load_model(), Request(clip)).voice for clip in clips] == pytest.approx([1, 1, 1])
 
 
-OPENING, WIDTH = articulation.ARTICULATORS.index("opening"), articulation.ARTICULATORS.index("width")
+OPENING, WIDTH = ARTICULATORS.index("opening"), ARTICULATORS.index("width")
 
 
 def middle(phone: str, articulator: int) -> float:
     """The articulator in the middle of a long phone between others."""
     units = timeline(("t", phone, "t"), 0.3)
-    curve = articulation.trace_articulators(units, 230)
-    span = units[2]
-    return float(curve[int((span.start_s + span.end_s) * 50), articulator])
+    frame = int((units[2].start_s + units[2].end_s) * 50)
+    return float(articulation.trace_articulators(units, 230)[frame, articulator])
 
 
 def test_open_vowels_are_open_closures_closed_and_rounded_sounds_narrow() -> None:
     assert min(middle(phone, OPENING) for phone in ("aa", "ae", "ay")) > 0.5
     assert max(middle(phone, OPENING) for phone in ("p", "b", "m", "f", "v")) < -0.4
     assert max(middle(phone, WIDTH) for phone in ("uw", "ow", "w", "ao")) < -0.5 < middle("iy", WIDTH)
-    assert (
-        "oy" not in articulation.read_articulation_table()
-    )  # a phone without a row borrows that of the most similar one
+    assert "oy" not in articulation.read_articulation_table()  # a phone without a row borrows that of the most similar
     assert middle("oy", OPENING) == pytest.approx(middle("ao", OPENING))
 
 
@@ -295,12 +279,9 @@ def test_ranges_of_frames_have_the_dynamics_of_the_whole() -> None:
 
 def test_contexts_are_counted_with_pauses_as_silence() -> None:
     units = timeline(("t", "aa"))
-    paused = (replace(span, label=replace(span.label, phone="sp")) for span in units if span.label.phone == "sil")
-    first, last = paused
-    assert (
-        articulation.count_contexts([units, replace(units, spans=(first, *units.spans[1:-1], last))])["sil", "t", "aa"]
-        == 2
-    )
+    first, *spoken, last = units
+    first, last = (replace(span, label=replace(span.label, phone="sp")) for span in (first, last))
+    assert articulation.count_contexts([units, Timeline((first, *spoken, last))])["sil", "t", "aa"] == 2
 
 
 def test_it_is_the_same_after_serialisation(prior: articulation.ArticulationPrior) -> None:
@@ -312,8 +293,7 @@ def test_it_is_the_same_after_serialisation(prior: articulation.ArticulationPrio
 
 def test_motion_without_an_opening_has_no_table() -> None:
     some = examples(3)
-    for number, one in enumerate(some):
-        motion = replace(one.motion, values=one.motion.values[:, 1:], channels=one.motion.channels[1:])
-        some[number] = replace(one, motion=motion)
+    less = (replace(one.motion, values=one.motion.values[:, 1:], channels=one.motion.channels[1:]) for one in some)
+    some = [replace(one, motion=motion) for one, motion in zip(some, less, strict=True)]
     space, values = fit_reduced_motion(some, 3)
     assert articulation.fit_articulation_prior(space, values, some) is None

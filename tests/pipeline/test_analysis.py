@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-import lipmotion
 from lipmotion import Model, Request, animate, load_model
 from lipmotion.engines import Engine, Inputs
 from lipmotion.errors import ExportError, InputError
@@ -54,12 +53,9 @@ def test_a_text_is_itself():
         assert read_text_or_file(text) == text
 
 
-def test_a_file_is_its_content(here):
+def test_a_file_is_its_content_and_subtitles_keep_their_times(here):
     (here / "words").write_text("näh\n", encoding="utf-8-sig")
     assert read_text_or_file("words") == "näh\n"
-
-
-def test_subtitles_keep_their_times(here):
     (here / "words.srt").write_text("1\n00:00:01,000 --> 00:00:02,500\n<i>Hello</i> there\n")
     transcript = read_text_or_file("words.srt")
     assert isinstance(transcript, TimedTranscript)
@@ -112,21 +108,13 @@ USER = Lexicon({"papa": (("p", "aa", "p", "aa"),), "2": (("m", "aa"),)})
 def test_another_language_has_its_own_words_and_lexicon(tmp_path):
     (tmp_path / "words.txt").write_text("¡Papa, 2!", encoding="utf-8")
     for transcript in ("¡Papa, 2!", tmp_path / "words.txt"):
-        request = resolve_language(
-            read_request(Request(SILENCE, transcript, lexicon=USER, language="es"), is_typed=False)
-        )
-        assert isinstance(request.transcript, TimedTranscript)
+        spanish = Request(SILENCE, transcript, lexicon=USER, language="es")
+        request = resolve_language(read_request(spanish, is_typed=False))
         assert request.transcript.words == ("papa", "2")
         assert request.lexicon.pronunciations("2") == (("m", "aa"),)
-
-
-def test_written_forms_in_subtitles_are_not_read_as_english():
-    written = tuple(map(TimedWord, ("perro", "$20M", "&", "St.", "21")))
+    written = TranscriptLine(tuple(map(TimedWord, ("perro", "$20M", "&", "St.", "21"))))  # not read as English
     user = Lexicon(dict.fromkeys(("perro", "20m", "st", "21"), (("m", "aa"),)))
-    request = resolve_language(
-        Request(SILENCE, TimedTranscript((TranscriptLine(written),)), lexicon=user, language="es")
-    )
-    assert isinstance(request.transcript, TimedTranscript)
+    request = resolve_language(Request(SILENCE, TimedTranscript((written,)), lexicon=user, language="es"))
     assert request.transcript.words == ("perro", "20m", "st", "21")
     assert request.lexicon.spoken_forms("21") == ((("m", "21"), ("aa", "21")),)
 
@@ -142,24 +130,21 @@ def test_auto_says_what_it_takes_the_speech_for(caplog):
     for transcript in ("bin blue at f two now", None):
         assert resolve_language(Request(SILENCE, transcript, language="auto")).language == "en"
     assert detect_english(SILENCE) is None
-    said = [record.getMessage().partition(";")[0] for record in caplog.records]
-    assert said == [
-        "the transcript is taken for English",
-        "the language of the speech is not known, English is assumed",
-    ]
+    first, second = (message.partition(";")[0] for message in caplog.messages)
+    assert first == "the transcript is taken for English"
+    assert second == "the language of the speech is not known, English is assumed"
 
 
 def test_mapped_phones_are_not_called_sure(toy_model, toy_sentence):
     words = " ".join(toy_sentence.words)
     lexicon = Lexicon({word: Lexicon().pronunciations(word) for word in toy_sentence.words})
     request = Request(toy_sentence.audio, words, lexicon=lexicon, recogniser="own", language="es")
-    outlook = lipmotion.animate(request, model=toy_model).outlook
+    outlook = animate(request, model=toy_model).outlook
     assert (outlook.words, outlook.confidence) == ("mapped transcript", MAPPED_CONFIDENCE)
     assert "mapped to English phones, confidence 0.80" in outlook.text
     foreign = " ".join(["sisa mapama bisi", *toy_sentence.words[:1]])
-    outlook = lipmotion.animate(Request(toy_sentence.audio, foreign, recogniser="own"), model=toy_model).outlook
-    assert outlook.words == "mapped transcript"
-    assert outlook.confidence == pytest.approx(0.25)
+    outlook = animate(Request(toy_sentence.audio, foreign, recogniser="own"), model=toy_model).outlook
+    assert (outlook.words, outlook.confidence) == ("mapped transcript", pytest.approx(0.25))
 
 
 @pytest.mark.long
@@ -182,10 +167,6 @@ def test_words_that_are_hardly_understood_are_told(confidence, lasts_s, warns, c
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 
 
-def words(*timed: tuple[float, float, str]) -> Timeline[RecognisedWord]:
-    return Timeline(tuple(Span(start_s, end_s, RecognisedWord(text, 0.5)) for start_s, end_s, text in timed))
-
-
 def labels(units: Timeline[Unit]) -> list[tuple[str, str]]:
     return [(span.label.phone, span.label.word) for span in units]
 
@@ -196,8 +177,10 @@ def found() -> Recognition:
 
 
 def test_long_pauses_end_a_line():
-    assert format_words(words((0.0, 0.3, "oh"), (0.4, 0.6, "no"), (1.2, 1.5, "yes"))) == "oh no\nyes\n"
-    assert format_words(words()) == ""
+    timed = ((0.0, 0.3, "oh"), (0.4, 0.6, "no"), (1.2, 1.5, "yes"))
+    words = Timeline(tuple(Span(start_s, end_s, RecognisedWord(text, 0.5)) for start_s, end_s, text in timed))
+    assert format_words(words) == "oh no\nyes\n"
+    assert format_words(Timeline(())) == ""
 
 
 @pytest.mark.parametrize("suffix", [".txt", ".JSON"])
@@ -227,10 +210,6 @@ def test_speech_is_as_reliable_as_its_words(found):
     given = analyse_speech(model, Request(WELCOME, transcript="please speak"))
     assert given.recognition is None
     assert analyse(model, Request(WELCOME, recogniser="fast")).confidence == pytest.approx(0)
-
-
-@pytest.mark.long
-def test_words_do_not_depend_on_the_processes():
     long = Audio(np.tile(read_welcome().samples, 7), 16_000)  # of more than half a minute
     assert recognise_words(long, workers=2).words == recognise_words(long).words
 
@@ -241,10 +220,11 @@ class RecognisingEngine(Engine[Any]):
 
     config: Any = None
     found: Timeline[Unit] | None = None
+    f0: bool = True
     name: ClassVar[str] = "recognising"
 
     def inputs(self, motion_s: float = np.inf) -> Inputs:  # noqa: ARG002
-        return Inputs(f0=True)
+        return Inputs(f0=self.f0)
 
     def recognise(self, model: object, speech: Speech) -> Timeline[Unit] | None:  # noqa: ARG002
         assert len(speech.units) == 0
@@ -289,22 +269,9 @@ def test_the_recogniser_says_what_the_engine_does_not_know(toy_model, toy_senten
 def test_f0_is_computed_for_engines_that_want_it(toy_sentence):
     features = features_of(toy_sentence.audio)
     found = build_speech(RecognisingEngine(), toy_sentence.audio, features, toy_sentence.units).log_f0
-    assert found is not None
     np.testing.assert_allclose(found, log_f0(toy_sentence.audio), rtol=1e-5)
-
-    @dataclass(frozen=True)
-    class Deaf(RecognisingEngine):
-        def inputs(self, motion_s: float = np.inf) -> Inputs:  # noqa: ARG002
-            return Inputs()
-
-    assert build_speech(Deaf(), toy_sentence.audio, features, toy_sentence.units).log_f0 is None
-
-
-def test_the_name_of_a_file_is_no_transcript(toy_model, toy_sentence, tmp_path):
-    (tmp_path / "words.txt").write_text("papa", encoding="utf-8")
-    request = Request(toy_sentence.audio, transcript=str(tmp_path / "words.txt"))
-    with pytest.raises(InputError, match="is the name of a file; give Path"):
-        analyse(toy_model, request)
+    deaf = RecognisingEngine(f0=False)
+    assert build_speech(deaf, toy_sentence.audio, features, toy_sentence.units).log_f0 is None
 
 
 def group_words(sentence: ToySentence, late_s: float = 0.0) -> TimedTranscript:
@@ -318,12 +285,10 @@ def group_words(sentence: ToySentence, late_s: float = 0.0) -> TimedTranscript:
 
 
 def test_subtitles_are_aligned_within_their_times(toy_model, toy_sentence, tmp_path):
-    (tmp_path / "said.srt").write_text(
-        f"00:00:00,300 --> 00:00:02,600\n<i>{' '.join(toy_sentence.words)}</i>\n", encoding="utf-8"
-    )
+    text = f"00:00:00,300 --> 00:00:02,600\n<i>{' '.join(toy_sentence.words)}</i>\n"
+    (tmp_path / "said.srt").write_text(text, encoding="utf-8")
     plain = Request(toy_sentence.audio, transcript=" ".join(toy_sentence.words), recogniser="own")
     wanted = analyse(toy_model, plain)
-    text = (tmp_path / "said.srt").read_text(encoding="utf-8")
     for transcript in (tmp_path / "said.srt", text, group_words(toy_sentence), group_words(toy_sentence, 0.4)):
         found = analyse(toy_model, replace(plain, transcript=transcript))
         assert found.units == wanted.units
@@ -356,11 +321,14 @@ def test_words_of_an_installed_recogniser_are_aligned(toy_model, toy_sentence, m
     assert not said
 
 
-def test_a_transcript_beside_a_request_is_taken_if_there_is_no_other():
+def test_a_transcript_beside_a_request_is_taken_if_there_is_no_other(toy_model, toy_sentence, tmp_path):
     assert as_request(Request("a.wav"), "papa").transcript == "papa"
     assert as_request("a.wav", "papa").transcript == "papa"
     with pytest.raises(InputError, match="give one"):
         as_request(Request("a.wav", "mama"), "papa")
+    (tmp_path / "words.txt").write_text("papa", encoding="utf-8")
+    with pytest.raises(InputError, match="is the name of a file; give Path"):
+        analyse(toy_model, Request(toy_sentence.audio, transcript=str(tmp_path / "words.txt")))
 
 
 @pytest.mark.parametrize("kind", ["own", "auto"])
@@ -377,9 +345,8 @@ def test_a_recording_without_speech(toy_model, kind, caplog):
 def test_a_transcript_beside_units_is_not_used(toy_model, toy_sentence, caplog):
     request = Request(toy_sentence.audio, transcript="hello", units=toy_sentence.units)
     assert analyse(toy_model, request).units == toy_sentence.units
-    assert caplog.messages == [
-        "the transcript is not used: the units already say what is spoken; leave one of them out"
-    ]
+    (message,) = caplog.messages
+    assert message == "the transcript is not used: the units already say what is spoken; leave one of them out"
 
 
 @pytest.mark.parametrize(

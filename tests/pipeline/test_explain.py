@@ -139,18 +139,17 @@ def test_text_is_bounded():
 FRAMES = 400
 
 
-def posteriors(name: str, probability: np.ndarray, lead: np.ndarray | None = None) -> ChainPosteriors:
+def posteriors(probability: np.ndarray) -> ChainPosteriors:
     units = tuple(f"u{number}" for number in range(probability.shape[1]))
-    leads = () if lead is None else (-1, 0, 1)
-    given = np.zeros((len(probability), 0)) if lead is None else lead
-    return ChainPosteriors(name, units, probability.astype(np.float32), leads, given.astype(np.float32))
+    no_lead = np.zeros((len(probability), 0), np.float32)
+    return ChainPosteriors("phone", units, probability.astype(np.float32), (), no_lead)
 
 
-def generated(frames: int = FRAMES, name: str = "opening") -> Generation:
+def generated(frames: int = FRAMES) -> Generation:
     values = 0.2 * np.sin(np.arange(frames) / 20)[:, None] ** 2
     half = frames / 200
     units = Timeline((Span(0.0, half, Unit("aa", "aa")), Span(half, 2 * half, Unit("m", "m"))))
-    return of_motion(Motion(values, 100.0, (Channel(name),)), units)
+    return of_motion(Motion(values, 100.0, (Channel("opening"),)), units)
 
 
 def halves(frames: int = FRAMES) -> np.ndarray:
@@ -165,7 +164,7 @@ def pixels(picture: Image.Image) -> np.ndarray:
 
 
 def test_units_have_a_row_each_in_the_order_of_their_time():
-    shown = pixels(draw_posteriors(generated(), [posteriors("phone", halves())]))
+    shown = pixels(draw_posteriors(generated(), [posteriors(halves())]))
     rows = [2 * TITLE_PX + ROW_PX * number + ROW_PX // 2 for number in range(3)]
     early, late = LEFT_PX + 100, LEFT_PX + 2 * FRAMES - 100
     full, white = list(COLOURS[0]), [255, 255, 255]
@@ -180,25 +179,19 @@ def test_units_have_a_row_each_in_the_order_of_their_time():
 def test_units_that_are_never_likely_have_no_row():
     three, four = halves(), halves()
     four[9, 3] = 0.06
-    heights = [draw_posteriors(generated(), [posteriors("phone", probability)]).height for probability in (three, four)]
+    heights = [draw_posteriors(generated(), [posteriors(probability)]).height for probability in (three, four)]
     assert heights[1] - heights[0] == ROW_PX
-
-
-def test_where_nothing_is_likely_there_is_a_picture_all_the_same():
-    few = draw_posteriors(generated(), [posteriors("phone", np.full((FRAMES, 30), 1 / 30))])
-    assert few.height > draw_posteriors(generated(), [posteriors("phone", halves())]).height
-    assert draw_posteriors(generated(), [posteriors("phone", np.zeros((FRAMES, 3)))]).height > 0
-
-
-def test_recordings_of_any_length():
-    for frames, columns in {1: MIN_COLUMNS, 400: 800, 5_345: MAX_COLUMNS}.items():
-        picture = draw_posteriors(generated(frames), [posteriors("phone", halves(frames))])
-        assert picture.width == LEFT_PX + columns + RIGHT_PX
+    few = draw_posteriors(generated(), [posteriors(np.full((FRAMES, 30), 1 / 30))])
+    assert few.height > heights[0]
+    assert draw_posteriors(generated(), [posteriors(np.zeros((FRAMES, 3)))]).height > 0
 
 
 def test_a_column_of_a_long_recording_is_the_mean_of_its_frames():
+    for frames, columns in {1: MIN_COLUMNS, 400: 800, 5_345: MAX_COLUMNS}.items():
+        picture = draw_posteriors(generated(frames), [posteriors(halves(frames))])
+        assert picture.width == LEFT_PX + columns + RIGHT_PX
     probability = np.zeros((8 * MAX_COLUMNS, 1))
     probability[::4] = 1
-    shown = pixels(draw_posteriors(generated(8 * MAX_COLUMNS), [posteriors("phone", probability)]))
+    shown = pixels(draw_posteriors(generated(8 * MAX_COLUMNS), [posteriors(probability)]))
     row = shown[2 * TITLE_PX + ROW_PX // 2, LEFT_PX + 10 : LEFT_PX + MAX_COLUMNS // 2 - 10]
     assert (row == [round(255 + 0.25 * (part - 255)) for part in COLOURS[0]]).all()

@@ -18,25 +18,21 @@ from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.model import VERSION, find_shipped, read_header
 from lipmotion.speech.recognition.adaptation import adaptation_to_arrays, create_adaptation
 from lipmotion.storage.archive import HEADER
-from lipmotion.types import Audio, Generation
+from lipmotion.types import Audio
 from pipeline.damage import DAMAGES, LARGEST_DIFFERENCE, QUICK, UNREADABLE, animated, damaged, distance, refused
 from robustness.case import changed_model
 from testing.toy import ToySentence, toy_sentences
 
 
-def test_saved_and_loaded_it_moves_the_same(toy_model, toy_model_file, toy_speech):
-    """Figures are kept at half precision, so the first save changes a little."""
-    before, after = (animate(toy_speech, model=model) for model in (toy_model, load_model(toy_model_file)))
-    assert [s.label.phone for s in before.units] == [s.label.phone for s in after.units]
-    assert np.abs(before.motion.values - after.motion.values).max() < 0.02
-
-
-def test_after_one_save_nothing_changes_any_more(toy_model_file, toy_speech, tmp_path):
+def test_saved_and_loaded_it_moves_the_same(toy_model, toy_model_file, toy_speech, tmp_path):
+    """Figures are kept at half precision: the first save changes a little, another one nothing any more."""
     once = load_model(toy_model_file)
     save_model(once, tmp_path / "again.lipmotion")
     twice = load_model(tmp_path / "again.lipmotion")
     assert (tmp_path / "again.lipmotion").read_bytes() == toy_model_file.read_bytes()
-    first, second = (animate(toy_speech, model=model) for model in (once, twice))
+    before, first, second = (animate(toy_speech, model=model) for model in (toy_model, once, twice))
+    assert [s.label.phone for s in before.units] == [s.label.phone for s in first.units]
+    assert np.abs(before.motion.values - first.motion.values).max() < 0.02
     assert np.array_equal(first.motion.values, second.motion.values)
     assert np.array_equal(first.variance, second.variance)
     assert first.units == second.units
@@ -76,8 +72,12 @@ def test_models_are_one_short_line():
         assert "\n" not in repr(part)
 
 
-def test_the_shipped_model_is_read_once():
+def test_the_shipped_model_is_read_once_and_says_whose_recordings_it_learned():
     assert load_model() is load_model()
+    header = read_header(find_shipped())
+    assert (header["licence"], header["split"], header["utterances"]) == (["CC BY 4.0"], "all", 524)
+    assert any("GRID" in line for line in header["attribution"])
+    assert find_shipped().stat().st_size < 9_000_000
 
 
 def test_a_model_with_the_former_names_of_options_is_read(toy_model_file, tmp_path):
@@ -95,21 +95,8 @@ def test_a_model_with_the_former_names_of_options_is_read(toy_model_file, tmp_pa
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 
 
-@pytest.fixture(scope="module")
-def welcome() -> Generation:
-    return animate(EXAMPLES / "welcome.flac", transcript=(EXAMPLES / "welcome.txt").read_text())
-
-
-def test_header_says_whose_recordings():
-    header = read_header(find_shipped())
-    assert header["licence"] == ["CC BY 4.0"]
-    assert any("GRID" in line for line in header["attribution"])
-    assert header["split"] == "all"
-    assert header["utterances"] == 524
-    assert find_shipped().stat().st_size < 9_000_000
-
-
-def test_lips_meet_on_p_b_m(welcome):
+def test_lips_meet_on_p_b_m():
+    welcome = animate(EXAMPLES / "welcome.flac", transcript=(EXAMPLES / "welcome.txt").read_text())
     opening = welcome.motion["opening"]
     closing = [span for span in welcome.units if span.label.phone in ("p", "b", "m")]
     assert len(closing) == 9  # please speak my lips move big blue boats by
@@ -123,22 +110,17 @@ def adapted(toy_model: Model, toy_speech: Path) -> Model:
     return adapt(toy_model, [toy_speech, toy_sentences(3)[1].audio])
 
 
-@pytest.fixture(scope="module")
-def adapted_file(adapted: Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("adapted") / "adapted.lipmotion"
-    save_model(adapted, path)
-    return path
-
-
 @pytest.mark.long
-def test_only_the_adaptation_changes(toy_model, adapted):
-    assert toy_model.adaptation is None
-    assert adapted.adaptation is not None
+def test_only_the_adaptation_changes_and_an_earlier_one_is_forgotten(toy_model, adapted, toy_speech):
+    assert (toy_model.adaptation is None, adapted.adaptation is None) == (True, False)
     assert adapted.phones is toy_model.phones
     assert adapted.learned is toy_model.learned
     about = dict(adapted.about)
     assert about.pop("adapted")["recordings"] == 2
     assert about == toy_model.about
+    again, fresh = (adapt(model, [toy_speech]) for model in (adapted, toy_model))
+    assert np.array_equal(again.adaptation.own, fresh.adaptation.own)
+    assert again.about == fresh.about
 
 
 def test_it_is_used_from_then_on(adapted, toy_speech):
@@ -149,21 +131,15 @@ def test_it_is_used_from_then_on(adapted, toy_speech):
         assert animate(request, model=odd).units != animate(request, model=adapted).units
 
 
-def test_a_saved_and_loaded_adaptation_gives_the_same_phones(adapted, adapted_file, toy_speech):
-    again = load_model(adapted_file)
+def test_a_saved_and_loaded_adaptation_gives_the_same_phones(adapted, toy_speech, tmp_path):
+    save_model(adapted, tmp_path / "adapted.lipmotion")
+    again = load_model(tmp_path / "adapted.lipmotion")
     assert np.array_equal(again.adaptation.own, adapted.adaptation.own)
     assert np.array_equal(again.adaptation.general, adapted.adaptation.general)
-    assert read_header(adapted_file)["adapted"] == adapted.about["adapted"]
+    assert again.about["adapted"] == adapted.about["adapted"]
     request = Request(toy_speech, recogniser="fast")
     before, after = (animate(request, model=model).units for model in (adapted, again))
     assert [span.label.phone for span in before] == [span.label.phone for span in after]
-
-
-@pytest.mark.long
-def test_an_earlier_adaptation_is_forgotten(adapted, toy_model, toy_speech):
-    again, fresh = (adapt(model, [toy_speech]) for model in (adapted, toy_model))
-    assert np.array_equal(again.adaptation.own, fresh.adaptation.own)
-    assert again.about == fresh.about
 
 
 def test_a_list_of_recordings_is_required(toy_model):

@@ -12,7 +12,7 @@ from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import find_mouth
 from lipmotion.errors import InputError
-from lipmotion.formats.keys import Thinning
+from lipmotion.formats.base import Thinning
 from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, compute_living_curves, eye_and_brow_weights
 from lipmotion.meshes.model.rig_tables import RigRow, read_rig_table
 from lipmotion.pipeline.analysis.read_request import read_units
@@ -30,13 +30,10 @@ TAKE = Path("a.livelink.csv")
 HEAD = ("headYaw", "headPitch", "headRoll")
 
 
-def test_plain_formats_hold_what_was_chosen(generation):
+def test_plain_formats_hold_what_was_chosen_and_a_take_a_whole_face_at_60_frames(generation):
     chosen = generation.selected(["opening"])
     assert fit_to_format(Path("a.csv"), generation, chosen, None) is chosen
-
-
-def test_a_take_holds_a_whole_face_at_60_frames(generation):
-    held = fit_to_format(TAKE, generation, generation.selected(["opening"]), None)
+    held = fit_to_format(TAKE, generation, chosen, None)
     assert held.motion.rate_hz == pytest.approx(60.0)
     assert {"mouthClose", "mouthFunnel", "mouthSmileLeft"} < set(held.motion.names)
     assert {"eyeBlinkLeft", "browInnerUp", *HEAD} < set(held.motion.names)
@@ -47,10 +44,9 @@ def test_a_take_shows_the_closures_of_the_motion(generation):
     at_100 = make_curves(generation.motion, generation.units, "arkit")
     held = fit_to_format(TAKE, generation, generation, 12.0).motion
     for start_s, end_s in ((0.46, 0.64), (0.86, 1.04)):
-        slow, fast = (
-            (each["jawOpen"] - each["mouthClose"])[(each.time_s >= start_s) & (each.time_s <= end_s)].min()
-            for each in (held, at_100)
-        )
+        spans = [(each.time_s >= start_s) & (each.time_s <= end_s) for each in (held, at_100)]
+        gaps = [each["jawOpen"] - each["mouthClose"] for each in (held, at_100)]
+        slow, fast = (gap[span].min() for gap, span in zip(gaps, spans, strict=True))
         assert slow == pytest.approx(fast, abs=0.01)
 
 
@@ -171,23 +167,20 @@ def test_controls_of_a_rig_have_the_stated_values(tmp_path):
     changed = calibrate_rows(rows, sources, {"open": {"Jaw": -20}, "closed": {"Jaw": 2}, "rounded": {"Lip": 3}})
     assert _values(changed, sources, "Jaw")[:2] == pytest.approx([-20, 2])
     assert _values(changed, sources, "Lip")[2] == pytest.approx(3)
-    assert changed[1].gain / changed[0].gain == pytest.approx(0.2)
-
-
-def test_three_values_of_one_control_are_met_as_nearly_as_a_line_can():
+    assert changed[1].gain / changed[0].gain == pytest.approx(0.2)  # three values of one are met as nearly as they can:
     stated = {pose: {"A": value} for pose, value in zip(POSES, (1.0, 0.0, 0.6), strict=True)}
     (row,) = calibrate_rows([RigRow("A", "jawOpen")], {"jawOpen": [0.5, 0.0, 0.2]}, stated)
     assert row.gain == pytest.approx(1.947, abs=1e-3)
     assert row.offset == pytest.approx(0.079, abs=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("control", "message"),
-    [("B", "the table has no 'B'; there are A"), ("A", "'A' follows no curve that tells these poses apart")],
-)
-def test_what_cannot_be_calibrated_is_said(control, message):
-    with pytest.raises(InputError, match=message):
-        calibrate_rows([RigRow("A", "")], {}, {"open": {control: 1.0}})
+def test_what_cannot_be_calibrated_is_said():
+    for control, message in (
+        ("B", "the table has no 'B'; there are A"),
+        ("A", "'A' follows no curve that tells these"),
+    ):
+        with pytest.raises(InputError, match=message):
+            calibrate_rows([RigRow("A", "")], {}, {"open": {control: 1.0}})
 
 
 def _values(rows: list[RigRow] | tuple[RigRow, ...], sources: dict[str, list[float]], control: str) -> list[float]:
@@ -222,13 +215,9 @@ def test_phones_of_a_recording_say_what_is_known_of_them(toy_model, toy_sentence
     result = animate(request, model=toy_model)
     write(result, tmp_path / name)
     given = Request(toy_sentence.audio, units=read_units(tmp_path / name), recogniser="own")
-    again = analyse(toy_model, given)
-    assert (
-        (again.units_known, again.confidence)
-        == (first.units_known, first.confidence)
-        == (bool(words), float(bool(words)))
-    )
-    assert again.units_decide == first.units_decide == bool(words)
+    again, known = analyse(toy_model, given), bool(words)
+    for each in (first, again):
+        assert (each.units_known, each.confidence, each.units_decide) == (known, float(known), known)
     assert np.array_equal(animate(given, model=toy_model).motion.values, result.motion.values)
 
 

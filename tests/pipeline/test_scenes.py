@@ -60,12 +60,6 @@ def test_the_head_closes_its_lips_in_m_and_p_and_opens_them_in_aa(own_head):
     assert gap[(time_s > 0.7) & (time_s < 0.8)].max() > 0.15
 
 
-def test_the_rate_is_that_of_the_keys(generation):
-    made = build_head_scene(generation, 30.0)
-    assert made.weights.rate_hz == pytest.approx(30.0)
-    assert len(made.weights.values) == 61
-
-
 @pytest.mark.parametrize("own", [False, True], ids=["head", "character"])
 @pytest.mark.parametrize("mood", [pytest.param("", marks=pytest.mark.long), "angry:0.8, surprised at 1.0"])
 def test_some_frames_are_those_of_the_whole(generation, mood, own, tmp_path):
@@ -74,10 +68,8 @@ def test_some_frames_are_those_of_the_whole(generation, mood, own, tmp_path):
     units = [replace(s, start_s=s.start_s + n * each_s, end_s=s.end_s + n * each_s) for n in range(3) for s in spans]
     moved = replace(generation.motion, values=values)
     moved = in_mood(moved, mood) if mood else moved
-    pin = Pin(2.7, "jawOpen", 0.4)
-    long = replace(
-        generation, motion=moved, units=Timeline(tuple(units)), spread=np.zeros(moved.values.shape), curve_edits=(pin,)
-    )
+    long = replace(generation, motion=moved, units=Timeline(tuple(units)), spread=np.zeros(moved.values.shape))
+    long = replace(long, curve_edits=(Pin(2.7, "jawOpen", 0.4),))
     scene = build_head_scene
     if own:
         write_glb(tmp_path / "own.glb", head())
@@ -91,31 +83,20 @@ def test_some_frames_are_those_of_the_whole(generation, mood, own, tmp_path):
             assert np.abs(part.turn.rotations - whole.turn.rotations[frames]).max() < 1e-9
 
 
-def test_a_motion_without_opening_is_refused(generation):
-    with pytest.raises(InputError, match="no channel 'opening'"):
-        build_head_scene(generation.selected(["x_13"]))
-
-
-def test_the_sound_is_in_the_extras_of_the_scene(character, tmp_path):
-    write_scene(tmp_path / "a.glb", character, tmp_path / "said.wav")
-    stored = read_gltf_document(tmp_path / "a.glb").json["scenes"][0]
-    assert stored["extras"] == {"audio": {"uri": "said.wav", "start_s": 0.0}}
-    write_scene(tmp_path / "b.glb", character)
-    assert "extras" not in read_gltf_document(tmp_path / "b.glb").json["scenes"][0]
-
-
 @pytest.mark.parametrize(
     ("sound_s", "lines"),
-    [(0.5, ["uniform timecode startTime = 12"]),
+    [(0.5, ["uniform timecode startTime = 12"]), (0.0, ["uniform timecode startTime = 0"]),
      (-0.5, ["uniform double mediaOffset = 0.5", "uniform timecode startTime = 0"])],
 )  # fmt: skip
-def test_a_sound_that_does_not_begin_with_the_animation(sound_s, lines, character, tmp_path):
+def test_when_the_sound_begins_in_the_animation(sound_s, lines, character, tmp_path):
     moved = replace(character, sound_s=sound_s)
     write_glb(tmp_path / "head.glb", head())
     for name, scene in (("a.glb", moved), ("b.glb", replace(moved, original=None))):
         write_scene(tmp_path / name, scene, tmp_path / "said.wav")
         stored = read_gltf_document(tmp_path / name).json["scenes"][0]
         assert stored["extras"] == {"audio": {"uri": "said.wav", "start_s": sound_s}}
+    write_scene(tmp_path / "b.glb", character)
+    assert "extras" not in read_gltf_document(tmp_path / "b.glb").json["scenes"][0]
     write_scene(tmp_path / "a.usda", moved, tmp_path / "said.wav")
     written = [line.strip() for line in (tmp_path / "a.usda").read_text().splitlines()]
     assert [line for line in written if "mediaOffset" in line or "startTime " in line] == lines
@@ -159,9 +140,13 @@ def test_keys_that_others_give_are_left_out(generation, tmp_path):
     assert shown[closed] == pytest.approx(scene.tabulate()[closed], abs=1e-6)
 
 
-def test_the_shapes_of_the_head_are_those_of_its_mesh(own_head):
+def test_the_shapes_of_the_head_are_those_of_its_mesh_and_the_rate_is_that_of_the_keys(generation, own_head):
     assert own_head.mesh.shape_names == build_head_mesh(make_figure()).shape_names
     assert set(own_head.weights.names) == set(own_head.mesh.shape_names)
+    slow = build_head_scene(generation, 30.0).weights
+    assert (slow.rate_hz, len(slow.values)) == (pytest.approx(30.0), 61)
+    with pytest.raises(InputError, match="no channel 'opening'"):
+        build_head_scene(generation.selected(["x_13"]))
 
 
 @pytest.mark.skipif(gltf_validator() is None, reason="needs Khronos' gltf-validator (tests/programs)")

@@ -171,17 +171,6 @@ def test_sources_are_the_recordings_whose_sound_is_joined(toy_corpus, selection_
     assert np.mean(np.array(found) > 0.8) > 0.6  # motion is chosen again, by the features of the joined sound
 
 
-def test_a_model_without_recordings_is_refused(toy_corpus, toy_model):
-    with pytest.raises(InputError, match="--engine selection"):
-        speak_from_corpus("baby blue", toy_corpus, toy_model)
-
-
-@pytest.mark.long
-def test_another_corpus_is_refused(selection_model, tmp_path):
-    with pytest.raises(InputError, match="lacks"):
-        speak_from_corpus("baby blue", Corpus.create(tmp_path / "empty"), selection_model)
-
-
 @pytest.mark.long
 def test_phones_that_were_never_recorded_are_named(toy_corpus, selection_model, caplog):
     speak_from_corpus("baby blue", toy_corpus, selection_model)
@@ -191,8 +180,13 @@ def test_phones_that_were_never_recorded_are_named(toy_corpus, selection_model, 
 
 
 @pytest.mark.long
-def test_recordings_of_several_people_are_refused(toy_corpus, selection_model, tmp_path):
+def test_other_models_and_corpora_are_refused(toy_corpus, toy_model, selection_model, tmp_path):
     utterances = map(toy_corpus.utterance, toy_corpus.names())
     two = corpus_of(tmp_path / "two", [replace(each, speaker="ab"[n % 2]) for n, each in enumerate(utterances)])
-    with pytest.raises(InputError, match="recordings of 2 people"):
-        speak_from_corpus("baby blue", two, selection_model)
+    for corpus, model, message in (
+        (toy_corpus, toy_model, "--engine selection"),
+        (Corpus.create(tmp_path / "empty"), selection_model, "lacks"),
+        (two, selection_model, "recordings of 2 people"),
+    ):
+        with pytest.raises(InputError, match=message):
+            speak_from_corpus("baby blue", corpus, model)

@@ -46,8 +46,8 @@ def model(two_people: Corpus) -> Model:
     return train(two_people, recogniser=SMALL)[0]
 
 
-def request(sentence: ToySentence, speaker: str = "") -> Request:
-    return Request(sentence.audio, units=sentence.units, speaker=speaker, pauses="natural")
+def request(sentence: ToySentence, speaker: str = "", onto: Onto | None = None, **more: str) -> Request:
+    return Request(sentence.audio, units=sentence.units, speaker=speaker, onto=onto, pauses="natural", **more)
 
 
 def opening(model: Model, sentence: ToySentence, speaker: str = "") -> np.ndarray:
@@ -75,15 +75,12 @@ def test_pins_hold_in_the_units_of_the_person(model, toy_sentence):
         animate(request(toy_sentence, "ben"), model=model, constraints=below)
 
 
-def test_unknown_speakers_are_refused(model, toy_model, toy_sentence):
+def test_unknown_speakers_and_maps_of_other_channels_are_refused(model, toy_model, toy_sentence, tmp_path):
     with pytest.raises(InputError, match="no speaker 'cleo', only: anna, ben"):
         opening(model, toy_sentence, "cleo")
     with pytest.raises(InputError, match=r"tells no speakers apart.*'cleo'"):
         opening(toy_model, toy_sentence, "cleo")
     assert toy_model.speakers is None
-
-
-def test_maps_of_other_channels_are_refused(model, toy_sentence, tmp_path):
     save_model(model, tmp_path / "people.lipmotion")
     channels = npy(np.array([("opening", "eye_distance"), ("width", "eye_distance"), ("jaw", "weight")]))
     changes = {"speakers/channels.npy": channels}
@@ -92,7 +89,7 @@ def test_maps_of_other_channels_are_refused(model, toy_sentence, tmp_path):
         opening(again, toy_sentence, "ben")
 
 
-def test_evaluation_compares_each_with_their_own_motion(two_people, model):
+def test_evaluation_compares_each_with_their_own_motion_and_names_strangers(two_people, model, tmp_path):
     own, mean = (
         evaluate(each, two_people, selection=Selection("test"), recogniser="own")
         for each in (model, replace(model, speakers=None))
@@ -101,22 +98,17 @@ def test_evaluation_compares_each_with_their_own_motion(two_people, model):
     assert own["conditions"][condition]["amse"] < 0.8 * mean["conditions"][condition]["amse"]
     assert own["strangers"] == []
     assert "strangers" not in mean
-
-
-def test_strangers_are_named_and_get_the_mean_person(two_people, model, tmp_path):
     cleo = replace(two_people.utterance(two_people.names("test")[0]), speaker="cleo")
     corpus = corpus_of(tmp_path / "cleo", [cleo])
     figures = evaluate(model, corpus, selection=Selection(None), recogniser="own")
-    assert figures["strangers"] == ["cleo"]
+    assert figures["strangers"] == ["cleo"]  # who gets the mean person
     mean = evaluate(replace(model, speakers=None), corpus, selection=Selection(None), recogniser="own")
     assert figures["conditions"] == mean["conditions"]
 
 
 def test_one_person_is_not_mapped(two_people):
-    model, _ = train(
-        two_people, selection=Selection("train", ("anna",)), recogniser=SMALL, engine=engine_named("joint", {})
-    )
-    assert model.speakers is None
+    anna = Selection("train", ("anna",))
+    assert train(two_people, selection=anna, recogniser=SMALL, engine=engine_named("joint", {}))[0].speakers is None
 
 
 @pytest.mark.parametrize("engine", ["joint", "coupled"])
@@ -154,9 +146,6 @@ def test_channels_that_all_have_are_trained_on(two_people, tmp_path, caplog):
     assert model.speakers.names == ("anna", "ben", "captured")
     generated = animate(Request(toy_utterances(3)[0].audio, speaker="captured", recogniser="own"), model=model)
     assert generated.motion.names == ("width", "opening")
-
-
-def test_no_common_channel_is_an_error(two_people, tmp_path):
     weights = tuple(Channel(name, "weight") for name in ("opening", "jaw"))
     strange = [captured(utterance, weights) for utterance in toy_utterances(3)[:1]]
     corpus = corpus_of(tmp_path / "apart", [two_people.utterance(two_people.names("train")[1]), *strange])
@@ -176,70 +165,58 @@ def of_two(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
 
 @pytest.fixture(scope="module")
 def two_model(of_two: Corpus) -> Model:
-    engine = engine_named("trajectory", {"articulation": False})
-    return train(of_two, recogniser=SMALL, engine=engine)[0]
-
-
-def request_onto(sentence: ToySentence, onto: Onto | None = None, **more: str) -> Request:
-    return Request(sentence.audio, units=sentence.units, onto=onto, pauses="natural", **more)
-
-
-def is_like_ben(model: Model, sentence: ToySentence, onto: Onto, **more: str) -> None:
-    """Raise AssertionError unless the motion is that of the model, in ben's place and range."""
-    own, mapped = (
-        animate(request_onto(sentence), model=model),
-        animate(request_onto(sentence, onto, **more), model=model),
-    )
-    wanted = OFFSET + GAIN * toy_motion(sentence.units, 100.0).values
-    ranges = [np.ptp(np.percentile(values, [2, 98], axis=0), axis=0) for values in (mapped.motion.values, wanted)]
-    np.testing.assert_allclose(ranges[0] / ranges[1], 1, atol=0.3)
-    assert np.abs(np.median(mapped.motion.values, axis=0) - np.median(wanted, axis=0)).max() < 0.03
-    for name in own.motion.names:
-        assert np.corrcoef(own.motion[name], mapped.motion[name])[0, 1] > 0.98
-    for frames in find_closable_ranges(sentence.units, len(mapped.motion.values)):
-        assert mapped.motion["opening"][frames].min() == pytest.approx(OFFSET[0], abs=0.02)
+    return train(of_two, recogniser=SMALL, engine=engine_named("trajectory", {"articulation": False}))[0]
 
 
 def test_variance_and_pins_and_explanations_are_of_the_person(toy_model, toy_sentence, ben):
     person = map_onto(toy_model, ben)
-    own, mapped = (animate(request_onto(toy_sentence, onto), model=toy_model) for onto in (None, person))
+    own, mapped = (animate(request(toy_sentence, onto=onto), model=toy_model) for onto in (None, person))
     np.testing.assert_allclose(mapped.variance, own.variance * np.square(person.gain))
     pins = Constraints((Pin(0.9, "opening", 0.17), Pin(1.2, "width", 0.5)))
-    pinned = animate(request_onto(toy_sentence, person), model=toy_model, constraints=pins).motion
+    pinned = animate(request(toy_sentence, onto=person), model=toy_model, constraints=pins).motion
     for pin in pins.pins:
         assert pinned[pin.channel][round(pin.time_s * 100)] == pytest.approx(pin.value, abs=1e-9)
-    (explanation,) = explain(request_onto(toy_sentence, person), at=0.9, model=toy_model)
+    (explanation,) = explain(request(toy_sentence, onto=person), at=0.9, model=toy_model)
     assert explanation.motion["opening"].value == pytest.approx(mapped.motion["opening"][90], abs=1e-9)
 
 
 def test_a_person_of_the_model_onto_another(two_model, toy_sentence, ben):
     """Whoever of the model's people speaks, the motion is in ben's place and range."""
-    people = [
-        animate(request_onto(toy_sentence, ben, speaker=name), model=two_model).motion for name in ("", "anna", "ben")
-    ]
+    requests = [request(toy_sentence, name, ben) for name in ("", "anna", "ben")]
+    people = [animate(each, model=two_model).motion for each in requests]
     ranges = np.stack([np.ptp(np.percentile(motion.values, [5, 95], axis=0), axis=0) for motion in people])
     np.testing.assert_allclose(ranges / ranges[2], 1, atol=0.15)
-    anna = animate(request_onto(toy_sentence, speaker="anna"), model=two_model).motion
+    anna = animate(request(toy_sentence, "anna"), model=two_model).motion
     assert np.ptp(anna["opening"]) > 1.3 * np.ptp(people[1]["opening"])
     with pytest.raises(InputError, match="no speaker 'cleo', only: anna, ben"):
-        animate(request_onto(toy_sentence, ben, speaker="cleo"), model=two_model)
+        animate(request(toy_sentence, "cleo", ben), model=two_model)
 
 
 def test_onto_one_person_of_a_corpus_of_several(toy_model, toy_sentence, of_two):
-    is_like_ben(toy_model, toy_sentence, of_two, onto_speaker="ben")
+    """The motion is that of the model, in ben's place and range."""
+    like_ben = request(toy_sentence, onto=of_two, onto_speaker="ben")
+    own, mapped = (animate(each, model=toy_model).motion for each in (request(toy_sentence), like_ben))
+    wanted = OFFSET + GAIN * toy_motion(toy_sentence.units, 100.0).values
+    ranges = [np.ptp(np.percentile(values, [2, 98], axis=0), axis=0) for values in (mapped.values, wanted)]
+    np.testing.assert_allclose(ranges[0] / ranges[1], 1, atol=0.3)
+    assert np.abs(np.median(mapped.values, axis=0) - np.median(wanted, axis=0)).max() < 0.03
+    for name in own.names:
+        assert np.corrcoef(own[name], mapped[name])[0, 1] > 0.98
+    for frames in find_closable_ranges(toy_sentence.units, len(mapped.values)):
+        assert mapped["opening"][frames].min() == pytest.approx(OFFSET[0], abs=0.02)
     for more, found in (({}, "2 speakers"), ({"onto_speaker": "cleo"}, "no speaker 'cleo'")):
         with pytest.raises(InputError, match=rf"{found}, required one of: anna, ben; name it \(--onto-speaker\)"):
-            animate(request_onto(toy_sentence, of_two, **more), model=toy_model)
+            animate(request(toy_sentence, onto=of_two, **more), model=toy_model)
 
 
 def test_onto_a_person_of_another_model(toy_model, two_model, toy_sentence, tmp_path):
     save_model(two_model, tmp_path / "two.lipmotion")
-    mapped = animate(request_onto(toy_sentence, tmp_path / "two.lipmotion", onto_speaker="ben"), model=toy_model).motion
-    wanted = animate(request_onto(toy_sentence, speaker="ben"), model=two_model).motion
-    own = animate(request_onto(toy_sentence), model=toy_model).motion
+    mapped = animate(request(toy_sentence, onto=tmp_path / "two.lipmotion", onto_speaker="ben"), model=toy_model).motion
+    wanted = animate(request(toy_sentence, "ben"), model=two_model).motion
+    own = animate(request(toy_sentence), model=toy_model).motion
     assert np.abs(mapped.values - wanted.values).mean() < 0.4 * np.abs(own.values - wanted.values).mean()
     with pytest.raises(InputError, match="no speaker 'cleo', only: anna, ben"):
-        animate(request_onto(toy_sentence, two_model, onto_speaker="cleo"), model=toy_model)
+        animate(request(toy_sentence, onto=two_model, onto_speaker="cleo"), model=toy_model)
     with pytest.raises(InputError, match=r"measured in some speech; give a request \(speech=\.\.\.\)"):
         map_onto(toy_model, two_model)
 
@@ -253,7 +230,7 @@ def test_onto_the_person_of_a_video(toy_model, toy_sentence, toy_speech, monkeyp
         return of_ben(toy_utterances(3)[0]).track
 
     monkeypatch.setattr("lipmotion_faces.transfer.track", track)
-    own, mapped = (animate(request_onto(toy_sentence, onto), model=toy_model).motion for onto in (None, toy_speech))
+    own, mapped = (animate(request(toy_sentence, onto=onto), model=toy_model).motion for onto in (None, toy_speech))
     assert tracked == [(toy_speech, False, 60.0)]
     ratio = np.ptp(mapped["opening"]) / np.ptp(own["opening"])
     assert GAIN[0] < ratio < 0.95
@@ -268,35 +245,25 @@ def test_a_map_is_kept_in_a_model(toy_model, toy_sentence, ben, tmp_path):
     save_model(known, tmp_path / "known.lipmotion")
     again = load_model(tmp_path / "known.lipmotion")
     assert again.about["speakers"] == ["ben", "cleo"]
-    wanted = animate(request_onto(toy_sentence, person), model=toy_model).motion
-    found = animate(request_onto(toy_sentence, speaker="ben"), model=again).motion
+    wanted = animate(request(toy_sentence, onto=person), model=toy_model).motion
+    found = animate(request(toy_sentence, "ben"), model=again).motion
     np.testing.assert_allclose(found.values, wanted.values, atol=1e-3)
-    unmapped = animate(request_onto(toy_sentence), model=toy_model).motion
-    np.testing.assert_allclose(
-        animate(request_onto(toy_sentence), model=again).motion.values, unmapped.values, atol=1e-3
-    )
+    first, second = (animate(request(toy_sentence), model=each).motion.values for each in (toy_model, again))
+    np.testing.assert_allclose(second, first, atol=1e-3)
     for name in ("ben", ""):
         with pytest.raises(InputError, match="required another name than: , ben, cleo"):
             with_person(known, name, person)
 
 
-def test_other_channels_are_refused(toy_model, toy_sentence, tmp_path):
-    def weights(utterance: Utterance) -> Utterance:
-        channels = tuple(Channel(name, "weight") for name in ("jaw", "width", "outer"))
-        motion = replace(utterance.track.motion, channels=channels)
-        return replace(utterance, track=replace(utterance.track, motion=motion))
-
-    corpus = corpus_of(tmp_path / "weights", [weights(each) for each in toy_utterances(3)])
-    with pytest.raises(InputError, match=r"weights: its motion has no channel 'opening'.*3 of 3 are missing"):
-        animate(request_onto(toy_sentence, corpus), model=toy_model)
-
-
-def test_no_face_and_no_speech_are_refused(toy_model, toy_sentence, tmp_path):
-    unseen = [
-        replace(each, track=replace(each.track, seen=np.zeros_like(each.track.seen))) for each in toy_utterances(3)
-    ]
-    corpus = corpus_of(tmp_path / "unseen", unseen)
-    with pytest.raises(InputError, match=r"unseen: 0\.00 s of speech with a measured face, required 0\.5 s or more"):
-        animate(request_onto(toy_sentence, corpus), model=toy_model)
-    with pytest.raises(InputError, match="the corpus is empty"):
-        animate(request_onto(toy_sentence, Corpus.create(tmp_path / "empty")), model=toy_model)
+def test_corpora_that_are_refused(toy_model, toy_sentence, tmp_path):
+    channels = tuple(Channel(name, "weight") for name in ("jaw", "width", "outer"))
+    tracks = {"weights": [captured(each, channels) for each in toy_utterances(3)], "empty": []}
+    unseen = [replace(each.track, seen=np.zeros_like(each.track.seen)) for each in toy_utterances(3)]
+    tracks["unseen"] = [replace(each, track=track) for each, track in zip(toy_utterances(3), unseen, strict=True)]
+    for name, message in (
+        ("weights", r"weights: its motion has no channel 'opening'.*3 of 3 are missing"),
+        ("unseen", r"unseen: 0\.00 s of speech with a measured face, required 0\.5 s or more"),
+        ("empty", "the corpus is empty"),
+    ):
+        with pytest.raises(InputError, match=message):
+            animate(request(toy_sentence, onto=corpus_of(tmp_path / name, tracks[name])), model=toy_model)

@@ -34,16 +34,19 @@ from speech.made_voices import laugh, pulses, recording, said, vowels
 from testing.toy import toy_sentences
 
 
-def test_several_files_at_once(result, toy_model, toy_speech, tmp_path):
+def test_several_files_at_once_and_another_rate(result, toy_model, toy_speech, tmp_path):
     paths = [tmp_path / name for name in ("a.json", "a.csv", "a.NPZ")]
     write(result, [paths[0], str(paths[1]), paths[2]], speech=toy_speech, model=toy_model)
     assert sorted(tmp_path.iterdir()) == sorted(paths)
     for path in paths:
         motion, units = read_motion(path)
-        assert motion.names == result.motion.names
-        assert motion.rate_hz == 100
+        assert (motion.names, motion.rate_hz) == (result.motion.names, 100)
         assert motion.values == pytest.approx(result.motion.values, abs=1e-5)
         assert len(units) == (0 if path.suffix == ".csv" else len(result.units))
+        write(result, path, model=toy_model, rate_hz=30)
+        motion, _ = read_motion(path)
+        assert motion.rate_hz == 30
+        assert motion.values == pytest.approx(close_on_frame_grid(result, 30).motion.resampled(30).values, abs=1e-5)
 
 
 def test_files_say_where_they_come_from_and_a_recording_may_have_any_name(result, toy_model, toy_speech, tmp_path):
@@ -56,14 +59,6 @@ def test_files_say_where_they_come_from_and_a_recording_may_have_any_name(result
     document = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
     assert document["source"] == {"file": "Ünal 音 caf\\udce9.wav"}
     assert len(read_motion(tmp_path / "a.npz")[1]) == len(result.units)
-
-
-def test_another_rate(result, toy_model, tmp_path):
-    write(result, [tmp_path / "a.json", tmp_path / "a.csv"], model=toy_model, rate_hz=30)
-    for name in ("a.json", "a.csv"):
-        motion, _ = read_motion(tmp_path / name)
-        assert motion.rate_hz == 30
-        assert motion.values == pytest.approx(close_on_frame_grid(result, 30).motion.resampled(30).values, abs=1e-5)
 
 
 def test_a_video_with_its_sound(result, toy_speech, tmp_path):
@@ -190,6 +185,12 @@ def test_cues_beside_other_outputs_are_those_of_the_function(result, tmp_path):
     write(result, [tmp_path / "a.cues.tsv", tmp_path / "a.csv"])
     write_cues(cues(result), tmp_path / "b.tsv")
     assert (tmp_path / "a.cues.tsv").read_bytes() == (tmp_path / "b.tsv").read_bytes()
+    with pytest.raises(ExportError, match="has no phones"):
+        cues(replace(result, units=Timeline(())))
+    broken = result.motion.values.copy()
+    broken[3, 0] = np.nan
+    with pytest.raises(ExportError, match="not finite"):
+        cues(replace(result, motion=replace(result.motion, values=broken)))
 
 
 def test_a_kind_of_a_package_is_written_beside_others(result, tmp_path, monkeypatch):
@@ -205,15 +206,6 @@ def test_a_kind_of_a_package_is_written_beside_others(result, tmp_path, monkeypa
     with pytest.raises(ExportError, match="no phones"):
         write(silent, [tmp_path / "b.json", tmp_path / "b.words.csv"])
     assert not (tmp_path / "b.json").exists()
-
-
-def test_results_that_have_no_cues(result):
-    with pytest.raises(ExportError, match="has no phones"):
-        lipmotion.cues(replace(result, units=Timeline(())))
-    broken = result.motion.values.copy()
-    broken[3, 0] = np.nan
-    with pytest.raises(ExportError, match="not finite"):
-        lipmotion.cues(replace(result, motion=replace(result.motion, values=broken)))
 
 
 @pytest.mark.long
@@ -281,10 +273,8 @@ def test_loudness_and_pitch_move_together(offset_ms):
 @pytest.mark.parametrize("rate_hz", [12.0, 23.976])
 def test_closures_between_two_frames_of_a_slow_file_are_kept(generation, rate_hz, tmp_path):
     narrow = generation.motion.values.copy()
-    column, closed = (
-        generation.motion.column("opening"),
-        [each.frame for each in find_closures(generation.motion, generation.units)],
-    )
+    column = generation.motion.column("opening")
+    closed = [each.frame for each in find_closures(generation.motion, generation.units)]
     narrow[50:100, column] = 0.1
     narrow[closed, column] = 0.0
     spiky = replace(generation, motion=replace(generation.motion, values=narrow))
@@ -314,6 +304,9 @@ def test_moods_are_channels_that_the_intensity_leaves_and_the_offset_moves(gener
     assert found["mood_happy"][[0, 100, -1]] == pytest.approx([0.5, 0.5, 0.0])
     again = deliver(replace(generation, motion=found), Delivery())
     assert np.array_equal(again.motion.values, found.values)
+    stepped = deliver_to_face(generation, Delivery(mood="happy, sad at 1.0", stepped=True), 25.0)  # moods move on
+    assert "mood_sad" not in stepped.stepped
+    assert len(np.unique(stepped.motion["mood_sad"])) > 6
 
 
 def test_words_say_the_mood_after_the_one_that_is_asked_for(generation):
@@ -322,9 +315,6 @@ def test_words_say_the_mood_after_the_one_that_is_asked_for(generation):
     both = deliver(tagged, Delivery(mood="happy")).motion
     assert (both["mood_happy"][0], both["mood_sad"][-1]) == (1, 1)
     assert both["mood_happy"][-1] == pytest.approx(0)
-
-
-def test_neutral_is_what_no_mood_is(generation):
     plain, neutral = (deliver(generation, Delivery(mood=mood)).motion for mood in ("", "neutral"))
     assert neutral.names == plain.names
     assert np.array_equal(neutral.values, plain.values)
@@ -349,20 +339,10 @@ def test_vowels_have_expressions_of_moods_that_leave_the_lips_closed(generation)
     assert curves["surprised"][pressed] == pytest.approx(0)
 
 
-def test_moods_move_on_while_the_mouth_is_held(generation):
-    found = deliver_to_face(generation, Delivery(mood="happy, sad at 1.0", stepped=True), 25.0)
-    assert "mood_sad" not in found.stepped
-    assert len(np.unique(found.motion["mood_sad"])) > 6
-
-
-@pytest.fixture(scope="module")
-def request_with_laughter() -> Request:
+def test_a_face_laughs_where_laughter_is_detected_and_asked_for(toy_model):
     audio = recording((0.5, vowels(pulses(1.0, 120))), (2.0, laugh(6)))
-    return Request(audio, units=said(audio.duration_s, (0.5, 1.5)))
-
-
-def test_a_face_laughs_where_laughter_is_detected_and_asked_for(toy_model, request_with_laughter):
-    laughing = animate(request_with_laughter, model=toy_model)
+    request = Request(audio, units=said(audio.duration_s, (0.5, 1.5)))
+    laughing = animate(request, model=toy_model)
     (event,) = laughing.events
     assert event.kind == "laughter"
     opening = laughing.motion["opening"]
@@ -372,7 +352,7 @@ def test_a_face_laughs_where_laughter_is_detected_and_asked_for(toy_model, reque
     assert happy[round(loudest_s * 100)] > 0.7
     assert not happy[:150].any()
     assert "mood_happy" not in deliver(laughing, Delivery(mood="neutral")).motion.names
-    plain = animate(replace(request_with_laughter, manner="asked"), model=toy_model)
+    plain = animate(replace(request, manner="asked"), model=toy_model)
     assert not plain.events
     assert plain.motion["opening"][200:].max() < 0.05
     assert np.array_equal(plain.motion.values[50:150], laughing.motion.values[50:150])

@@ -26,10 +26,8 @@ def test_words_have_the_times_of_their_line_or_their_own():
     nan = np.nan
     np.testing.assert_allclose(found.start_s, [1.0, 1.0, 4.0, 4.5, nan, nan])
     np.testing.assert_allclose(found.end_s, [2.0, 2.0, nan, 4.75, 5.0, nan])
-    assert (
-        found.tolerance_s.tolist()
-        == [anchors.LINE_TOLERANCE_S] * 3 + [anchors.WORD_TOLERANCE_S] + [anchors.LINE_TOLERANCE_S] * 2
-    )
+    line_s, word_s = anchors.LINE_TOLERANCE_S, anchors.WORD_TOLERANCE_S
+    assert found.tolerance_s.tolist() == [line_s, line_s, line_s, word_s, line_s, line_s]
     assert found.groups.tolist() == [0, 0, 1, 2, 3, 4]
 
 
@@ -95,9 +93,9 @@ def found_words(*starts: int, fits: Sequence[float] | None = None) -> list[Place
 
 def test_words_that_begin_or_end_with_their_window_are_pressed():
     windows = Windows(np.array([0, 100, 200]), np.array([150, 300, 500]))
-    assert anchors.find_pressed_words(found_words(20, 120, 250), windows, 500).tolist() == [False, False, False]
-    assert anchors.find_pressed_words(found_words(20, 100, 250), windows, 500).tolist() == [False, True, False]
-    assert anchors.find_pressed_words(found_words(20, 150, 300), windows, 500).tolist() == [True, True, False]
+    for starts, pressed in (((20, 120, 250), []), ((20, 100, 250), [1]), ((20, 150, 300), [0, 1])):
+        found = anchors.find_pressed_words(found_words(*starts), windows, 500)
+        assert np.flatnonzero(found).tolist() == pressed
 
 
 class Search:
@@ -119,10 +117,8 @@ def many_lines(count: int) -> TimedTranscript:
 
 
 def aligned(search: Search, frames: int = 12_000) -> list[int]:
-    count = len(search.starts)
-    placed, _ = anchors.align_within(
-        anchors.find_anchors(many_lines(count)), np.full(count, 3, np.intp), 3, frames, search
-    )
+    found = anchors.find_anchors(many_lines(len(search.starts)))
+    placed, _ = anchors.align_within(found, np.full(len(search.starts), 3, np.intp), 3, frames, search)
     return [item.start for item in placed[1:]]
 
 
@@ -202,14 +198,13 @@ def test_a_shift_of_all_times_is_found(late_s, caplog):
 
 
 def test_no_shift_is_found_where_there_is_none():
-    seed = 1
-    draw = np.random.default_rng(seed)
-    spans = spoken_spans(seed, 60)
+    draw = np.random.default_rng(1)
+    spans = spoken_spans(1, 60)
     loud = loud_at(spans, spans[-1][1] + 1)
     inexact = [(start_s + draw.normal(0, 0.6), end_s + draw.normal(0.5, 0.6)) for start_s, end_s in spans]
     lines = [line("a", start_s, max(start_s, end_s)) for start_s, end_s in inexact]
     assert anchors.measure_lateness(transcript(*lines), loud) == 0
-    others = spoken_spans(seed + 100, 60)  # times of something else
+    others = spoken_spans(101, 60)  # times of something else
     assert anchors.measure_lateness(transcript(*(line("a", *span) for span in others)), loud) == 0
     assert anchors.measure_lateness(transcript(line("a"), line("b")), loud) == 0
     assert anchors.measure_lateness(transcript(line("a", 1.0, 2.0)), np.zeros(0, bool)) == 0
@@ -217,10 +212,8 @@ def test_no_shift_is_found_where_there_is_none():
 
 def test_lines_after_the_end_are_left_out(caplog):
     loud = np.ones(1000, bool)
-    kept = anchors.fit_transcript(
-        transcript(line("a", 1.0, 2.0), line("b"), line("c", 10.5, 12.0), line("d", 11.5, 12.0)), loud, 10.0
-    )
-    assert kept.words == ("a", "b", "c")
+    lines = line("a", 1.0, 2.0), line("b"), line("c", 10.5, 12.0), line("d", 11.5, 12.0)
+    assert anchors.fit_transcript(transcript(*lines), loud, 10.0).words == ("a", "b", "c")
     (record,) = caplog.records
     assert "goes on after the recording ends at 10.00 s; its last 1 lines are left out" in record.getMessage()
     with pytest.raises(InputError, match=r"begins at 20\.00 s, the recording ends at 10\.00 s; give the transcript"):

@@ -35,12 +35,6 @@ def onset_s(audio: types.Audio) -> float:
     return float(np.flatnonzero(np.abs(audio.samples) > LEVEL / 3)[0]) / audio.rate_hz
 
 
-def test_another_rate_can_be_asked_for(tmp_path: Path) -> None:
-    audio = read_audio(write_sound(tmp_path / "a.wav", tone(16_000), 16_000, "pcm_s16le"), 48_000)
-    assert (audio.rate_hz, len(audio.samples)) == (48_000, pytest.approx(48_000, abs=100))
-    assert onset_s(audio) == pytest.approx(ONSET_S, abs=0.002)
-
-
 def test_time_0_is_where_the_pictures_begin(tmp_path: Path) -> None:
     for name, start_s in (("a.mp4", 0.0), ("a.mp4", 0.4), ("a.mkv", 0.4), ("a.ts", 0.4)):
         audio = read_audio(write_sound(tmp_path / name, tone(44_100), 44_100, "aac", start_s=start_s, video=True))
@@ -49,8 +43,10 @@ def test_time_0_is_where_the_pictures_begin(tmp_path: Path) -> None:
         assert np.abs(audio.samples[: round((start_s + 0.2) * 16_000)]).max(initial=0) < 0.01
 
 
-def test_the_content_decides_not_the_name(tmp_path: Path) -> None:
-    write_sound(tmp_path / "a.flac", tone(16_000), 16_000, "flac")
+def test_the_content_decides_not_the_name_and_another_rate_may_be_wanted(tmp_path: Path) -> None:
+    audio = read_audio(write_sound(tmp_path / "a.flac", tone(16_000), 16_000, "flac"), 48_000)
+    assert (audio.rate_hz, len(audio.samples)) == (48_000, pytest.approx(48_000, abs=100))
+    assert onset_s(audio) == pytest.approx(ONSET_S, abs=0.002)
     for name in ("sound", "sound.txt", "Ton ü 音.wav"):
         shutil.copy(tmp_path / "a.flac", tmp_path / name)
         assert read_audio(tmp_path / name).duration_s == 1
@@ -183,15 +179,12 @@ def test_what_is_missing_of_a_wave_file_is_said(tmp_path: Path, caplog: pytest.L
     assert [message.partition(": ")[2] for message in caplog.messages] == [said] * 2
 
 
-def test_the_logarithmic_form_says_any_number_of_valid_bits(tmp_path: Path) -> None:
+def test_the_logarithmic_form_says_any_number_of_valid_bits_and_other_headers_are_refused(tmp_path: Path) -> None:
     content = bytes(np.arange(len(TONE), dtype=np.uint8))
     plain = read(riff(chunk(b"fmt ", form(8, coding=ULAW)), chunk(b"data", content)), tmp_path)
     for valid in (8, 14, 16):
         found = read(riff(chunk(b"fmt ", long_form(valid, 8, ULAW)), chunk(b"data", content)), tmp_path)
         np.testing.assert_allclose(found, plain)
-
-
-def test_the_high_byte_first_and_headers_that_end_too_early_are_refused(tmp_path: Path) -> None:
     with pytest.raises(errors.InputError, match="RIFX"):
         read(riff(chunk(b"fmt ", form()), SOUND, kind=b"RIFX"), tmp_path)
     for length in (12, 20, 40, 44):
@@ -252,17 +245,13 @@ def test_coded(tmp_path: Path, original: Samples, kinds: list[tuple[str, str, in
         assert alike > (0.95 if delay else 0.99)  # a delay of a third of a sample is left in it
 
 
-def test_opus_made_from_16_khz_keeps_its_time(tmp_path: Path, original: Samples) -> None:
+def test_opus_of_16_khz_more_channels_than_have_a_name_and_the_cover_of_an_album(
+    tmp_path: Path, original: Samples
+) -> None:
     audio = read_audio(write_sound(tmp_path / "a.webm", babble(16_000), 16_000, "libopus"))
     assert abs(late_by(audio.samples, original)[0]) <= MS
-
-
-def test_more_channels_than_have_a_name(tmp_path: Path, original: Samples) -> None:
     path = write_wave(tmp_path / "a.wav", np.round(np.tile(original[:, None], 12) * 32767).astype(np.int16))
     assert late_by(read_audio(path).samples, original)[1] > 0.999
-
-
-def test_the_cover_of_an_album_changes_nothing(tmp_path: Path) -> None:
     plain = read_audio(write_sound(tmp_path / "a.mp3", babble(44_100), 44_100, "libmp3lame"))
     covered = read_audio(write_sound(tmp_path / "b.mp3", babble(44_100), 44_100, "libmp3lame", cover=True))
     assert np.array_equal(plain.samples, covered.samples)
@@ -490,7 +479,7 @@ def test_memory_is_that_of_the_result(tmp_path: Path) -> None:
 def test_sound_and_silence_are_bounded_together() -> None:
     """30 s of sound and 620 s of holes are each short enough for 810 bytes; their sum is not."""
     decoder = object.__new__(_TrackDecoder)
-    decoder._name, decoder._size, decoder._sound_s, decoder._silence_s = "a.mkv", 810_000, 30.0, 620.0
+    decoder._name, decoder._size, decoder._sound_s, decoder.silence_s = "a.mkv", 810_000, 30.0, 620.0
     decoder._check_silence()
     decoder._size = 810
     with pytest.raises(InputError, match="810 bytes of sound last 650 s"):

@@ -1,3 +1,4 @@
+import itertools
 import runpy
 import tracemalloc
 from collections.abc import Callable
@@ -104,12 +105,8 @@ def test_digital_silence_is_nothing_at_all_and_finite_inside_a_recording() -> No
     values = features(samples)
     assert np.isfinite(values).all()
     assert values[30:70, LOG_ENERGY].max() < values[:20, LOG_ENERGY].min() - 1
-
-
-def test_a_constant_column_becomes_0() -> None:
-    for value in (0.1, -69.07755, 1e4):
-        for count in (1, 2, 12_345):
-            assert not normalise_rows(np.full((count, 2), value, np.float32), ROUNDING_SHARE * abs(value)).any()
+    for value, count in itertools.product((0.1, -69.07755, 1e4), (1, 2, 12_345)):  # a constant column becomes 0
+        assert not normalise_rows(np.full((count, 2), value, np.float32), ROUNDING_SHARE * abs(value)).any()
 
 
 @settings(max_examples=50)
@@ -139,11 +136,8 @@ def drawn_features(seed: int, frames: int = 200) -> types.Features:
 
 def around(values: np.ndarray, frame: int) -> np.ndarray:
     """Return what the map sees of a frame, slowly."""
-    rows = [
-        values[min(max(frame + step, 0), len(values) - 1), : sound_offset.STATIC_FEATURES]
-        for step in sound_offset.FRAME_OFFSETS
-    ]
-    return np.concatenate(rows)
+    places = [min(max(frame + step, 0), len(values) - 1) for step in sound_offset.FRAME_OFFSETS]
+    return np.concatenate([values[place, : sound_offset.STATIC_FEATURES] for place in places])
 
 
 def test_the_fit_finds_the_map_behind_the_data() -> None:
@@ -167,9 +161,6 @@ def test_the_map_that_ships_is_linear_and_local() -> None:
     changed[100, : sound_offset.STATIC_FEATURES] += 1
     moved = np.flatnonzero(np.abs(sound_offset.predict_opening_speed(types.Features(changed, 2.0)) - whole) > 1e-6)
     assert moved.tolist() == [100 - step for step in reversed(sound_offset.FRAME_OFFSETS)]
-
-
-def test_speed_is_the_slope() -> None:
     assert sound_offset.measure_opening_speed(0.03 * np.arange(20.0))[3:-3] == pytest.approx(0.03, abs=1e-6)
 
 
@@ -224,15 +215,14 @@ def test_rows_do_not_depend_on_what_is_asked_for() -> None:
     assert steps[600:800].max() < 3 * np.median(steps)  # no seam where one window fades into the next
 
 
-def test_silence_around_and_gain_change_nothing(spoken: NDArray[np.float32]) -> None:
-    plain = read_sound(types.Audio(spoken, RATE_HZ)).encoding.astype(float)
+def test_silence_around_and_gain_change_nothing_and_passages_have_the_same_features(
+    spoken: NDArray[np.float32],
+) -> None:
+    audio = read_sound(types.Audio(spoken, RATE_HZ))
+    plain = audio.encoding.astype(float)
     later = np.concatenate([np.zeros(3 * RATE_HZ, np.float32), spoken * np.float32(0.01)])
     moved = read_sound(types.Audio(later, RATE_HZ)).encoding.astype(float)[300 : 300 + len(plain)]
     assert np.abs(moved - plain).max() < 0.02 * np.abs(plain).max()
-
-
-def test_features_of_a_passage_are_those_of_the_whole(spoken: NDArray[np.float32]) -> None:
-    audio = read_sound(types.Audio(spoken, RATE_HZ))
     (passage,) = audio.passages
     own = passage.audio.encoding[passage.own.start - passage.first :][: len(audio.encoding)]
     assert np.array_equal(audio.encoding[: len(own)], own)
@@ -270,7 +260,9 @@ def test_speech_without_an_encoding_is_refused() -> None:
     assert not fitted.can_predict(without)
     with pytest.raises(errors.InputError, match="no encoding"):
         fitted.predict(without)
-    with pytest.raises(errors.CorpusError, match="without encoding"):
-        EncodingRegression.fit(PredictorTraining([replace(one, speech=without)], [motion], 2))
-    with pytest.raises(errors.CorpusError, match="no frame"):
-        EncodingRegression.fit(PredictorTraining([replace(one, valid=np.zeros_like(one.valid))], [motion], 2))
+    for wrong, message in (
+        ({"speech": without}, "without encoding"),
+        ({"valid": np.zeros_like(one.valid)}, "no frame"),
+    ):
+        with pytest.raises(errors.CorpusError, match=message):
+            EncodingRegression.fit(PredictorTraining([replace(one, **wrong)], [motion], 2))

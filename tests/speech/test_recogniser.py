@@ -21,10 +21,11 @@ from lipmotion.speech.recognition.recognised_speech import (
     build_recognition,
     label_words,
     splice,
+    time_phones,
 )
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.stats.constrained_mllr import log_determinant
-from lipmotion.types import Audio, Span, Timeline, Unit
+from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon
 from lipmotion.units.phones import SHORT_PAUSE_S, count_phone_edits
 from pipeline.made import features_of, read_sound
@@ -82,7 +83,7 @@ def test_the_words_are_found_where_they_are(hmm: Any, sentences: list[ToySentenc
 
 def test_frame_n_reaches_from_half_a_frame_before_to_half_a_frame_after_and_silences_are_one() -> None:
     bounds = np.array([0, 10, 12, 40, 60, 80, 100])
-    found = recogniser._timeline([(phone, "") for phone in ("sil", "p", "sil", "aa", "sil", "sil")], bounds, 1.0)
+    found = time_phones([(phone, "") for phone in ("sil", "p", "sil", "aa", "sil", "sil")], bounds, 1.0)
     assert [span.start_s for span in found] == pytest.approx([0, 0.095, 0.115, 0.395, 0.595])
     assert covers(found, 1.0)
     assert phones(found) == ["sil", "p", "sil", "aa", "sil"]
@@ -104,8 +105,7 @@ def test_unknown_sentences_and_digital_silence(hmm: Any, sentences: list[ToySent
 def test_silence_at_both_ends_is_silence_however_short(hmm: Any, sentences: list[ToySentence]) -> None:
     sentence = sentences[0]
     start, stop = sentence.units.spans[0].end_s - 0.08, sentence.units.spans[-1].start_s + 0.08
-    samples = sentence.audio.samples[round(start * 16_000) : round(stop * 16_000)]
-    audio = Audio(samples, 16_000)
+    audio = Audio(sentence.audio.samples[round(start * 16_000) : round(stop * 16_000)], 16_000)
     aligned = align(hmm, audio, sentence.words, Lexicon())
     assert phones(aligned)[0] == phones(aligned)[-1] == SILENCE
     assert aligned.spans[0].duration_s < SHORT_PAUSE_S
@@ -113,35 +113,27 @@ def test_silence_at_both_ends_is_silence_however_short(hmm: Any, sentences: list
     assert PAUSE not in (recognised[0], recognised[-1])
 
 
-def test_a_short_pause_between_words_is_a_pause(hmm: Any) -> None:
-    found = recognise(hmm, with_pause(0.18))
-    pauses = [span for span in found if span.label.phone == PAUSE]
-    assert len(pauses) == 1
-    assert pauses[0].duration_s < SHORT_PAUSE_S
-    assert phones(found)[5] == PAUSE
+def test_a_short_pause_between_words_is_a_pause_and_a_long_one_is_silence(hmm: Any) -> None:
+    short, long = recognise(hmm, with_pause(0.18)), with_pause(0.5)
+    ((place, pause),) = ((place, span) for place, span in enumerate(short) if span.label.phone == PAUSE)
+    assert (place, pause.duration_s < SHORT_PAUSE_S) == (5, True)
+    for found in (align(hmm, long, ("papa", "mama"), Lexicon()), recognise(hmm, long)):
+        assert phones(found) == [SILENCE, *WORDS["papa"], SILENCE, *WORDS["mama"], SILENCE]
+        assert found.spans[5].label.word == ""
+        assert found.spans[5].duration_s == pytest.approx(0.5, abs=0.12)
 
 
-@pytest.mark.parametrize("known", [True, False])
-def test_a_long_pause_between_words_is_silence(hmm: Any, known: bool) -> None:
-    audio = with_pause(0.5)
-    found = align(hmm, audio, ("papa", "mama"), Lexicon()) if known else recognise(hmm, audio)
-    assert phones(found) == [SILENCE, *WORDS["papa"], SILENCE, *WORDS["mama"], SILENCE]
-    assert found.spans[5].label.word == ""
-    assert found.spans[5].duration_s == pytest.approx(0.5, abs=0.12)
-
-
-def test_a_phone_without_data_takes_the_models_of_a_similar_one(hmm: Any, sentences: list[ToySentence]) -> None:
+def test_a_phone_without_data_borrows_models_and_what_cannot_be_is_refused(
+    hmm: Any, sentences: list[ToySentence]
+) -> None:
     sentence = sentences[0]
     assert not {"z", "g"} & set(hmm.table.units)
     found = align(hmm, sentence.audio, sentence.words, Lexicon({"see": (("z", "ih"),)}))
     assert phones(found)[1:3] == ["z", "ih"]  # named as in the lexicon
     errors_s = [a.start_s - b.start_s for a, b in zip(found, sentence.units, strict=True)]
     assert np.abs(errors_s).max() < 0.1
-
-
-def test_too_many_words_for_the_sound_and_an_unknown_kind_are_refused(hmm: Any, sentences: list[ToySentence]) -> None:
     with pytest.raises(errors.AlignmentError, match=r"50 words take at least \d+ frames of 10 ms, found \d+"):
-        align(hmm, sentences[0].audio, ["baby"] * 50, Lexicon())
+        align(hmm, sentence.audio, ["baby"] * 50, Lexicon())
     with pytest.raises(errors.InputError, match="'best'; required one of: auto, words, fast, own, general"):
         recogniser.Recogniser(hmm, "best")
 
@@ -205,9 +197,8 @@ def test_evidence_is_the_sum_of_both(toy_model: Model, trust: float) -> None:
     own, general = np.random.default_rng(0).normal(size=(2, 9, 39)).astype(np.float32)
     combined = combine_phones(toy_model.phones)
     log_likelihoods = combine_likelihoods(combined, own, trust, general)
-    wanted = load_general().log_density(general)[:, combined.columns] + trust * combined.hmm.mixtures.log_likelihood(
-        own
-    )
+    own_values = trust * combined.hmm.mixtures.log_likelihood(own)
+    wanted = load_general().log_density(general)[:, combined.columns] + own_values
     assert log_likelihoods.frames == 9
     assert log_likelihoods.log_density(0, 9, None) == pytest.approx(wanted, abs=2e-3)
     some = np.array([5, 2, 40])
@@ -257,19 +248,16 @@ def test_fits_are_means_over_the_frames_of_each_word() -> None:
 
 def test_what_was_recognised() -> None:
     labels = [LabelledFrames(*each) for each in ((0, "sil"), (10, "b", 0), (20, "iy", 0), (40, "z"))]
-    spans = ((0.0, 0.1, "sil", ""), (0.1, 0.2, "b", "bee"), (0.2, 0.4, "iy", "bee"), (0.4, 0.5, "z", ""))
-    units = Timeline(tuple(Span(start, end, Unit(phone, word=word)) for start, end, phone, word in spans))
-    found = build_recognition(units, labels, [RecognisedWord("bee", 0.8)], -7.0)
+    found, doubtful = (build_recognition(labels, [RecognisedWord("bee", sure)], 51, 0.5, None) for sure in (0.8, 0.3))
     (word,) = found.words
     assert (word.start_s, word.end_s, word.label.text) == (pytest.approx(0.1), pytest.approx(0.4), "bee")
-    assert (found.word_s, found.phone_s) == pytest.approx((0.3, 0.1))
+    assert [span.label.word for span in found.units] == ["", "bee", "bee", ""]
+    assert (found.word_s, found.phone_s) == pytest.approx((0.3, 0.105))
     assert found.confidence == pytest.approx(0.8)
-    assert found.reliability == pytest.approx(1)
-    doubtful = build_recognition(units, labels, [RecognisedWord("bee", 0.3)], -7.0)
-    assert doubtful.reliability == pytest.approx(0)
+    assert (found.reliability, doubtful.reliability) == pytest.approx((1, 0))
     shares = [replace(found, posterior=posterior).reliability for posterior in (0.6, 0.8, 0.95)]
     assert shares == pytest.approx([0, 0.5, 1])
-    wordless = build_recognition(units, [LabelledFrames(0, "sil")], [], -7.0)
+    wordless = build_recognition([LabelledFrames(0, "sil")], [], 51, 0.5, None)
     assert replace(wordless, posterior=0.575).reliability == pytest.approx(0.5)
 
 
@@ -300,9 +288,7 @@ def test_own_features_are_warped_then_transformed_and_general_ones_stream_by_str
 def test_arrays_and_back_and_damaged_arrays() -> None:
     one, broken = some(), np.eye(39, 40)
     again = adaptation.adaptation_from_arrays(adaptation.adaptation_to_arrays(one))
-    assert (again.warp, again.own_weight) == (one.warp, one.own_weight)
-    assert np.array_equal(again.own, one.own)
-    assert np.array_equal(again.general, one.general)
+    assert all(np.array_equal(value, vars(again)[name]) for name, value in vars(one).items())
     broken.flat[3] = np.nan
     for damage, says in (
         ({"own": None}, "own"),
@@ -312,9 +298,8 @@ def test_arrays_and_back_and_damaged_arrays() -> None:
         ({"numbers": np.array(["a", "b"])}, "numbers holds <U1, required fractions"),
         ({"own": broken}, "own holds values that are not finite"),
     ):
-        arrays = {
-            key: value for key, value in (adaptation.adaptation_to_arrays(one) | damage).items() if value is not None
-        }
+        damaged = adaptation.adaptation_to_arrays(one) | damage
+        arrays = {name: values for name, values in damaged.items() if values is not None}
         with pytest.raises(errors.ModelFormatError, match=f"{says}.*adapt the model again"):
             adaptation.adaptation_from_arrays(arrays)
 
@@ -354,6 +339,10 @@ def test_the_speaker_of_the_training_has_full_weight_and_changes_little(
         assert np.sqrt(np.square(changed).mean()) < 0.5
         first, then = ([s.label.phone for s in recogniser.recognise(audio, features)] for recogniser in (before, after))
         assert count_phone_edits(first, then) <= 2
+    long = estimate_adaptation(toy_model.phones, voice * 3)  # features and their deltas move together
+    assert long.speech_s == pytest.approx(3 * same_speaker.speech_s, rel=0.1)
+    assert long.speech_s > 10
+    assert np.abs(long.adaptation.own[:13, 13:39]).max() > 1e-3
 
 
 @pytest.mark.long
@@ -367,16 +356,6 @@ def test_a_voice_in_another_channel_becomes_more_probable(toy_model: Model, voic
     between = block[:, None] != block
     assert not own[between].any()
     assert np.abs(own[~between]).sum() > 39
-
-
-@pytest.mark.long
-def test_much_speech_moves_them_together(
-    same_speaker: EstimatedAdaptation, toy_model: Model, voice: list[types.Audio]
-) -> None:
-    long = estimate_adaptation(toy_model.phones, voice * 3)
-    assert long.speech_s == pytest.approx(3 * same_speaker.speech_s, rel=0.1)
-    assert long.speech_s > 10
-    assert np.abs(long.adaptation.own[:13, 13:39]).max() > 1e-3
 
 
 def test_too_little_speech(toy_model: Model, voice: list[types.Audio]) -> None:

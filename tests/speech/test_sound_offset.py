@@ -52,13 +52,10 @@ def test_claps_and_beeps_are_found_where_they_are():
     assert marks[0].hertz == pytest.approx(2000, abs=32)
 
 
-def test_speech_holds_no_beep():
+def test_speech_holds_no_beep_and_different_sounds_are_refused():
     chance = np.random.default_rng(2)
     marks = find_marks(types.Audio(scene(chance, "").astype(np.float32), RATE_HZ))
     assert not [mark for mark in marks if mark.kind == BEEP]
-
-
-def test_different_sounds_are_refused():
     chance = np.random.default_rng(3)
     one, other = (types.Audio(scene(chance, "").astype(np.float32), RATE_HZ) for _ in range(2))
     with pytest.raises(errors.InputError, match=r"is not clear: no clap and no beep is in both.*give the offset"):

@@ -49,12 +49,14 @@ def transcript(words: list[str], end_s: float, word_s: float = 0.1) -> Timeline[
     return Timeline((*spans, Span(at_s, max(end_s, at_s + 0.1), Unit("sil"))))
 
 
-def test_a_right_transcript_is_said() -> None:
+def test_a_right_transcript_is_said_and_words_that_do_not_fit_into_the_frames_are_not() -> None:
     found = find_evidence(heard([*SAID]), FRAME_S, transcript([*SAID], 1.0))
     assert [word.word for word in found.words] == [*SAID]
     assert (found.unsaid, found.others, found.is_doubtful) == ((), (), False)
     assert found.words[0].start_s == pytest.approx(0.22)
     assert found.words[0].end_s == pytest.approx(0.36)  # four phones and the blanks between them
+    crowded = find_evidence(heard([], pause=12), FRAME_S, transcript([*SAID] * 3, 0.5, word_s=0.02))
+    assert (crowded.unsaid, crowded.gaps) == (crowded.words, ())
 
 
 def test_another_transcript_is_doubtful() -> None:
@@ -123,12 +125,6 @@ def test_a_long_recording_is_divided(monkeypatch: pytest.MonkeyPatch) -> None:
     assert other == pytest.approx(one, abs=0.05)
 
 
-def test_words_that_do_not_fit_into_the_frames_are_not_said() -> None:
-    found = find_evidence(heard([], pause=12), FRAME_S, transcript([*SAID] * 3, 0.5, word_s=0.02))
-    assert found.unsaid == found.words
-    assert found.gaps == ()
-
-
 def test_posteriors_of_something_else_are_refused() -> None:
     with pytest.raises(ValueError, match="47 classes, required 48"):
         find_evidence(np.zeros((20, 47)), FRAME_S, transcript(["a"], 0.1))
@@ -140,7 +136,7 @@ def best_by_trying(log_posteriors: NDArray[np.float64], words: list[list[int]]) 
     """Return the score of the best path, and which words it says: all of them are tried, one after another."""
     phones = [phone for word in words for phone in word]
     edges = list(np.cumsum([0, *map(len, words)]))
-    silent = np.logaddexp.reduce(log_posteriors[:, module._find_silent()], axis=1)
+    silent = np.logaddexp.reduce(log_posteriors[:, module.SILENT], axis=1)
     anything = np.maximum(log_posteriors.max(axis=1), silent)
     spoken = np.log(np.exp(log_posteriors) @ module._count_taken())
 
@@ -176,8 +172,8 @@ def test_the_best_path_is_the_best_of_all(seed: int) -> None:
     logits = draw.normal(0, 12, (5, len(PHONES) + 1))
     log_posteriors = logits - np.logaddexp.reduce(logits, axis=1)[:, None]
     _, said = best_by_trying(log_posteriors, words)
-    path = _best_path(log_posteriors, [np.array(word) for word in words])
-    assert [word is not None for word in path.words] == said
+    frames_of_words, _ = _best_path(log_posteriors, [np.array(word) for word in words])
+    assert [frames is not None for frames in frames_of_words] == said
 
 
 ROW_S = 2 * FRAME_S
@@ -225,10 +221,8 @@ def test_it_is_the_mean_over_phones_of_the_best_state_of_what_is_said(sentences:
     ]
     wanted: dict[int, list[float]] = {}
     for frame, number, phone in spoken[:: agreement.FRAME_STEP]:
-        row = general.PHONES.index(names.get(phone, phone.upper()))
-        wanted.setdefault(number, []).append(
-            max(density[frame].reshape(len(general.PHONES), 3)[row].max(), agreement.WORST_SCORE)
-        )
+        states = density[frame].reshape(len(general.PHONES), 3)[general.PHONES.index(names.get(phone, phone.upper()))]
+        wanted.setdefault(number, []).append(max(states.max(), agreement.WORST_SCORE))
     mean = np.mean([np.mean(scores) for scores in wanted.values()])
     assert agreement.score_agreement(sentence.audio, sentence.units) == pytest.approx(mean, abs=1e-4)
 
@@ -272,13 +266,11 @@ def test_long_phones_are_judged_by_their_sound(sentences: list[ToySentence]) -> 
 
 
 def test_places_near_one_another_are_one_stretch() -> None:
-    assert agreement._joined([(0.0, 1.0), (1.4, 2.0), (3.0, 3.5)]) == ((0.0, 2.0), (3.0, 3.5))
+    assert agreement._join([(0.0, 1.0), (1.4, 2.0), (3.0, 3.5)]) == ((0.0, 2.0), (3.0, 3.5))
     fit = agreement.TranscriptFit(-1.0, ((0.0, 2.0), (3.0, 3.5)), 10.0)
     assert fit.missing_s == pytest.approx(2.5)
     assert fit.share == pytest.approx(0.75)
-    assert agreement.TranscriptFit(agreement.DOUBTFUL_SCORE - 0.1, (), 10.0).share == pytest.approx(
-        0
-    )  # of something else
+    assert agreement.TranscriptFit(agreement.DOUBTFUL_SCORE - 0.1, (), 10.0).share == 0  # of something else
 
 
 @pytest.mark.recordings

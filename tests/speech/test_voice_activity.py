@@ -24,13 +24,10 @@ def energy(frames: int, *sounds: tuple[int, int]) -> np.ndarray:
     return values
 
 
-def test_sound_has_its_stretch_with_a_margin_that_ends_with_the_recording() -> None:
+def test_sound_has_its_stretch_with_a_margin_and_clicks_and_constant_energy_have_none() -> None:
     (found,) = voice_activity.find_sound(energy(1000, (300, 500)))
     assert found == pytest.approx((300 - voice_activity.MARGIN_FRAMES, 500 + voice_activity.MARGIN_FRAMES), abs=5)
     assert voice_activity.find_sound(energy(400, (10, 200), (230, 390))) == [voice_activity.Stretch(0, 400)]
-
-
-def test_short_pauses_do_not_part_sound_and_clicks_and_constant_energy_are_none() -> None:
     assert len(voice_activity.find_sound(energy(1000, (200, 300), (380, 500)))) == 1
     assert len(voice_activity.find_sound(energy(1000, (200, 300), (600, 700)))) == 2
     assert not voice_activity.find_sound(energy(1000, (300, 300 + MIN_FRAMES // 3), (600, 602)))
@@ -110,9 +107,11 @@ def test_a_noise_as_loud_as_the_room_may_be_its_margin_and_nothing_more() -> Non
     assert sound[-1] + 10 <= found.end <= sound[-1] + voice_activity.PASSAGE_MARGIN + 3
 
 
-@pytest.mark.parametrize("decibels", [-40, -20, -6])
-def test_a_passage_is_the_same_at_any_level(decibels: float) -> None:
-    assert passages(louder(spoken(0), decibels)) == passages(spoken(0))
+def test_a_passage_is_the_same_at_any_level_and_a_pause_does_not_divide_it() -> None:
+    samples = spoken(0)
+    assert [passages(louder(samples, decibels)) for decibels in (-40, -20, -6)] == [passages(samples)] * 3
+    half = len(samples) // mfcc.HOP // 2 * mfcc.HOP
+    assert len(passages(samples[:half], noise(0.4, 0), samples[half:])) == 1
 
 
 @pytest.mark.parametrize("gap_s", [0.3, 0.5, 1, 5])
@@ -135,12 +134,6 @@ def test_lines_are_passages_of_their_own_whatever_their_levels(gap_s: float, dec
     assert moved([loud], -place) == [second_alone]
     assert soft.first >= first_alone.first
     assert soft.end <= first_alone.end
-
-
-def test_a_pause_within_a_line_does_not_divide_it() -> None:
-    samples = spoken(0)
-    half = len(samples) // mfcc.HOP // 2 * mfcc.HOP
-    assert len(passages(samples[:half], noise(0.4, 0), samples[half:])) == 1
 
 
 def test_every_line_of_a_stem_of_ten_minutes_is_a_passage() -> None:
@@ -307,13 +300,10 @@ def test_loudness_may_change_in_an_hour():
     np.testing.assert_allclose([span for span in found if span[0] % 60 < 5], expected, atol=0.05)
 
 
-def test_the_quietest_place():
+def test_the_quietest_place_and_levels_at_any_time_also_of_less_than_a_step():
     levels = pauses.measure_levels_db(loud_in([(0.0, 1.0), (1.1, 2.0)], 2.0))
     assert pauses.find_quietest(levels, 0.5, 1.8) == pytest.approx(1.05, abs=0.06)
     assert pauses.find_quietest(levels, 1.0, 1.0) == pytest.approx(1.0)
-
-
-def test_levels_at_any_time_also_of_less_than_a_step():
     sound = loud_in(SPANS, 5.0)
     levels, times_s = pauses.measure_levels_db(sound), np.array([-1.0, 0.005, 1.005, 1.01, 99.0])
     found = pauses.measure_levels_at(sound, times_s)

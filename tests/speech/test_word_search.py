@@ -66,8 +66,7 @@ def test_words_decide_the_phones_of_english(welcome: Audio) -> None:
             [span.label for span in units if not is_silent(span.label.phone)] for units in (found.units, aligned)
         )
         assert [(label.phone, label.word) for label in spoken] == [(label.phone, label.word) for label in wanted]
-        assert found.confidence is not None
-        assert found.confidence > 0.5
+        assert (found.confidence or 0) > 0.5
 
 
 @pytest.mark.parametrize("kind", ["fast", "own"])
@@ -128,20 +127,12 @@ def test_a_voice_and_words_that_the_model_knows_are_left_to_its_phones(recording
 
 @pytest.mark.recordings
 @pytest.mark.usefixtures("without_a_phone_recogniser")
-def test_strangers_are_understood_better_with_words(recordings: Path) -> None:
-    audio = read_sound(recordings / "speech-open" / "61-70968-0000.flac")
-    said = (recordings / "speech-open" / "61-70968-0000.lab").read_text().lower().split()
-    assert len(set(texts(recognition(audio))) & set(said)) > 0.7 * len(set(said))
-
-
-@pytest.mark.recordings
-@pytest.mark.usefixtures("without_a_phone_recogniser")
-def test_other_languages_have_no_confident_words(recordings: Path) -> None:
-    confidence = recognition(
-        read_sound(recordings / "speech-open" / "common_voice_ja_24511055.mp3"), "words"
-    ).confidence
-    assert confidence is not None
-    assert confidence < 0.35
+def test_strangers_are_understood_with_words_and_other_languages_have_no_confident_ones(recordings: Path) -> None:
+    folder = recordings / "speech-open"
+    said = {*(folder / "61-70968-0000.lab").read_text().lower().split()}
+    assert len({*texts(recognition(read_sound(folder / "61-70968-0000.flac")))} & said) > 0.7 * len(said)
+    japanese = recognition(read_sound(folder / "common_voice_ja_24511055.mp3"), "words")
+    assert (japanese.confidence or 1) < 0.35
 
 
 def test_words_of_a_sentence() -> None:
@@ -152,7 +143,7 @@ def test_words_of_a_sentence() -> None:
     assert sum(word.posterior for word in words) > len(words) / 2
     assert {"please", "speak", "lips", "five", "big", "blue", "boats"} <= set(found)
     assert all(Lexicon().known(word) for word in found)
-    assert not any(word_search.is_filler(word) or "(" in word for word in found)
+    assert not any({"<", "[", "+", "("} & set(word) for word in found)
 
 
 def test_no_sound_has_no_words_and_the_samples_of_a_stretch_are_clipped_integers() -> None:
@@ -162,8 +153,6 @@ def test_no_sound_has_no_words_and_the_samples_of_a_stretch_are_clipped_integers
     assert len(samples) == 320
     assert samples[0] == pytest.approx(16_383, abs=1)
     assert samples[-1] == -32_768
-    assert all(word_search.is_filler(entry) for entry in ("<s>", "</s>", "[NOISE]", "++UH++"))
-    assert not word_search.is_filler("'bout")
 
 
 def test_one_recording_does_not_change_the_next() -> None:
@@ -222,29 +211,23 @@ def test_words_that_begin_alike_share_nodes() -> None:
     assert tree.arcs.sum() == len(tree.target)
 
 
-def test_words_are_found_in_their_order() -> None:
-    words = beam_search.decode_words(
-        WORDS, beam_search.score_stretch(said("b", "l", "uː", posteriors.WORD_BOUNDARY, "b", "iː"))
-    )
+def decode(rows: posteriors.PhonePosteriors) -> list[beam_search.DecodedWord]:
+    return beam_search.decode_words(WORDS, beam_search.score_stretch(rows))
+
+
+def test_words_are_found_in_their_order_and_the_language_decides_where_posteriors_do_not() -> None:
+    words = decode(said("b", "l", "uː", posteriors.WORD_BOUNDARY, "b", "iː"))
     assert [word.text for word in words] in (["blue", "be"], ["blue", "bee"])
     assert words[0].first == 0 < words[0].end <= words[1].first < words[1].end
+    assert [word.text for word in decode(said("b", "l", "iː", sure=0.5))] in (["blue"], ["be"], ["bee"])
 
 
-def test_the_language_decides_where_posteriors_do_not() -> None:
-    likely = beam_search.decode_words(WORDS, beam_search.score_stretch(said("b", "l", "iː", sure=0.5)))
-    assert [word.text for word in likely] in (["blue"], ["be"], ["bee"])
-
-
-def test_what_is_no_word_is_phones() -> None:
+def test_what_is_no_word_is_phones_and_nothing_is_said_in_blanks() -> None:
     rows = said("ŋ", "p", "ŋ", "l", "ŋ", sure=0.99)
-    words = beam_search.decode_words(WORDS, beam_search.score_stretch(rows))
+    words = decode(rows)
     assert "".join(word.text for word in words) == ""
     assert [phone for word in words for phone in rows.phones_between(word.first, word.end)] == "ng p ng l ng".split()
-
-
-def test_nothing_is_said_in_blanks() -> None:
-    assert beam_search.decode_words(WORDS, beam_search.score_stretch(said())) == []
-    assert list_spoken(said()) == []
+    assert decode(said()) == list_spoken(said()) == []
     assert posteriors.mean_posterior([posteriors.PosteriorStretch(Stretch(0, 2), said())]) == 0
 
 
@@ -263,12 +246,9 @@ def test_posteriors_draw_phones_that_models_do_not_tell_apart(frames: int) -> No
     assert list_wordless(hmm, recogniser._loop, same, [posteriors.PosteriorStretch(Stretch(0, 2), said())]) == []
 
 
-def test_forms_of_a_phone_are_the_same() -> None:
+def test_forms_of_a_phone_are_the_same_and_posteriors_of_phones_sum_to_one() -> None:
     assert count_phone_edits(("ax", "b", "el"), ["ah", "b", "l"]) == 0
     assert count_phone_edits(("b", "uw"), ["p", "uw", "t"]) == 2
-
-
-def test_posteriors_of_phones_sum_to_one() -> None:
     phones = np.exp(said("b", "iː").of_phones)
     assert phones.sum(axis=1) == pytest.approx(np.exp(said("b", "iː").values).sum(axis=1), rel=1e-4)
     assert units.PHONES[int(phones[1].argmax())] == "b"
@@ -314,7 +294,7 @@ def noise_after_silence(seconds: float) -> types.Audio:
     return types.Audio(samples, 16_000)
 
 
-def test_a_recording_has_posteriors_throughout(loud: str) -> None:
+def test_a_recording_has_posteriors_throughout_and_a_long_one_is_cut(loud: str) -> None:
     audio = read_sound(noise_after_silence(3.0))
     stretches = posteriors.find_stretches(loud, audio)
     whole = posteriors.read_posteriors(loud, audio)
@@ -326,12 +306,9 @@ def test_a_recording_has_posteriors_throughout(loud: str) -> None:
     found = posteriors.infer_posteriors(loud, audio)
     assert found.source == "loud 1 0"
     assert found.mean == pytest.approx(np.exp(-0.1), abs=1e-3)
-
-
-def test_a_long_recording_is_cut(loud: str) -> None:
-    found = posteriors.find_stretches(loud, read_sound(noise_after_silence(50.0)))
-    assert len(found) > 2
-    assert max(each.stretch.end - each.stretch.first for each in found) <= 2000
+    stretches = posteriors.find_stretches(loud, read_sound(noise_after_silence(50.0)))
+    assert len(stretches) > 2
+    assert max(each.stretch.end - each.stretch.first for each in stretches) <= 2000
 
 
 @pytest.mark.usefixtures("loud")
@@ -357,10 +334,8 @@ def test_the_welcome_is_understood() -> None:
     audio = read_welcome()
     found = recogniser_of(load_model(), "auto").recognition(audio, audio.mfcc())
     assert [span.label.text for span in found.words][:7] == "please speak and my lips will move".split()
-    assert found.confidence is not None
-    assert found.confidence > 0.6
-    assert found.posterior is not None
-    assert found.posterior > 0.8
+    assert (found.confidence or 0) > 0.6
+    assert (found.posterior or 0) > 0.8
     assert found.reliability == pytest.approx(1)
     assert {"please", "speak", "lips"} <= {span.label.word for span in found.units if span.label.phone == "p"}
 

@@ -15,7 +15,7 @@ from lipmotion.stats.constrained_mllr import (
     transformed,
 )
 from lipmotion.stats.mixture import Mixtures
-from oracles import affine as oracle
+from oracles import statistics as oracle
 
 SIZE = 3
 ALL = np.ones((SIZE, SIZE + 1), bool)
@@ -59,11 +59,11 @@ def test_statistics_are_those_of_the_sums_written_out() -> None:
         mixtures, transform = random_mixtures(draw), random_transform(draw)
         given = mixtures, *spoken(draw, mixtures, 20), transform
         found, log_likelihood = collect_transform_statistics(*given)
-        quadratic, linear = oracle.statistics(*given)
+        quadratic, linear = oracle.affine_statistics(*given)
         assert found.count == 20
         np.testing.assert_allclose(found.quadratic, quadratic, rtol=1e-4, atol=1e-4)
         np.testing.assert_allclose(found.linear, linear, rtol=1e-4, atol=1e-4)
-        assert log_likelihood == pytest.approx(oracle.log_likelihood(*given), abs=1e-3)
+        assert log_likelihood == pytest.approx(oracle.affine_log_likelihood(*given), abs=1e-3)
 
 
 def test_the_objective_has_the_slope_of_the_likelihood() -> None:
@@ -72,8 +72,8 @@ def test_the_objective_has_the_slope_of_the_likelihood() -> None:
     mixtures, transform = random_mixtures(draw), random_transform(draw)
     features, densities = spoken(draw, mixtures, 20)
     statistics, _ = collect_transform_statistics(mixtures, features, densities, transform)
-    rise = gradient(partial(oracle.log_likelihood, mixtures, features, densities), transform, 1e-4)
-    assert rise == pytest.approx(gradient(partial(oracle.objective, statistics), transform), rel=1e-2, abs=1e-2)
+    rise = gradient(partial(oracle.affine_log_likelihood, mixtures, features, densities), transform, 1e-4)
+    assert rise == pytest.approx(gradient(partial(oracle.affine_objective, statistics), transform), rel=1e-2, abs=1e-2)
 
 
 @settings(max_examples=25)
@@ -83,10 +83,10 @@ def test_no_row_lowers_the_objective(seed: int, frames: int) -> None:
     mixtures, transform = random_mixtures(draw), random_transform(draw)
     statistics, _ = collect_transform_statistics(mixtures, *spoken(draw, mixtures, frames), transform)
     statistics += create_prior(mixtures, np.arange(4)).times(5)
-    values = [oracle.objective(statistics, transform)]
+    values = [oracle.affine_objective(statistics, transform)]
     for _ in range(4):
         transform = improve_transform(transform, statistics, ALL, sweeps=1)
-        values.append(oracle.objective(statistics, transform))
+        values.append(oracle.affine_objective(statistics, transform))
     assert (np.diff(values) >= -1e-8 * np.abs(values[1:])).all()
 
 
@@ -100,7 +100,7 @@ def test_the_likelihood_never_falls() -> None:
     transform, values = identity(SIZE), []
     for _ in range(12):
         statistics, log_likelihood = collect_transform_statistics(mixtures, features, densities, transform)
-        values.append(log_likelihood + oracle.objective(prior, transform))
+        values.append(log_likelihood + oracle.affine_objective(prior, transform))
         transform = improve_transform(transform, statistics + prior, ALL)
     assert (np.diff(values) > -1e-3).all()
     assert values[-1] > values[0] + 10
@@ -127,11 +127,11 @@ def test_the_models_own_data_ask_for_no_change() -> None:
     mixtures = random_mixtures(np.random.default_rng(4))
     prior = create_prior(mixtures, np.array([0, 2]))
     assert prior.count == pytest.approx(1)
-    assert np.abs(gradient(partial(oracle.objective, prior), identity(SIZE))).max() < 1e-6
+    assert np.abs(gradient(partial(oracle.affine_objective, prior), identity(SIZE))).max() < 1e-6
     np.testing.assert_allclose(improve_transform(identity(SIZE), prior, ALL), identity(SIZE), atol=1e-8)
     for seed in range(20):
         other = random_transform(np.random.default_rng(seed))
-        assert oracle.objective(prior, other) < oracle.objective(prior, identity(SIZE))
+        assert oracle.affine_objective(prior, other) < oracle.affine_objective(prior, identity(SIZE))
 
 
 def test_a_prior_holds_a_transform_of_few_frames_back() -> None:
@@ -154,6 +154,8 @@ def test_entries_that_are_not_free_stay() -> None:
     free[:, -1] = True
     better = improve_transform(start, statistics, free)
     assert np.array_equal(better[~free], start[~free])
-    assert oracle.objective(statistics, better) > oracle.objective(statistics, start)
-    slope = gradient(partial(oracle.objective, statistics), improve_transform(start, statistics, free, sweeps=60))
+    assert oracle.affine_objective(statistics, better) > oracle.affine_objective(statistics, start)
+    slope = gradient(
+        partial(oracle.affine_objective, statistics), improve_transform(start, statistics, free, sweeps=60)
+    )
     assert np.abs(slope[free]).max() < 1e-2 < np.abs(slope[~free]).max()

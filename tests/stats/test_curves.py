@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lipmotion.stats.curves import count_window, measure_modulation_spectrum, varies, with_dynamics
-from oracles.trajectories import window_matrix
+from lipmotion.stats.curves import measure_modulation_spectrum, varies, with_dynamics
+from oracles.statistics import window_matrix
 
 
 @given(frames=st.integers(1, 12), seed=st.integers(0, 1000))
@@ -53,7 +53,7 @@ def test_a_wave_is_at_its_frequency(rate_hz: float) -> None:
 
 def test_it_is_the_mean_over_windows_and_level_does_not_matter() -> None:
     rng = np.random.default_rng(0)
-    clips = [rng.normal(size=(count_window(25.0), 2)) for _ in range(3)]
+    clips = [rng.normal(size=(32, 2)) for _ in range(3)]
 
     def power(*given: np.ndarray) -> np.ndarray:
         return measure_modulation_spectrum(given, 25.0)[1]

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from lipmotion.stats import pca as module
 from lipmotion.stats.pca import choose_evenly, fit_pca
-from oracles.components import components, share
+from oracles.statistics import components, share
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -7,14 +7,7 @@ import pytest
 
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.storage.archive import read_archive, write_archive
-from lipmotion_faces.coded_video import (
-    FrameGroups,
-    decode_pictures,
-    encode_pictures,
-    encode_video,
-    stored_video_from_arrays,
-    stored_video_to_arrays,
-)
+from lipmotion_faces import coded_video
 
 
 def film(count: int = 21, size: tuple[int, int] = (48, 64)) -> np.ndarray:
@@ -33,7 +26,7 @@ def psnr_db(first: np.ndarray, other: np.ndarray) -> float:
 
 @pytest.fixture(scope="module")
 def stored():
-    return encode_video(film(), 25.0)
+    return coded_video.encode_video(film(), 25.0)
 
 
 def test_frames_come_back_in_order(stored):
@@ -57,26 +50,25 @@ def test_any_order_gives_the_same_frames(stored, order):
 def test_odd_sizes():
     for size in ((47, 64), (48, 63), (17, 19)):
         frames = film(3, size)
-        stored = encode_video(frames, 25.0)
-        shown = np.stack(list(stored.decode(range(3))))
+        shown = np.stack(list(coded_video.encode_video(frames, 25.0).decode(range(3))))
         assert shown.shape == frames.shape
         assert psnr_db(shown, frames) > 34
-        pictures = decode_pictures(encode_pictures(frames))
+        pictures = coded_video.decode_pictures(coded_video.encode_pictures(frames))
         assert pictures.shape == frames.shape
         assert psnr_db(pictures, frames) > 40
 
 
 def test_a_smaller_factor_is_better_and_groups_are_of_any_length():
-    sizes = [len(encode_video(film(), 25.0, crf=crf).data) for crf in (10, 20, 30)]
+    sizes = [len(coded_video.encode_video(film(), 25.0, crf=crf).data) for crf in (10, 20, 30)]
     assert sizes == sorted(sizes, reverse=True)
     for group in (1, 5, 100):
-        assert len(list(encode_video(film(), 25.0, group=group).decode(range(20, -1, -1)))) == 21
+        assert len(list(coded_video.encode_video(film(), 25.0, group=group).decode(range(20, -1, -1)))) == 21
 
 
 def test_an_archive_holds_it(stored, tmp_path: Path):
     path = tmp_path / "a.face"
-    write_archive(path, {}, stored_video_to_arrays(stored))
-    read = stored_video_from_arrays(read_archive(path))
+    write_archive(path, {}, coded_video.stored_video_to_arrays(stored))
+    read = coded_video.stored_video_from_arrays(read_archive(path))
     assert (read.rate_hz, read.size, read.count) == (25.0, (48, 64), 21)
     np.testing.assert_array_equal(next(read.decode([9])), next(stored.decode([9])))
 
@@ -85,7 +77,7 @@ def test_pictures_keep_their_colours():
     pictures = np.zeros((6, 32, 40, 3), np.uint8)
     pictures[:, :, 0::2] = (200, 40, 40)  # columns of different colours, which 4:2:0 would mix
     pictures[:, :, 1::2] = (40, 80, 200)
-    assert psnr_db(decode_pictures(encode_pictures(pictures, crf=8)), pictures) > 40
+    assert psnr_db(coded_video.decode_pictures(coded_video.encode_pictures(pictures, crf=8)), pictures) > 40
 
 
 def test_what_is_no_video_is_refused():
@@ -96,12 +88,12 @@ def test_what_is_no_video_is_refused():
         ([np.zeros((32, 32, 3))], "frame 0 is float64"),
     ):
         with pytest.raises(InputError, match=told):
-            encode_video(frames, 25.0)  # type: ignore[arg-type]
+            coded_video.encode_video(frames, 25.0)  # type: ignore[arg-type]
     for options in ({"crf": -1}, {"crf": 52}, {"group": 0}):
         with pytest.raises(InputError, match="required 0 to 51"):
-            encode_video(film(2), 25.0, **options)
+            coded_video.encode_video(film(2), 25.0, **options)
     with pytest.raises(InputError, match="at least one"):
-        encode_pictures(np.zeros((0, 8, 8, 3), np.uint8))
+        coded_video.encode_pictures(np.zeros((0, 8, 8, 3), np.uint8))
 
 
 class TestDamage:
@@ -114,8 +106,7 @@ class TestDamage:
         data = stored.data.copy()
         at = int(draw.integers(len(data)))
         if change == "flip":
-            places = draw.integers(len(data), size=20)
-            data[places] ^= draw.integers(1, 256, size=20).astype(np.uint8)
+            data[draw.integers(len(data), size=20)] ^= draw.integers(1, 256, size=20).astype(np.uint8)
         elif change == "cut":
             data = data[:at]
         elif change == "zeros":
@@ -125,7 +116,7 @@ class TestDamage:
         with suppress(ModelFormatError):
             assert {frame.shape for frame in replace(stored, data=data).decode(range(21))} == {(48, 64, 3)}
         with suppress(ModelFormatError):
-            assert decode_pictures(data).shape[1:] == (48, 64, 3)
+            assert coded_video.decode_pictures(data).shape[1:] == (48, 64, 3)
 
     @pytest.mark.parametrize("data", [b"", b"\0\0\1", bytes(400), b"\0\0\1\x09" * 200, b"noise" * 50])
     def test_other_bytes(self, stored, data):
@@ -133,7 +124,7 @@ class TestDamage:
         with pytest.raises(ModelFormatError, match="damaged"):
             replace(stored, data=values)
         with pytest.raises(ModelFormatError, match="damaged"):
-            decode_pictures(values)
+            coded_video.decode_pictures(values)
 
     def test_another_count_or_size(self, stored):
         with pytest.raises(ModelFormatError, match="21 frames, required 20"):
@@ -142,7 +133,7 @@ class TestDamage:
             list(replace(stored, size=(40, 64)).decode([0]))
 
     def test_arrays_of_wrong_kinds(self, stored):
-        arrays = stored_video_to_arrays(stored)
+        arrays = coded_video.stored_video_to_arrays(stored)
         for wrong in (
             {name: value for name, value in arrays.items() if name != "size"},
             arrays | {"more": np.zeros(3)},
@@ -151,15 +142,15 @@ class TestDamage:
             arrays | {"rate_hz": np.array(np.nan)},
         ):
             with pytest.raises(ModelFormatError):
-                stored_video_from_arrays(wrong)
+                coded_video.stored_video_from_arrays(wrong)
 
     def test_larger_pictures_than_allowed_are_not_decoded(self, monkeypatch):
         from lipmotion_faces import coded_video
 
-        data = encode_pictures(film(4))
+        data = coded_video.encode_pictures(film(4))
         monkeypatch.setattr(coded_video, "MAX_PICTURE_BYTES", 4 * 48 * 64 * 3 - 1)
         with pytest.raises(ModelFormatError, match="4 pictures of 9216 bytes"):
-            decode_pictures(data)
+            coded_video.decode_pictures(data)
 
 
 STARTS = [0, 4, 8, 12, 16, 18]
@@ -181,18 +172,18 @@ class Film:
 )
 @pytest.mark.parametrize("most_bytes", [0, 3 * 4 * 300, 10**6])
 def test_every_frame_is_the_right_one(order, most_bytes):
-    groups = FrameGroups(Film().frames, STARTS, most_bytes)
+    groups = coded_video.FrameGroups(Film().frames, STARTS, most_bytes)
     assert [int(groups.decode(n)[0, 0, 0]) for n in order] == list(order)
 
 
 def test_frames_are_read_once_each_way_and_memory_is_bounded():
     film = Film()
-    groups = FrameGroups(film.frames, STARTS, 0)
+    groups = coded_video.FrameGroups(film.frames, STARTS, 0)
     for n in [*range(18), *range(16, -1, -1)]:
         groups.decode(n)
     ways = [(0, 4), (4, 8), (8, 12), (12, 16), (16, 18)]
     assert film.read == [*ways, *ways[2::-1]]  # the last two were still there
-    long, sizes = FrameGroups(film.frames, range(0, 401, 4), most_bytes=3 * 4 * 300), []
+    long, sizes = coded_video.FrameGroups(film.frames, range(0, 401, 4), most_bytes=3 * 4 * 300), []
     for n in range(400):
         long.decode(n)
         sizes.append(long.nbytes)

@@ -14,15 +14,6 @@ import pytest
 from children import PIPE, child, run_child
 from lipmotion.errors import ExportError, InputError
 from lipmotion.storage import files, locks
-from lipmotion.storage.files import (
-    TEMPORARY,
-    atomic_file,
-    check_distinct,
-    check_target,
-    confine,
-    make_portable,
-    replace_folder,
-)
 from lipmotion.storage.locks import LOCK, keep_unfinished, lock_folder
 from lipmotion.storage.sources import Source, check_apart, check_kind
 
@@ -36,14 +27,14 @@ def names(folder: Path) -> list[str]:
 def test_a_file_appears_when_it_is_whole_and_an_old_one_stays_until_then(tmp_path: Path) -> None:
     target = tmp_path / "motion.json"
     for old, new in ((None, "first"), ("first", "second")):
-        with atomic_file(target) as unfinished:
+        with files.atomic_file(target) as unfinished:
             unfinished.write_text(new)
             assert (target.read_text() if target.exists() else None) == old
             assert unfinished.suffix == target.suffix
             assert unfinished.parent == target.parent
         assert target.read_text() == new
         with pytest.raises(RuntimeError):
-            fail(atomic_file(target), RuntimeError())
+            fail(files.atomic_file(target), RuntimeError())
         assert target.read_text() == new
         assert names(tmp_path) == ["motion.json"]
 
@@ -55,7 +46,7 @@ def fail(context: AbstractContextManager[Path], error: BaseException) -> None:
         raise error
 
 
-@pytest.mark.parametrize("context", [atomic_file, replace_folder])
+@pytest.mark.parametrize("context", [files.atomic_file, files.replace_folder])
 def test_a_failure_leaves_nothing(tmp_path: Path, context: Context) -> None:
     for error in (RuntimeError(), KeyboardInterrupt()):
         with pytest.raises(type(error)):
@@ -68,7 +59,7 @@ def test_a_failure_leaves_nothing(tmp_path: Path, context: Context) -> None:
 
 
 def test_a_folder_appears_when_it_is_whole(tmp_path: Path) -> None:
-    with replace_folder(tmp_path / "one") as unfinished:
+    with files.replace_folder(tmp_path / "one") as unfinished:
         (unfinished / "entry.json").touch()
         assert not (tmp_path / "one").exists()
     assert names(tmp_path / "one") == ["entry.json"]
@@ -78,14 +69,14 @@ def test_a_folder_appears_when_it_is_whole(tmp_path: Path) -> None:
 def test_a_folder_does_not_replace_one_that_holds_something(tmp_path: Path) -> None:
     (tmp_path / "one").mkdir()
     (tmp_path / "one" / "precious").touch()
-    with pytest.raises(ExportError, match="one: cannot be written"), replace_folder(tmp_path / "one"):
+    with pytest.raises(ExportError, match="one: cannot be written"), files.replace_folder(tmp_path / "one"):
         pass
     assert names(tmp_path) == ["one"]
     assert names(tmp_path / "one") == ["precious"]
 
 
 def test_targets_are_checked_before_work_begins(tmp_path: Path) -> None:
-    check_target(tmp_path / "new.json")
+    files.check_target(tmp_path / "new.json")
     (tmp_path / "file").touch()
     for target, words in (
         (tmp_path, r"is a folder; give the name of a file"),
@@ -93,7 +84,7 @@ def test_targets_are_checked_before_work_begins(tmp_path: Path) -> None:
         (tmp_path / "file" / "new.json", r"does not exist"),
     ):
         with pytest.raises(ExportError, match=words):
-            check_target(target)
+            files.check_target(target)
     assert names(tmp_path) == ["file"]
 
 
@@ -109,11 +100,11 @@ def test_what_a_killed_process_left_of_a_target_is_removed_with_the_next(tmp_pat
     run_child([sys.executable, "-c", program, target])
     (left,) = tmp_path.iterdir()
     os.utime(left, (0, 0))  # Windows, where no process can be looked for, goes by its age
-    with atomic_file(tmp_path / "other.json") as other, atomic_file(target) as mine:
+    with files.atomic_file(tmp_path / "other.json") as other, files.atomic_file(target) as mine:
         assert len(names(tmp_path)) == 0
         other.touch()
         mine.touch()
-        with atomic_file(target) as same:  # the file of a running process is not removed
+        with files.atomic_file(target) as same:  # the file of a running process is not removed
             same.touch()
         assert mine.exists()
     assert names(tmp_path) == ["motion.json", "other.json"]
@@ -158,7 +149,7 @@ def test_unfinished_work_is_found_again(tmp_path: Path) -> None:
     def interrupted() -> None:
         with keep_unfinished(tmp_path / "model") as folder:
             (folder / "stage").touch()
-            (folder / f"{TEMPORARY}half").touch()
+            (folder / f"{files.TEMPORARY}half").touch()
             raise KeyboardInterrupt
 
     for _ in range(2):
@@ -173,7 +164,7 @@ def test_a_link_is_written_through_and_unfinished_work_lies_beside_what_it_point
     for name, target in (("a.json", "there/b.json"), ("c.json", "a.json")):
         (tmp_path / name).symlink_to(target)
     for name in ("c.json", "a.json"):
-        with atomic_file(tmp_path / name) as unfinished:
+        with files.atomic_file(tmp_path / name) as unfinished:
             assert unfinished.parent == (tmp_path / "there").resolve()
             unfinished.write_text(name)
         assert (tmp_path / "there" / "b.json").read_text() == name
@@ -189,7 +180,7 @@ def test_a_link_is_written_through_and_unfinished_work_lies_beside_what_it_point
 def test_a_link_is_replaced_where_it_must_not_lead_away(tmp_path: Path) -> None:
     (tmp_path / "precious").write_text("old")
     (tmp_path / "corpus.json").symlink_to("precious")
-    with confine(tmp_path), atomic_file(tmp_path / "corpus.json") as unfinished:
+    with files.confine(tmp_path), files.atomic_file(tmp_path / "corpus.json") as unfinished:
         unfinished.write_text("new")
     assert not (tmp_path / "corpus.json").is_symlink()
     assert (tmp_path / "precious").read_text() == "old"
@@ -200,8 +191,8 @@ def test_a_link_that_leads_nowhere(tmp_path: Path) -> None:
     (tmp_path / "away").symlink_to("missing/b.json")
     for name, words in (("loop", "leads back to itself"), ("away", "the folder .*missing does not exist")):
         with pytest.raises(ExportError, match=words):
-            check_target(tmp_path / name)
-        with pytest.raises(ExportError, match=words), atomic_file(tmp_path / name):
+            files.check_target(tmp_path / name)
+        with pytest.raises(ExportError, match=words), files.atomic_file(tmp_path / name):
             raise AssertionError
     assert names(tmp_path) == ["away", "loop"]
 
@@ -213,16 +204,16 @@ def test_two_outputs_that_are_one(tmp_path: Path) -> None:
     os.link(tmp_path / "a", tmp_path / "hard")
     for one, other in (("a", "soft"), ("hard", "a"), ("new", "b"), ("c", "../" + tmp_path.name + "/c")):
         with pytest.raises(ExportError, match="is given twice"):
-            check_distinct([tmp_path / one, tmp_path / other])
-    check_distinct([tmp_path / "a", tmp_path / "b", tmp_path / "c"])
+            files.check_distinct([tmp_path / one, tmp_path / other])
+    files.check_distinct([tmp_path / "a", tmp_path / "b", tmp_path / "c"])
 
 
 def test_only_names_that_windows_does_not_take_get_other_ones() -> None:
     for name in (*"CON nul Aux.wav prn.tar.gz com1 LPT9.csv COM\u00b2 conin$ a.".split(), "NUL .txt", "a "):
-        assert make_portable(name) != name
-        assert make_portable(make_portable(name)) == make_portable(name)
+        assert files.make_portable(name) != name
+        assert files.make_portable(files.make_portable(name)) == files.make_portable(name)
     for name in "icon.wav console com10 lpt nul_.wav a.b .hidden null".split():
-        assert make_portable(name) == name
+        assert files.make_portable(name) == name
 
 
 def interrupted(folder: Path, step: int) -> bool:

@@ -1,7 +1,7 @@
 import os
 import sys
 from collections.abc import Callable
-from contextlib import AbstractContextManager, suppress
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -126,9 +126,7 @@ def test_no_verb_follows_a_link_in_a_folder_of_a_stranger(tmp_path: Path, verb: 
 
 
 @pytest.mark.parametrize("write", [files.atomic_file, files.replace_folder])
-def test_a_confined_folder_may_be_a_link_itself(
-    tmp_path: Path, write: Callable[[Path], AbstractContextManager[Path]]
-) -> None:
+def test_a_confined_folder_may_be_a_link_itself(tmp_path, write):
     (tmp_path / "there").mkdir()
     (tmp_path / "given").symlink_to("there")
     with lock_folder(tmp_path / "given"):

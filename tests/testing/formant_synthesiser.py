@@ -22,10 +22,8 @@ from lipmotion.types import Audio, Span, Timeline, Unit
 Array = NDArray[np.float64]
 Formants = tuple[float, float, float]
 
-CONTROL_HZ = 320
-"""Rate at which tracks are updated."""
-FLOOR_DB = -70.0
-"""Level of the background noise, in dB of full scale (root mean square)."""
+CONTROL_HZ = 320  # rate at which tracks are updated
+FLOOR_DB = -70.0  # level of the background noise, in dB of full scale (root mean square)
 
 _FORMANT_SMOOTHING_S, _LEVEL_SMOOTHING_S = 0.016, 0.004  # standard deviations
 _HIGH_HZ, _HIGH_WIDTHS_HZ = (4500.0, 3500.0), (280.0, 220.0)  # F5 and F4, the same for all phones
@@ -60,9 +58,8 @@ PhoneTargets = tuple[TargetSegment, ...]
 def _vowel(start: Formants, end: Formants | None = None) -> PhoneTargets:
     if end is None:
         return (TargetSegment(1.0, start, voicing=1.0, aspiration=0.01),)
-    return TargetSegment(0.5, start, voicing=1.0, aspiration=0.01), TargetSegment(
-        0.5, end, voicing=0.9, aspiration=0.01
-    )
+    steady = TargetSegment(0.5, start, voicing=1.0, aspiration=0.01)
+    return steady, replace(steady, formants=end, voicing=0.9)
 
 
 def _glide(formants: Formants) -> PhoneTargets:
@@ -107,9 +104,8 @@ def _affricate(
 
 def _syllabic(consonant: PhoneTargets) -> PhoneTargets:
     """Return a schwa that runs into a consonant."""
-    return replace(_vowel(SCHWA)[0], share=0.35), *(
-        replace(segment, share=0.65 * segment.share) for segment in consonant
-    )
+    (schwa,) = _vowel(SCHWA)
+    return replace(schwa, share=0.35), *(replace(each, share=0.65 * each.share) for each in consonant)
 
 
 SCHWA: Formants = (500, 1400, 2450)
@@ -180,10 +176,8 @@ def synthesise(
     voicing, aspiration, frication = (np.interp(np.arange(count), centres, level) for level in tracks.levels.T)
     pitch = pitch_hz * np.linspace(1 + _DECLINATION, 1 - _DECLINATION, count)
     opened = np.cumsum(pitch / rate_hz) % 1.0 / _OPEN_SHARE
-    source = (
-        voicing * lfilter([1 - _TILT], [1.0, -_TILT], np.where(opened < 1, opened * (2 - 3 * opened), 0.0))
-        + aspiration * noise[0]
-    )
+    pulses = np.where(opened < 1, opened * (2 - 3 * opened), 0.0)
+    source = voicing * lfilter([1 - _TILT], [1.0, -_TILT], pulses) + aspiration * noise[0]
     high = np.ones((len(tracks.formants), 1))
     centre = np.concatenate([high * _HIGH_HZ, tracks.formants[:, ::-1]], axis=1)
     width = np.concatenate([high * _HIGH_WIDTHS_HZ, tracks.widths[:, ::-1]], axis=1)

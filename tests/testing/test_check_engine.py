@@ -83,8 +83,7 @@ class Broken:
     """Ways to break the contract: what each of them changes, and the check that must notice."""
 
     def half(self, result: Generation) -> Generation:
-        motion = replace(result.motion, values=result.motion.values[::2])
-        return replace(result, motion=motion)
+        return replace(result, motion=replace(result.motion, values=result.motion.values[::2]))
 
     def still(self, result: Generation) -> Generation:
         return replace(result, motion=replace(result.motion, values=np.zeros_like(result.motion.values)))

@@ -16,12 +16,9 @@ from lipmotion.units import is_silent
 from lipmotion.units.spelling import parse_table
 from testing.formant_synthesiser import synthesise
 
-SKIN, LIPS, INSIDE = (206.0, 160.0, 141.0), (172.0, 84.0, 88.0), (58.0, 24.0, 30.0)
-"""Colours, RGB."""
-INNER_WIDTH = 0.8
-"""Width of the inner lips, relative to the width of the mouth."""
-SHADE = 0.15
-"""Share by which the skin is darker at the lower edge of the picture."""
+SKIN, LIPS, INSIDE = (206.0, 160.0, 141.0), (172.0, 84.0, 88.0), (58.0, 24.0, 30.0)  # colours, RGB
+INNER_WIDTH = 0.8  # width of the inner lips, relative to the width of the mouth
+SHADE = 0.15  # share by which the skin is darker at the lower edge of the picture
 THINNEST_PX = 0.2
 
 
@@ -51,25 +48,19 @@ LIP_TARGETS = {
 LIPS_TOUCH = frozenset({"p", "b", "m"})
 
 CHANNELS = (Channel("opening"), Channel("width"), Channel("outer"))
-LIP_THICKNESS = 0.22
-"""``outer`` exceeds ``opening`` by this much."""
-LIP_LEAD_S = 0.03
-"""Time by which the lips are ahead of the sound."""
-BLEND_S = 0.12
-"""Time over which neighbouring targets are blended."""
-CLOSING_S = 0.08
-"""Time in which the lips close before p b m, and open after."""
+LIP_THICKNESS = 0.22  # ``outer`` exceeds ``opening`` by this much
+LIP_LEAD_S = 0.03  # time by which the lips are ahead of the sound
+BLEND_S = 0.12  # time over which neighbouring targets are blended
+CLOSING_S = 0.08  # time in which the lips close before p b m, and open after
 
-SPEECH_S = 1.27
-"""A sentence ends with the word that makes its speech at least this long."""
+SPEECH_S = 1.27  # a sentence ends with the word that makes its speech at least this long
 SILENCE_S, PITCH_HZ = (0.4, 0.6), (105.0, 135.0)  # ranges
 
 CAMERA_HZ = 25.0
 FACE_HEIGHT = 256
 _GRID_HZ = 1000
 MOTION_HZ = 100.0
-SMALL = HmmConfig(mixtures=1, iterations=2)
-"""Phone models that are trained in a second."""
+SMALL = HmmConfig(mixtures=1, iterations=2)  # phone models that are trained in a second
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,9 +137,8 @@ def _speak_sentence(name: str, split: str, vocabulary: Iterator[str], rng: np.ra
     while sum(durations_s[1:]) < SPEECH_S:
         words.append(next(vocabulary))
         labels += [Unit(phone, word=words[-1]) for phone in WORDS[words[-1]]]
-        durations_s += [
-            (0.17 if phone[0] in "aeiou" else 0.105) * rng.uniform(0.85, 1.15) for phone in WORDS[words[-1]]
-        ]
+        usual_s = (0.17 if phone[0] in "aeiou" else 0.105 for phone in WORDS[words[-1]])
+        durations_s += [duration_s * rng.uniform(0.85, 1.15) for duration_s in usual_s]
     labels, durations_s = [*labels, Unit("sil")], [*durations_s, rng.uniform(*SILENCE_S)]
     phones = [(label.phone, duration_s) for label, duration_s in zip(labels, durations_s, strict=True)]
     audio, units = synthesise(phones, pitch_hz=rng.uniform(*PITCH_HZ), seed=int(rng.integers(2**31)))
@@ -173,9 +163,8 @@ def _utterance(sentence: ToySentence) -> Utterance:
         picture = (1 - share) * picture + share * np.array(colour)
     track = Track(motion, np.ones(len(motion.values), dtype=bool), np.rint(picture).astype(np.uint8))
     source = {"file": "", "licence": "synthesised by lipmotion"}
-    return Utterance(
-        sentence.name, sentence.audio, analysed(sentence.audio).mfcc(), track, sentence.words, sentence.split, source
-    )
+    features = analysed(sentence.audio).mfcc()
+    return Utterance(sentence.name, sentence.audio, features, track, sentence.words, sentence.split, source)
 
 
 def _targets(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArray[np.float64]:

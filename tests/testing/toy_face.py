@@ -23,35 +23,24 @@ Array = NDArray[np.float64]
 Values = NDArray[np.floating[Any]]
 Pictures = NDArray[np.uint8]
 
-SHAPE = FaceShape(44.0, 109.0)
-"""The part of the lower face that is replaced: it ends above the chin at its highest."""
+SHAPE = FaceShape(44.0, 109.0)  # the part of the lower face that is replaced: it ends above the chin at its highest
 CHIN_PX, CHIN_DROP_PX = 113.0, 40.0
 """How far the tip of the chin is below the eyes when the mouth is closed, and how much further for an opening of 1."""
-FRAME_WIDTH, FRAME_HEIGHT = 224, 288
-"""Size of a frame of the background, px."""
-SCALE = 0.9
-"""Size of the face in the background: px of the frame for one px of the face."""
-MIDDLE_PX = (112.0, 120.0)
-"""Where the point between the eyes is in the frame, on average, px."""
-SWAY_PX, SWAY_S = 3.0, 4.0
-"""The head moves so far to either side, in so long a time."""
-TILT = 0.02
-"""The head tilts so far to either side, radians."""
+FRAME_WIDTH, FRAME_HEIGHT = 224, 288  # size of a frame of the background, px
+SCALE = 0.9  # size of the face in the background: px of the frame for one px of the face
+MIDDLE_PX = (112.0, 120.0)  # where the point between the eyes is in the frame, on average, px
+SWAY_PX, SWAY_S = 3.0, 4.0  # the head moves so far to either side, in so long a time
+TILT = 0.02  # the head tilts so far to either side, radians
 BACKGROUND_S = 2.0
-HEAD_PX = (66.0, 80.0)
-"""Half width of the head, and its height above ``HEAD_MIDDLE_PX``, px of the face."""
-HEAD_MIDDLE_PX = 17.0
-"""Height at which the head is widest, px below the eyes."""
+HEAD_PX = (66.0, 80.0)  # half width of the head, and its height above ``HEAD_MIDDLE_PX``, px of the face
+HEAD_MIDDLE_PX = 17.0  # height at which the head is widest, px below the eyes
 CREASE_PX, CREASE = (4.0, 18.0), 0.2
 """Height and width of the crease above the chin, px of the face, and how much darker it is."""
-MIN_OPENING_PX, TEETH_PX = 0.6, 5.0
-"""A mouth that is open less looks closed; height of the upper teeth, px of the face."""
-NECK_PX = 40.0
-"""Half width of the neck, px of the face."""
+MIN_OPENING_PX, TEETH_PX = 0.6, 5.0  # a mouth that is open less looks closed; height of the upper teeth, px of the face
+NECK_PX = 40.0  # half width of the neck, px of the face
 TEETH, NECK, WALL, EYES = (226.0, 220.0, 205.0), (150.0, 112.0, 98.0), (70.0, 96.0, 120.0), (40.0, 34.0, 38.0)
 """Colours, RGB."""
-NOISE = 1.2
-"""Standard deviation of the noise of the camera, grey levels."""
+NOISE = 1.2  # standard deviation of the noise of the camera, grey levels
 
 
 def toy_lower_faces(motion: Motion, *, noise: float = NOISE, seed: int = 0) -> Pictures:
@@ -134,10 +123,8 @@ def _levels(sentence: ToySentence, frames: int) -> Array:
 
 def _shapes(motion: Motion) -> Array:
     """Return opening, width, outer and place of the chin in every frame, px of the face [shape=(T, 4)]."""
-    distances = (
-        np.stack([motion[name] for name in ("opening", "width", "outer")], axis=1) * mouth_region.EYE_DISTANCE_PX
-    )
-    return np.column_stack([distances, toy_chin_px(motion)])
+    distances = [motion[name] * mouth_region.EYE_DISTANCE_PX for name in ("opening", "width", "outer")]
+    return np.column_stack([*distances, toy_chin_px(motion)])
 
 
 def _picture(x: Values, y: Values, shape: Array, pixel_px: float, noise: float, draw: np.random.Generator) -> Pictures:

@@ -8,43 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lipmotion import types
 from lipmotion.errors import InputError
-from lipmotion.types import (
-    EYE_DISTANCE,
-    Channel,
-    Configuration,
-    Constraints,
-    Delivery,
-    Generation,
-    Motion,
-    Pin,
-    ReducedVariance,
-    Rule,
-    Span,
-    SpeechKnowledge,
-    StateTrace,
-    Timeline,
-    Unit,
-    option,
-)
+from lipmotion.types import Channel, Motion, Span, Timeline, Unit, values
 from lipmotion.types.delivery import MoodKey, format_moods, parse_moods, sort_moods
-from lipmotion.types.values import (
-    SchemaError,
-    any_members,
-    if_fits,
-    items,
-    members,
-    number,
-    one_of,
-    optional,
-    parse_number,
-    parse_whole,
-    path,
-    text,
-    truth,
-    value_of,
-    whole,
-)
+from lipmotion.types.values import SchemaError, number, parse_number, parse_whole, text
 
 CHANNELS = (Channel("opening"), Channel("jaw", "degrees"))
 
@@ -59,7 +27,7 @@ def test_frames_have_times_and_channels_have_names() -> None:
     assert curves.time_s == pytest.approx(np.arange(11) / 10)
     assert curves.names == ("opening", "jaw")
     assert curves["jaw"] == pytest.approx(-2 * np.arange(11))
-    assert Channel("opening").unit == EYE_DISTANCE
+    assert Channel("opening").unit == types.EYE_DISTANCE
     with pytest.raises(InputError, match="no motion channel 'width' among 2: opening, jaw"):
         _ = curves["width"]
 
@@ -118,13 +86,12 @@ def test_a_name_is_no_formula_of_a_spreadsheet() -> None:
         assert Channel(name).name == name
 
 
-def generation(frames: int = 101) -> Generation:
+def generation(frames: int = 101) -> types.Generation:
     """A second of a line, its variance the square of the frame's number, ten states."""
     line = np.arange(frames, dtype=float)[:, None]
     units = Timeline((Span(0.0, 1.0, Unit("aa")),))
-    states = tuple(f"state {number}" for number in range(10))
-    trace = StateTrace(states, np.minimum(np.arange(frames) // 10, 9))
-    return Generation(Motion(line, 100.0, (Channel("opening"),)), line**2, units, trace)
+    trace = types.StateTrace(tuple(f"state {number}" for number in range(10)), np.minimum(np.arange(frames) // 10, 9))
+    return types.Generation(Motion(line, 100.0, (Channel("opening"),)), line**2, units, trace)
 
 
 def test_all_parts_come_at_the_new_rate_and_the_state_is_that_of_the_nearest_frame() -> None:
@@ -148,10 +115,10 @@ def test_variance_that_follows_from_few_dimensions_is_kept_as_such() -> None:
     channels = tuple(map(Channel, ("opening", "width", "outer")))
     plain = generation()
     motion = Motion(np.zeros((101, 3)), 100.0, channels)
-    small = Generation(motion, ReducedVariance(reduced, mixing), plain.units, plain.trace)
-    large = Generation(motion, reduced @ mixing, plain.units, plain.trace)
+    small = types.Generation(motion, types.ReducedVariance(reduced, mixing), plain.units, plain.trace)
+    large = types.Generation(motion, reduced @ mixing, plain.units, plain.trace)
     for change in (lambda g: g, lambda g: g.selected(["outer", "width"]), lambda g: g.resampled(29.97)):
-        assert isinstance(change(small).spread, ReducedVariance)
+        assert isinstance(change(small).spread, types.ReducedVariance)
         assert change(small).variance == pytest.approx(change(large).variance)
     assert small.variance_of(slice(3, 5)) == pytest.approx(large.variance[3:5])
 
@@ -160,17 +127,17 @@ def test_pins_and_times_are_numbers() -> None:
     wrong: Any
     for wrong in ("soon", None, [0.1], 1j, np.array([0.5]), 10**400):
         with pytest.raises(InputError, match=r"the time of a pin is .*, required a number"):
-            Pin(wrong, "opening", 0.1)
+            types.Pin(wrong, "opening", 0.1)
         with pytest.raises(InputError, match=r"the value of a pin is .*, required a number"):
-            Pin(0.5, "opening", wrong)
+            types.Pin(0.5, "opening", wrong)
     for wrong in ("soon", None, [0.1], 1j, 10**400):
         with pytest.raises(InputError, match=r"the phone 'p' lasts from .* to .*, required seconds"):
             Timeline((Span(wrong, wrong, Unit("p")),))
-    pin = Pin(0.5, "opening", 0.1)
+    pin = types.Pin(0.5, "opening", 0.1)
     pins: Any
     for pins in (7, None, pin, "pins", [(0.5, "opening", 0.1)], [pin, None], iter([pin])):
         with pytest.raises(InputError, match="required pins"):
-            Constraints(pins)
+            types.Constraints(pins)
 
 
 NAN = float("nan")
@@ -211,7 +178,8 @@ def test_a_phone_is_named_as_users_know_it() -> None:
         Timeline((Span(1.0, 0.5, Unit("", "bilabial")),))
 
 
-POINT = members({"at": items(number(-1, 1), 2, 2), "count": whole(0, 9), "kind": one_of(["a", 1])}, ["at"])
+MEMBERS = {"at": values.items(number(-1, 1), 2, 2), "count": values.whole(0, 9), "kind": values.one_of(["a", 1])}
+POINT = values.members(MEMBERS, ["at"])
 DEEP: list = []
 for _ in range(5000):
     DEEP = [DEEP]
@@ -221,13 +189,13 @@ def test_what_fits_is_taken_out_in_its_type() -> None:
     found = POINT({"at": [1, 0.5], "count": 3, "kind": 1, "unknown": DEEP})
     assert found == {"at": [1.0, 0.5], "count": 3, "kind": 1}
     assert isinstance(found["at"][0], float)
-    assert members({"a": if_fits(text(2)), "b": truth})({"a": "long", "b": True}) == {"b": True}
-    assert items(if_fits(whole(0, 1)))([0, "x", 1]) == [0, 1]
-    assert any_members(whole(0, 1))({"x": 1, "": 0}) == {"x": 1, "": 0}
+    assert values.members({"a": values.if_fits(text(2)), "b": values.truth})({"a": "long", "b": True}) == {"b": True}
+    assert values.items(values.if_fits(values.whole(0, 1)))([0, "x", 1]) == [0, 1]
+    assert values.any_members(values.whole(0, 1))({"x": 1, "": 0}) == {"x": 1, "": 0}
 
 
 def test_what_does_not_fit_is_named_with_its_place() -> None:
-    wrong = {
+    for message, value in {
         "at is missing, required a value": {},
         "at[1] is 2, required a number from -1 to 1": {"at": [0, 2]},
         "at[0] is true, required a number": {"at": [True, 0]},
@@ -240,14 +208,13 @@ def test_what_does_not_fit_is_named_with_its_place() -> None:
         "kind is true, required one of a, 1": {"at": [0, 0], "kind": True},
         "kind is an object": {"at": [0, 0], "kind": {}},
         "the document is a list, required an object": [],
-    }
-    for message, value in wrong.items():
+    }.items():
         with pytest.raises(SchemaError) as refused:
             POINT(value)
         assert str(refused.value).startswith(message)
         assert len(str(refused.value)) < 300
     with pytest.raises(SchemaError, match=r"^a\.b\[1\]\.at\[0\] is 5"):
-        members({"a": any_members(items(POINT))})({"a": {"b": [{"at": [0, 0]}, {"at": [5, 0]}]}})
+        values.members({"a": values.any_members(values.items(POINT))})({"a": {"b": [{"at": [0, 0]}, {"at": [5, 0]}]}})
 
 
 def test_numbers_in_texts_are_of_plain_digits() -> None:
@@ -262,10 +229,10 @@ def test_numbers_in_texts_are_of_plain_digits() -> None:
 
 
 def test_texts_and_paths_that_no_file_holds() -> None:
-    assert path("a/\udce9.wav") == "a/\udce9.wav"  # a name that is no UTF-8
+    assert values.path("a/\udce9.wav") == "a/\udce9.wav"  # a name that is no UTF-8
     for wrong in ("a\0b", "\ud800", "x" * 5000, "a/" + "é" * 200, 7, None):
         with pytest.raises(SchemaError):
-            path(wrong)
+            values.path(wrong)
     for wrong in ("\ud800", "x" * 5000, 10**400, float("nan")):
         with pytest.raises(SchemaError):
             text(1000)(wrong)
@@ -275,7 +242,7 @@ def test_texts_and_paths_that_no_file_holds() -> None:
 
 
 def test_a_value_is_made_of_its_fields_alone() -> None:
-    pair = value_of(complex, {"real": number(), "imag": optional(number())}, ["real"])
+    pair = values.value_of(complex, {"real": number(), "imag": values.optional(number())}, ["real"])
     assert pair({"real": 1, "imag": 2}) == complex(1, 2)
     for wrong in ({}, {"real": 1, "other": 2}, [1, 2]):
         with pytest.raises(SchemaError):
@@ -283,12 +250,12 @@ def test_a_value_is_made_of_its_fields_alone() -> None:
 
 
 @dataclass(frozen=True)
-class Example(Configuration):
-    count: int = option(3, Rule(least=1))
-    odd: int = option(5, Rule(least=1, odd=True))
-    mixtures: int = option(4, Rule(power_of_two=True))
-    weight: float = option(0.5, Rule(above=0))
-    kind: str = option("soft", Rule(choices=("soft", "hard")))
+class Example(types.Configuration):
+    count: int = types.option(3, types.Rule(least=1))
+    odd: int = types.option(5, types.Rule(least=1, odd=True))
+    mixtures: int = types.option(4, types.Rule(power_of_two=True))
+    weight: float = types.option(0.5, types.Rule(above=0))
+    kind: str = types.option("soft", types.Rule(choices=("soft", "hard")))
     on: bool = True
     free: str = "anything"
 
@@ -298,7 +265,7 @@ class Example(Configuration):
 
 
 def test_a_value_that_is_not_allowed() -> None:
-    for values, words in (
+    for options, words in (
         ({"count": 0}, "count is 0, required a whole number from 1"),
         ({"count": 1.0}, "count is 1.0, required a whole number from 1"),
         ({"count": True}, "count is true, required a whole number from 1"),
@@ -320,7 +287,7 @@ def test_a_value_that_is_not_allowed() -> None:
         ({"steps": 3}, "steps is 3; this option no longer exists, required 0"),
     ):
         with pytest.raises(InputError) as error:
-            Example.parsed(values)
+            Example.parsed(options)
         assert words in str(error.value)
 
 
@@ -329,12 +296,12 @@ def test_options_come_back_and_texts_are_parsed_as_their_types() -> None:
     assert (one.count, one.weight) == (7, 2)
     assert Example.parsed(one.as_mapping()) == one
     assert Example.parsed({}) == Example()
-    for given_texts, values in (
+    for given_texts, options in (
         (["count=4", "weight=2", "kind=hard"], {"count": 4, "weight": 2.0, "kind": "hard"}),
         (["on=no"], {"on": False}), (["on=TRUE"], {"on": True}), (["free=a=b"], {"free": "a=b"}),
         (["how_many=2"], {"count": 2}), ([], {}),
     ):  # fmt: skip
-        assert Example.values_of(given_texts) == values
+        assert Example.values_of(given_texts) == options
 
 
 def test_texts_that_cannot_be_parsed() -> None:
@@ -373,7 +340,7 @@ def test_other_texts_are_refused(text, said):
     with pytest.raises(InputError, match=said):
         parse_moods(text)
     with pytest.raises(InputError, match=said):
-        Delivery(mood=text)
+        types.Delivery(mood=text)
 
 
 def test_of_two_moods_at_one_time_the_last_holds_but_a_manner_may_begin_with_a_mood():
@@ -387,23 +354,23 @@ CERTAIN, UNCERTAIN = np.zeros(4), np.full(4, 2e-3)
 
 
 def test_a_known_voice_is_as_sure_as_its_variance_and_movements_of_a_stranger_less_than_his_mean() -> None:
-    known = SpeechKnowledge(voice=1.0, phones=0.0)
+    known = types.SpeechKnowledge(voice=1.0, phones=0.0)
     np.testing.assert_allclose(known.confidence(CURVE, CERTAIN), 1)
     np.testing.assert_allclose(known.confidence(CURVE, UNCERTAIN), 1 / (1 + 8 * 2e-3 / CURVE.var()))
-    confidence = SpeechKnowledge(voice=0.0, phones=1.0).confidence(CURVE, CERTAIN)
+    confidence = types.SpeechKnowledge(voice=0.0, phones=1.0).confidence(CURVE, CERTAIN)
     assert confidence[0] == pytest.approx(confidence[2])
     assert confidence[0] < confidence[1]
 
 
 @pytest.mark.parametrize("better", [{"voice": 0.5, "phones": 0.5}, {"voice": 0.2, "phones": 0.9}])
 def test_knowing_more_makes_sure(better: dict[str, float]) -> None:
-    worse = SpeechKnowledge(voice=0.2, phones=0.5).confidence(CURVE, UNCERTAIN)
-    assert (SpeechKnowledge(**better).confidence(CURVE, UNCERTAIN) > worse).all()
+    worse = types.SpeechKnowledge(voice=0.2, phones=0.5).confidence(CURVE, UNCERTAIN)
+    assert (types.SpeechKnowledge(**better).confidence(CURVE, UNCERTAIN) > worse).all()
 
 
 def test_motion_of_other_words_is_not_sure_whoever_speaks_and_one_that_stands_still_is() -> None:
     for voice in (0.0, 1.0):
-        other = SpeechKnowledge(voice, 1.0, fit=0.0).confidence(CURVE, CERTAIN)
-        assert 1 / other - 1 / SpeechKnowledge(voice, 1.0).confidence(CURVE, CERTAIN) == pytest.approx(0.5)
-    still = SpeechKnowledge(voice=0.0, phones=1.0).confidence(np.full(5, 0.1, np.float32), np.full(5, -1e-12))
+        other = types.SpeechKnowledge(voice, 1.0, fit=0.0).confidence(CURVE, CERTAIN)
+        assert 1 / other - 1 / types.SpeechKnowledge(voice, 1.0).confidence(CURVE, CERTAIN) == pytest.approx(0.5)
+    still = types.SpeechKnowledge(voice=0.0, phones=1.0).confidence(np.full(5, 0.1, np.float32), np.full(5, -1e-12))
     assert (still > 0.5).all()

@@ -6,28 +6,19 @@ from lipmotion.units import split_words
 from lipmotion.units.mood_tags import SYNONYMS, parse_tagged_text, remove_known_tags, time_moods
 
 
-def test_a_text_without_tags_is_returned_as_it_is():
-    text = "It is 3 < 4, and (really) a > b."
-    assert parse_tagged_text(text) == (text, ())
-
-
 def test_tags_hold_until_the_next_and_end_tags_are_neutral():
+    text = "It is 3 < 4, and (really) a > b."  # without tags it is returned as it is
+    assert parse_tagged_text(text) == (text, ())
     plain, tags = parse_tagged_text("One [Angry] two <smile>three</smile> four [sad: 0.25]")
     assert split_words(plain) == ("one", "two", "three", "four")
     wanted = (0.25, "angry"), (0.5, "happy", 0.6), (0.75, NEUTRAL), (1.0, "sad", 0.25)
     assert tags == tuple(MoodTag(*each) for each in wanted)
 
 
-def test_unknown_tags_are_named_and_not_spoken(caplog):
-    plain, tags = parse_tagged_text("[plays the harp] hello <b>you</b>")
-    assert split_words(plain) == ("hello", "you")
-    assert tags == ()
-    assert "[plays the harp], <b>, </b>" in caplog.text
-
-
 @pytest.mark.parametrize(
     ("text", "words", "named"),
     [
+        ("[plays the harp] hello <b>you</b>", "hello you", "[plays the harp], <b>, </b>"),
         ("“What the {i}heck{/i}?{w=0.5} My {b}boat{/b} is gone.”", "what the heck my boat is gone", "{w=0.5}"),
         ("<color=#f00>re</color>d un<b>believ</b>able <sprite index=1>", "red unbelievable", "<sprite index=1>"),
         ("[wave]hey[/wave] you #line:0e12a", "hey you", "#line:0e12a"),
@@ -65,22 +56,13 @@ def test_markup_and_names_of_speakers_are_named_and_not_spoken(caplog, text, wor
     assert bool(caplog.records) == bool(named)
 
 
-def test_known_tags_alone_can_be_taken_out():
-    assert remove_known_tags("<html> [happy] hello").split() == ["<html>", "hello"]
-
-
-@pytest.mark.parametrize(
-    ("text", "moods"),
-    [
+def test_manners_and_deeds_are_tags_every_synonym_means_a_mood_and_known_tags_can_be_taken_out():
+    for text, moods in (
         ("[whispers] one </whispers> two", ["whisper", "plain"]),
         ("*laughs* {angry}no{/angry} *gasps*", ["happy", "angry", NEUTRAL, "surprised"]),
-    ],
-)
-def test_manners_and_what_somebody_does_between_asterisks_are_tags_too(text, moods):
-    assert [tag.mood for tag in parse_tagged_text(text).tags] == moods
-
-
-def test_every_synonym_means_a_mood():
+    ):
+        assert [tag.mood for tag in parse_tagged_text(text).tags] == moods
+    assert remove_known_tags("<html> [happy] hello").split() == ["<html>", "hello"]
     for mood, strength in SYNONYMS.values():
         MoodKey(0.0, mood, strength)
         assert strength > 0

@@ -34,13 +34,10 @@ def test_a_consonant_has_the_stress_of_its_syllable() -> None:
     assert find_stress(said(("bye", "b ay"), ("", "sp"), ("bye", "b ay"))) == (1, 1, None, 1, 1)
 
 
-def test_silence_and_what_has_no_word() -> None:
+def test_silence_and_what_has_no_word_and_a_word_of_two_equal_halves() -> None:
     units = said(("", "sil"), ("please", "p l iy z"), ("", "sp b ax ih"), ("hm", "hh m"), ("", "sil"))
     assert find_stress(units) == (None, 1, 1, 1, 1, None, None, 0, None, None, None, None)
     assert find_stress(Timeline(())) == ()
-
-
-def test_a_word_of_two_equal_halves_is_one() -> None:
     lexicon = Lexicon({"dodo": (("d", "ow", "d", "ow"),)})
     assert find_stress(said(("dodo", "d ow d ow")), lexicon) == (1, 1, 0, 0)
     assert find_stress(said(("dodo", "d ow d ow d ow d ow")), lexicon) == (1, 1, 0, 0, 1, 1, 0, 0)

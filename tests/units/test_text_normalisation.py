@@ -59,12 +59,9 @@ def test_texts() -> None:
         assert " ".join(split_words(text)) == words
 
 
-def test_quotation_marks_are_not_spoken() -> None:
+def test_quotation_marks_are_not_spoken_and_a_text_without_words_is_refused() -> None:
     for text in ("say 'hello'.", "say ‘Hello’", "say hello'", "say 'hello", "say “hello”", "SAY «HELLO»"):
         assert split_words(text) == ("say", "hello")
-
-
-def test_a_text_without_words_is_refused() -> None:
     for text in ("", "   \n", "...", "—", "'", "’’", "🙂", "_"):
         with pytest.raises(InputError, match="holds no word; give the words that are spoken"):
             split_words(text)
@@ -120,24 +117,16 @@ def test_a_letter_keeps_thirty_marks() -> None:
         assert spelling.normalise_text("e\u0301" * 100) == "é" * 100
 
 
-def test_a_text_may_be_as_long_as_can_be_said() -> None:
+def test_a_text_may_be_as_long_as_can_be_said_and_phones_are_no_more_than_frames() -> None:
     for duration_s in (0.0, 1.0, 3600.0):
         most = ALWAYS_ALLOWED_CHARACTERS + int(CHARACTERS_PER_S * duration_s)
         check_text("a" * most, duration_s)
         with pytest.raises(AlignmentError, match=f"{most + 1} characters, .* at most {most} for {duration_s:.2f} s"):
             check_text("a" * (most + 1), duration_s)
     check_text("strong " * 655 * 60, 3600.0)  # the fastest speech on record: 655 words a minute, for an hour
-
-
-def test_words_count_with_the_blanks_between_them() -> None:
-    check_words(["a"] * (ALWAYS_ALLOWED_CHARACTERS // 2), 0.0)
-    with pytest.raises(AlignmentError, match=f"has {ALWAYS_ALLOWED_CHARACTERS + 2} characters"):
+    check_words(["a"] * (ALWAYS_ALLOWED_CHARACTERS // 2), 0.0)  # with the blanks between them
+    with pytest.raises(AlignmentError, match=f"has {ALWAYS_ALLOWED_CHARACTERS + 2} characters.*the words of this"):
         check_words(["a"] * (ALWAYS_ALLOWED_CHARACTERS // 2 + 1), 0.0)
-    with pytest.raises(AlignmentError, match="give the words of this recording"):
-        check_words(["a" * ALWAYS_ALLOWED_CHARACTERS], 0.0)
-
-
-def test_phones_are_no_more_than_frames() -> None:
     most = ALWAYS_ALLOWED_PHONES + 2 * PHONES_PER_S
     check_phones(most, 2.0)
     with pytest.raises(InputError, match=f"{most + 1} units in time, required at most {most} for 2.00 s of sound"):

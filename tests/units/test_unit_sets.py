@@ -83,11 +83,6 @@ def check_classes(found: UnitSet) -> None:
         assert len(units) > 1 or units == {name}
 
 
-@named
-def test_classes_hold_whole_units(name: str) -> None:
-    check_classes(load_unit_set(name))
-
-
 @settings(max_examples=20)
 @given(
     units=st.lists(st.sampled_from(["a", "vowel", "stop", "x"]), min_size=len(SPOKEN), max_size=len(SPOKEN)),
@@ -100,8 +95,9 @@ def test_classes_of_any_table(units: list[str], quiet: tuple[str, str]) -> None:
 
 
 @named
-def test_a_table_says_the_same_as_the_set(name: str, tmp_path: Path) -> None:
+def test_classes_hold_whole_units_and_a_table_says_the_same_as_the_set(name: str, tmp_path: Path) -> None:
     wanted = load_unit_set(name)
+    check_classes(wanted)
     text = "# mine\n\n" + table(dict(wanted.unit_of_phone)).replace("\n", " # why\n")
     found = load_unit_set(written(tmp_path, text))
     assert (found.name, found.unit_of_phone, found.units) == ("mine", wanted.unit_of_phone, wanted.units)
@@ -130,7 +126,7 @@ def test_a_wrong_table_is_refused(case: str, tmp_path: Path) -> None:
         load_unit_set(written(tmp_path, text))
 
 
-def test_neither_a_name_nor_a_file(tmp_path: Path) -> None:
+def test_neither_a_name_nor_a_file_and_a_unit_that_is_no_word(tmp_path: Path) -> None:
     (tmp_path / "binary").write_bytes(b"\xff\xfe\x00")
     for asked, message in (
         ("evis", r"'evis'; there are: 2vis, sVis, pbVis, eVis, phone"),
@@ -141,14 +137,12 @@ def test_neither_a_name_nor_a_file(tmp_path: Path) -> None:
         with pytest.raises(errors.InputError, match=message):
             load_unit_set(asked)
 
-
-def test_a_unit_is_a_word() -> None:
     for unit in ("", "a b", " a", "a\n"):
         with pytest.raises(errors.InputError, match="not a word"):
             UnitSet("mine", {**load_unit_set("phone").unit_of_phone, "zh": unit})
 
 
-def test_the_document_counts_the_units_of_every_set() -> None:
+def test_the_document_counts_the_units_of_every_set_and_its_table_is_one(tmp_path: Path) -> None:
     rows = [line.strip("| ").split(" | ") for line in DOCUMENT.read_text(encoding="utf-8").splitlines()]
     head = [row for row in rows if row[0].strip("`") in PRINTED and len(row) == 4]
     assert [(r[0].strip("`"), int(r[1]), int(r[2]), r[3]) for r in head] == [
@@ -156,15 +150,13 @@ def test_the_document_counts_the_units_of_every_set() -> None:
         for name, found in UNIT_SETS.items()
     ]
 
-
-def test_the_table_in_the_document_is_one(tmp_path: Path) -> None:
     example = DOCUMENT.read_text(encoding="utf-8").partition("```text\n")[2].partition("```")[0]
     found = load_unit_set(written(tmp_path, example))
     assert found.units == ("closed", "teeth", "rounded", "open")
     assert found.silence == ("closed",)
 
 
-def test_what_is_spoken_has_the_unit_of_its_phone_or_else_its_own() -> None:
+def test_a_label_has_the_unit_of_its_phone_or_its_own_and_a_unit_tells_its_phone_where_it_has_one() -> None:
     units = UNIT_SETS["eVis"]
     assert units.unit_of(types.Unit("p", "sil-hidden+aa")) == "bilabial"
     assert units.unit_of(types.Unit("", "bilabial")) == "bilabial"
@@ -172,8 +164,6 @@ def test_what_is_spoken_has_the_unit_of_its_phone_or_else_its_own() -> None:
         with pytest.raises(errors.InputError):
             units.unit_of(label)
 
-
-def test_a_unit_alone_tells_its_phone_only_where_it_has_one() -> None:
     for name, unit, label in (
         ("eVis", "aw", types.Unit("aw", "aw")),
         ("eVis", "bilabial", types.Unit("", "bilabial")),

@@ -18,20 +18,17 @@ from lipmotion.units import mark_closing_phones
 Curve = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-CLOSED_OPENING: Final = 0.012
-"""Trackers measure openings up to this on lips that touch, in eye distances."""
+CLOSED_OPENING: Final = 0.012  # trackers measure openings up to this on lips that touch, in eye distances
 TRACKER_DEFICIT, FULL_DEFICIT_GAP = 0.006, 0.03
 """Trackers measure this much less than the distance of parted lips; from the second length on, all of it is added."""
 MEASURED_GAP, LARGEST_GAP = 0.3, 0.48
 """Up to the first gap, lips are as far apart as measured; further ones approach the second, in eye distances."""
-MIN_GAP: Final = 0.006
-"""Lips that do not touch are at least this far apart, in eye distances (0.5 mm on a face)."""
+MIN_GAP: Final = 0.006  # lips that do not touch are at least this far apart, in eye distances (0.5 mm on a face)
 CONTACT_S: Final = (0.05, 0.09)
 """The lips are made to touch in p, b and m for ``CONTACT_SHARE`` of the phone, but for at least the first time (longer
 than a picture at 24 a second), and for no longer than the second one."""
 CONTACT_SHARE: Final = 0.6
-FADE_S: Final = 0.04
-"""Lips that are made to touch come together, and part, within this time."""
+FADE_S: Final = 0.04  # lips that are made to touch come together, and part, within this time
 EDITED: Final = {"opening": "edited_opening", "width": "edited_width"}
 """By channels that edits have decided, the channels that say how far, 0 to 1: as far, phones change nothing of them."""
 EDITED_GAP: Final = 0.15

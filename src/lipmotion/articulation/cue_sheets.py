@@ -28,8 +28,7 @@ from lipmotion.units.phones import BLAIR, LETTERS, OPTIONAL, REST, SHAPES, choos
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")
 
-CUES_FPS = 24.0
-"""Frame rate of cues where none is given."""
+CUES_FPS = 24.0  # frame rate of cues where none is given
 
 
 @dataclass(frozen=True)
@@ -166,25 +165,20 @@ SPECIAL = "AGHX"
 OPENING_WEIGHT, SPREAD_WEIGHT = 6.0, 0.5
 UNCLOSED_COST, UNBITTEN_COST = 10_000.0, 100.0
 """Cost where the one frame of a p b m, or f v, does not show its shape: where only one fits, p b m win."""
-LARGEST_OPENING = 1.2
-"""Largest relative opening that is distinguished."""
+LARGEST_OPENING = 1.2  # largest relative opening that is distinguished
 MIN_OPENING = 1e-4
 """Least mean opening, in the unit of the motion, that scales: a mouth that stays closed is not amplified."""
 LINE_PAUSE_S, SHORT_S, NEAR_S = 0.5, 1.5, 1.5
 """A longer pause divides lines; one shorter than the second belongs to another one nearer than the third."""
 LIP_BITING = VISEMES["ld"]
-LEAD_S = 0.02
-"""The shape of a phone begins this long before its sound."""
+LEAD_S = 0.02  # the shape of a phone begins this long before its sound
 
 _NAMES = "".join(SHAPES)
 _POSES = np.array([(shape.opening, shape.spread) for shape in SHAPES.values()])
 
 
 def compute_frame_costs(generation: Generation, frames: int, fps: float, intensity: float = 1.0) -> Array:
-    """Return the cost of every one of ``SHAPES`` in every frame [shape=(frames, 9)].
-
-    Frame k is shown from ``k / fps`` to ``(k + 1) / fps``; phones and motion count by their share of that time.
-    """
+    """Return the cost of each of ``SHAPES`` in every frame [shape=(frames, 9)]; frame k lasts from ``k / fps`` on."""
     edges_s = np.arange(frames + 1) / fps
     silence = find_phone_values(list_phone_shapes(SILENCE)[0], silent=True)
     bounds_s, sums = [-LEAD_S], [np.zeros_like(silence)]
@@ -218,8 +212,7 @@ def compute_frame_costs(generation: Generation, frames: int, fps: float, intensi
         spread = np.clip(intensity * spread, *limits)
         cost += SPREAD_WEIGHT * voiced[:, None] * (spread[:, None] - _POSES[:, 1]) ** 2
     cost *= COST_RATE_HZ / fps
-    closing = mark_closing_phones(generation.units)
-    for span, closes in zip(generation.units, closing, strict=True):
+    for span, closes in zip(generation.units, mark_closing_phones(generation.units), strict=True):
         if closes or span.label.phone in LIP_BITING:
             shape, penalty = ("A", UNCLOSED_COST) if closes else ("G", UNBITTEN_COST)
             frame = min(int(_find_least_open_s(span, generation.motion) * fps), frames - 1)
@@ -287,8 +280,7 @@ def _average_between(time_s: Array, sums: Array, edges_s: Array) -> Array:
     return np.diff(at_edges, axis=0) / np.diff(edges_s)[:, None]
 
 
-CHANGE_COST = 0.35
-"""Cost of a change of shape, in the unit of ``compute_frame_costs``."""
+CHANGE_COST = 0.35  # cost of a change of shape, in the unit of ``compute_frame_costs``
 HOLD_S = 2 / 24
 
 
@@ -340,8 +332,7 @@ PREFIX = "viseme_"
 CHARTS = (BLAIR, LETTERS, FLEMING_DOBBS, OCULUS, PHONES)
 LONGEST_S = 86_400.0
 MAX_CUES = 250_000
-MILLISECONDS = 20.0
-"""Shapes other than rest of which half seem to last so many whole seconds are in milliseconds."""
+MILLISECONDS = 20.0  # shapes other than rest of which half seem to last so many whole seconds are in milliseconds
 
 
 def parse_shape(name: str, names: dict[str, str], place: str) -> str:
@@ -359,11 +350,7 @@ def is_shape(name: str) -> bool:
 
 
 def choose_chart(names: Iterable[str], usual: dict[str, str] = BLAIR) -> dict[str, str]:
-    """Return the shapes by the names of one set that programs offer: the first that has all of them.
-
-    The usual one, Preston Blair's, Rhubarb's letters, Fleming and Dobbs', Meta's visemes, or the phones of CMU's
-    dictionary, with stress or without.
-    """
+    """Return the shapes by the names of the first set that has all: the usual one, or another of ``CHARTS``."""
     wanted = {name.strip().lower().removeprefix(PREFIX) for name in names}
     return next((chart for chart in (usual, *CHARTS) if wanted <= {*chart}), usual)
 

@@ -21,13 +21,10 @@ from lipmotion.types.edits import Locked
 
 Curve = NDArray[np.float64]
 
-PIN_REACH_S = 0.1
-"""A pin bends a curve within this time before and after it."""
-GAIN_EDGE_S = 0.1
-"""A gain grows and fades in this time."""
+PIN_REACH_S = 0.1  # a pin bends a curve within this time before and after it
+GAIN_EDGE_S = 0.1  # a gain grows and fades in this time
 SAME_GAP = 1e-6
-LOCK_EDGE_S = 0.05
-"""Motion goes over into a locked span, or one that is held, and out of it, in this time."""
+LOCK_EDGE_S = 0.05  # motion goes over into a locked span, or one that is held, and out of it, in this time
 
 
 def apply_curve_edits(
@@ -144,8 +141,7 @@ def mark_edited(motion: Motion, edits: Sequence[CurveEdit]) -> Motion:
 def weigh_edits(time_s: Curve, edits: Sequence[CurveEdit]) -> Curve:
     """Return how far some of the edits act at each time, 0 to 1 [shape=(T,)]."""
     ends = [(edit.time_s,) * 2 if isinstance(edit, Pin) else (edit.start_s, edit.end_s) for edit in edits]
-    none = np.zeros(len(time_s))
-    return np.max([none, *(weigh_span(time_s, *each, PIN_REACH_S) for each in ends)], axis=0)
+    return np.max([np.zeros(len(time_s)), *(weigh_span(time_s, *each, PIN_REACH_S) for each in ends)], axis=0)
 
 
 class MotionStretch(NamedTuple):
@@ -176,9 +172,7 @@ def _cut_stretch(generation: Generation, weight: Curve) -> MotionStretch:
 
 
 def apply_stretch(first: Generation, other: MotionStretch) -> Generation:
-    """Return a generation, and its variances, that goes over to other motion of the recording where its share is over
-    0.
-    """
+    """Return a generation, and its variances, that goes over to other motion as far as that takes its place."""
     values, variance = first.motion.values.astype(np.float64), np.array(first.variance)
     for ours, theirs in ((values[other.frames], other.values), (variance[other.frames], other.variance)):
         ours[:] = np.where(other.share == 1, theirs, ours + other.share * (theirs - ours))
@@ -186,9 +180,7 @@ def apply_stretch(first: Generation, other: MotionStretch) -> Generation:
 
 
 def weigh_span(time_s: Curve, start_s: float, end_s: float, edge_s: float, after_s: float | None = None) -> Curve:
-    """Return 1 within a span, falling to 0 within ``edge_s`` before it and ``after_s`` (None: the same) after it
-    [shape=(T,)].
-    """
+    """Return 1 within a span, falling to 0 in ``edge_s`` before it and ``after_s`` after it [shape=(T,)]."""
     outside = np.maximum(np.maximum((start_s - time_s) / edge_s, (time_s - end_s) / (after_s or edge_s)), 0)
     outside[outside < 1e-6] = 0.0  # the time of a frame is rounded
     weight: Curve = (1 + np.cos(np.pi * np.clip(outside, 0, 1))) / 2

@@ -18,7 +18,7 @@ import csv
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,35 +29,24 @@ from lipmotion.types.delivery import MOODS, MoodKey
 
 Curve = NDArray[np.float64]
 
-PREFIX: Final = "mood_"
-"""The channels of moods are called so, and the mood: ``mood_happy``, a weight."""
-CHANGE_S: Final = (0.25, 0.2)
-"""A mood begins to change so long before its time, and has changed so long after it."""
-
-
-class MoodRow(NamedTuple):
-    """An action unit of a mood: its intensity, 0 to 1, and where it is from."""
-
-    mood: str
-    unit: int
-    intensity: float
-    source: str
+PREFIX: Final = "mood_"  # the channels of moods are called so, and the mood: ``mood_happy``, a weight
+CHANGE_S: Final = (0.25, 0.2)  # a mood begins to change so long before its time, and has changed so long after it
 
 
 @cache
-def list_mood_rows() -> tuple[MoodRow, ...]:
-    """Return the rows of the table ``moods.csv``."""
+def list_mood_rows() -> list[dict[str, str]]:
+    """Return the rows of the table ``moods.csv``: mood, action unit, its intensity, and where it is from."""
     text = resources.files("lipmotion.articulation").joinpath("moods.csv").read_text(encoding="ascii")
-    return tuple(
-        MoodRow(row["mood"], int(row["action_unit"]), float(row["intensity"]), row["source"])
-        for row in csv.DictReader(text.splitlines())
-    )
+    return list(csv.DictReader(text.splitlines()))
 
 
 @cache
 def read_mood_table() -> Mapping[str, Mapping[int, float]]:
     """Return the intensity of the action units of each mood, 0 to 1."""
-    return {mood: {row.unit: row.intensity for row in list_mood_rows() if row.mood == mood} for mood in MOODS}
+    return {
+        mood: {int(r["action_unit"]): float(r["intensity"]) for r in list_mood_rows() if r["mood"] == mood}
+        for mood in MOODS
+    }
 
 
 def is_mood(channel: str) -> bool:
@@ -84,8 +73,7 @@ def with_moods(motion: Motion, keys: Sequence[MoodKey]) -> Motion:
         curves = {mood: curve + share * (wanted[mood] - curve) for mood, curve in curves.items()}
     added = [curve[:, None].astype(motion.values.dtype) for curve in curves.values()]
     values = np.concatenate([others.values, *added], axis=1)
-    channels = (*others.channels, *(Channel(PREFIX + mood, WEIGHT) for mood in curves))
-    return Motion(values, motion.rate_hz, channels)
+    return Motion(values, motion.rate_hz, (*others.channels, *(Channel(PREFIX + mood, WEIGHT) for mood in curves)))
 
 
 def list_action_units(motion: Motion, time_s: Curve | None = None) -> dict[int, Curve]:
@@ -101,6 +89,5 @@ def list_action_units(motion: Motion, time_s: Curve | None = None) -> dict[int, 
 
 def read_moods(motion: Motion) -> dict[str, Curve]:
     """Return how strong each mood of a motion is, 0 to 1, by its name [each shape=(T,)]."""
-    return {
-        name[len(PREFIX) :]: np.clip(motion[name].astype(np.float64), 0, 1) for name in motion.names if is_mood(name)
-    }
+    names = filter(is_mood, motion.names)
+    return {name[len(PREFIX) :]: np.clip(motion[name].astype(np.float64), 0, 1) for name in names}

@@ -17,14 +17,10 @@ from numpy.typing import NDArray
 
 from lipmotion.types import Motion
 
-UPPER_MIDDLE, LOWER_MIDDLE = 13, 14
-"""The middles of the inner lips; the channel ``opening`` is their distance."""
-RIGHT_CORNER, LEFT_CORNER = 61, 291
-"""The lip corners; the channel ``width`` is their distance."""
-INNER_CORNERS = (78, 308)
-"""Where the lips part, right and left."""
-UPPER_EDGE, LOWER_EDGE = 0, 17
-"""The middles of the outer lips; the channel ``outer`` is their distance."""
+UPPER_MIDDLE, LOWER_MIDDLE = 13, 14  # the middles of the inner lips; the channel ``opening`` is their distance
+RIGHT_CORNER, LEFT_CORNER = 61, 291  # the lip corners; the channel ``width`` is their distance
+INNER_CORNERS = (78, 308)  # where the lips part, right and left
+UPPER_EDGE, LOWER_EDGE = 0, 17  # the middles of the outer lips; the channel ``outer`` is their distance
 CHIN = 152
 FACING = ((13, 14), (82, 87), (312, 317), (81, 178), (311, 402))
 """Pairs of an upper and a lower point of the inner lips that touch when the mouth is closed."""
@@ -82,12 +78,11 @@ def build_mouth() -> MouthTemplate:
     text = resources.files("lipmotion.articulation").joinpath("lip_points.csv").read_text(encoding="ascii")
     rows = list(csv.DictReader(text.splitlines()))
     points = tuple(int(row["point"]) for row in rows)
-    kinds = {kind: np.array([kind in row["place"] for row in rows]) for kind in "upper lower corner jaw inner".split()}
     return MouthTemplate(
         points,
         np.array([[float(row[axis]) for axis in "xyz"] for row in rows]),
         mirrored=np.array([points.index(int(row["mirrored"])) for row in rows]),
-        **kinds,
+        **{kind: np.array([kind in row["place"] for row in rows]) for kind in "upper lower corner jaw inner".split()},
     )
 
 

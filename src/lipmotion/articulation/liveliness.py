@@ -28,31 +28,22 @@ from lipmotion.units import group_words, is_silent
 
 Curve = NDArray[np.float64]
 
-BLINK_S, MEAN_BLINK_S, MIN_BLINK_S = 0.24, 4.1, 1.1
-"""Duration of a blink; mean and least time between two."""
+BLINK_S, MEAN_BLINK_S, MIN_BLINK_S = 0.24, 4.1, 1.1  # duration of a blink; mean and least time between two
 FIRST_BLINK_S, SHUT_S = (1.0, 2.6), 0.08
 """Between these times the first blink comes; the eyes are shut so long after one begins."""
-NEAR_BORDER_S = 0.06
-"""Eyes are shut within this time of the border of a word, or in a pause."""
-PHRASE_PAUSE_S = 0.15
-"""A pause of at least this duration ends a phrase."""
-SACCADE_S = 0.05
-"""Duration of a movement of the eyes."""
-LARGEST_GLANCE = (0.2, 0.08)
-"""The furthest that the eyes turn to the side, and up or down, in radians."""
-BROW_RAISE = 0.03
-"""For a strong accent, in eye distances."""
-BROW_LEAD_S = 0.2
-"""Brows rise so long before an accent, as those of tracked talkers do (docs/expression.md)."""
-GAZE_COUNTER_SHARE = 0.85
-"""The eyes turn against the head by this part of its way, and so hold their target."""
+NEAR_BORDER_S = 0.06  # eyes are shut within this time of the border of a word, or in a pause
+PHRASE_PAUSE_S = 0.15  # a pause of at least this duration ends a phrase
+SACCADE_S = 0.05  # duration of a movement of the eyes
+LARGEST_GLANCE = (0.2, 0.08)  # the furthest that the eyes turn to the side, and up or down, in radians
+BROW_RAISE = 0.03  # for a strong accent, in eye distances
+BROW_LEAD_S = 0.2  # brows rise so long before an accent, as those of tracked talkers do (docs/expression.md)
+GAZE_COUNTER_SHARE = 0.85  # the eyes turn against the head by this part of its way, and so hold their target
 SWAY, SWAY_HZ = (0.034, 0.016, 0.018), (0.08, 0.45)
 """Deviations of the slow turning of the head in speech, to the side, up and down, to a shoulder, in radians; and the
 slowest and fastest parts of it."""
 NOD_RAD, PHRASE_FALL_RAD = 0.045, 0.03
 """How far the head nods with a strong accent, and how much lower a phrase ends than it begins, in radians."""
-STILL_SHARE = 0.35
-"""Share of the turning of the head that is left in silence."""
+STILL_SHARE = 0.35  # share of the turning of the head that is left in silence
 MOOD_TURNS = {
     53: (0, 0.1, 0),
     54: (0, -0.12, 0),
@@ -64,10 +55,8 @@ MOOD_TURNS = {
 """How far the head turns to its left, upwards and to its left shoulder for an action unit, in radians."""
 MOOD_WANDER, MOOD_ACCENT = 0.13, 0.3
 """How far a mood comes and goes in the upper face, and how much stronger it is in a strong accent."""
-MOOD_GAZE_RAD = 0.22
-"""How far the eyes look down for the action unit 64, in radians."""
-DROOPING_LIDS = 0.75
-"""How far the eyes are closed by the action unit 43."""
+MOOD_GAZE_RAD = 0.22  # how far the eyes look down for the action unit 64, in radians
+DROOPING_LIDS = 0.75  # how far the eyes are closed by the action unit 43
 UPPER_FACE_UNITS = {"inner": 1, "outer": 2, "lowered": 4, "wide": 5, "squint": 7, "cheek": 6, "sneer": 9}
 """The action units of the parts of ``UpperFace``."""
 
@@ -194,10 +183,7 @@ def find_phrases(units: Timeline[Unit], pause_s: float = PHRASE_PAUSE_S) -> list
 def blink_times(
     end_s: float, spoken: list[tuple[float, float]], words: list[tuple[float, float]], rng: np.random.Generator
 ) -> list[float]:
-    """Return when blinks begin, in seconds: at random, but rather at the end of a phrase where one is near.
-
-    spoken, words : starts and ends of phrases, and of words where they are known: no blink is in the middle of one
-    """
+    """Return when blinks begin, in seconds: at random, rather at the end of a phrase, never in the middle of a word."""
     ends = np.array([end for _, end in spoken] or [-np.inf])
     starts_s, ends_s = np.array(words).reshape(-1, 2).T
 

@@ -22,12 +22,9 @@ from lipmotion.types import Motion, Timeline, Unit
 
 Curve = NDArray[np.float64]
 
-TUCKED_GAP = (0.05, 0.072)
-"""Range of the gap while the lower lip is on the upper teeth, which are seen."""
-TONGUE_GAP = (0.05, 0.1)
-"""Range of the gap while the tongue is between the teeth."""
-PURSED_GAP = (0.04, 0.05)
-"""Range of the gap of w: a small hole."""
+TUCKED_GAP = (0.05, 0.072)  # range of the gap while the lower lip is on the upper teeth, which are seen
+TONGUE_GAP = (0.05, 0.1)  # range of the gap while the tongue is between the teeth
+PURSED_GAP = (0.04, 0.05)  # range of the gap of w: a small hole
 ROUND_GAPS, TEETH_GAPS = (0.06, 0.085), (0.045, 0.1)
 """Range of the gap of wholly protruded lips, and where both rows of teeth are seen."""
 ROUND_WIDTH, PURSED_WIDTH, SPREAD_WIDTH, OVAL_WIDTH = 0.89, 0.82, 1.05, 0.97
@@ -37,36 +34,27 @@ OVAL_GAPS = (0.06, 0.16)
 SPREAD_GAP, SPREAD_FROM = 0.1, 0.45
 """Wholly spread lips are apart by this gap and a third of what was measured beyond it: ee is not aa. Lips count as
 spread from the second value on."""
-WIDTH_REACH = 0.3
-"""Changes of width approach this."""
-LIP_SPEED = 2.0
-"""The gap changes no faster than this beside f and v, in eye distances a second (27 cm/s on a face)."""
-PRESS_S = 0.03
-"""Within this time from the first contact the lips are wholly pressed together."""
-TUCKED_CHIN_SHARE = 0.6
-"""Share of its drop by which the chin rises while the lower lip is on the teeth."""
+WIDTH_REACH = 0.3  # changes of width approach this
+LIP_SPEED = 2.0  # the gap changes no faster than this beside f and v, in eye distances a second (27 cm/s on a face)
+PRESS_S = 0.03  # within this time from the first contact the lips are wholly pressed together
+TUCKED_CHIN_SHARE = 0.6  # share of its drop by which the chin rises while the lower lip is on the teeth
 LARGEST_UPPER_RISE, UPPER_RATE = 0.058, 5.2
 """The upper lip rises by at most the first length (5 mm), for small gaps by the product of both times the gap."""
-JAW_SHARE = 0.85
-"""Share of the lower lip's way that the chin goes: the lip also turns outwards."""
+JAW_SHARE = 0.85  # share of the lower lip's way that the chin goes: the lip also turns outwards
 MIN_CHIN_DROP_SHARE = 0.75
 """Least drop of the chin, as a share of the usual one: trackers of small jaws, and models of them, show less."""
 ROUND_SHARE = 0.15
 """Share of a smile, of corners pulled down or apart, and of a raised lip that is left on wholly protruded lips."""
-PARTED_ROUND_SHARE = 0.75
-"""Share by which a mood parts protruded lips less than others."""
+PARTED_ROUND_SHARE = 0.75  # share by which a mood parts protruded lips less than others
 SMILE_WIDTH, STRETCH_WIDTH, DROPPED_WIDTH = 0.16, 0.16, -0.14
 """A full smile, lips stretched in fear, and lips over a dropped jaw are so much wider than at rest."""
 PARTED_GAP, DROPPED_GAP, RAISED_GAP = 0.05, 0.19, 0.05
 """Gaps of a mouth at rest that a mood parts, whose jaw it drops, and whose upper lip it raises."""
-TIGHT_FULLNESS = 0.3
-"""Tightened and pressed lips are thinner by this share."""
+TIGHT_FULLNESS = 0.3  # tightened and pressed lips are thinner by this share
 EXPRESSED = ("smile", "frown", "stretched", "upper_raise", "chin_raise", "tight")
 """What a mood does to the mouth beside its gap and its width."""
-CORNERS = (f"x_{RIGHT_CORNER}", f"x_{LEFT_CORNER}")
-"""Where the lip corners are across, in motion that has points."""
-DRAWN = ("opening", "width", "outer", "y_152", *GESTURES)
-"""The channels of motion that are used."""
+CORNERS = (f"x_{RIGHT_CORNER}", f"x_{LEFT_CORNER}")  # where the lip corners are across, in motion that has points
+DRAWN = ("opening", "width", "outer", "y_152", *GESTURES)  # the channels of motion that are used
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,9 +245,7 @@ def check_spoken(motion: Motion, fps: float) -> None:
         raise InputError("the motion has no frames; there is nothing to draw")
     for name in (*DRAWN, GAP):
         if name in motion.names and not np.isfinite(motion[name]).all():
-            raise InputError(
-                f"the channel {name!r} has values that are not finite; interpolate the missing frames first"
-            )
+            raise InputError(f"the channel {name!r} has values that are not finite; interpolate missing frames first")
 
 
 def weigh_upper(gap: Any) -> Any:

@@ -36,8 +36,7 @@ TIP_UP, TIP_OUT = 0.6, 1.0
 """Values of ``tongue``: the tip is at the ridge behind the upper teeth; the tip is between the teeth."""
 PURSED_PRESS = 0.5
 """Value of ``lip_press`` of w: with protruded lips, a hole that is almost closed. The round hole of uw has 0."""
-REACH = 4.0
-"""Dominance is 0 further than so many widths from a phone."""
+REACH = 4.0  # dominance is 0 further than so many widths from a phone
 
 
 class GestureTarget(NamedTuple):
@@ -59,9 +58,8 @@ Targets = Mapping[str, GestureTarget]
 
 def _steady(values: Mapping[str, float], dominance: float = 1.0, width_s: float = 0.035) -> dict[str, GestureTarget]:
     """Return the same target from begin to end for phones: ``{"t d n": 0.6}``."""
-    return {
-        p: GestureTarget(value, value, dominance, width_s) for phones, value in values.items() for p in phones.split()
-    }
+    pairs = [(phone, value) for phones, value in values.items() for phone in phones.split()]
+    return {phone: GestureTarget(value, value, dominance, width_s) for phone, value in pairs}
 
 
 _CLOSED = " ".join(LIP_CLOSING)
@@ -165,10 +163,8 @@ def with_gestures(motion: Motion, units: Timeline[Unit], names: Collection[str] 
     return Motion(values, motion.rate_hz, (*motion.channels, *(Channel(name, WEIGHT) for name in curves)))
 
 
-FADE_S = 0.06
-"""Longest half of a cross-fade between two phones, in seconds; of short phones, half of the phone."""
-MIN_FADE_S = 0.025
-"""Shortest half of a cross-fade: no curve jumps, and a phone under 50 ms is not wholly said."""
+FADE_S = 0.06  # longest half of a cross-fade between two phones, in seconds; of short phones, half of the phone
+MIN_FADE_S = 0.025  # shortest half of a cross-fade: no curve jumps, and a phone under 50 ms is not wholly said
 
 
 def crossfade_phones(units: Timeline[Unit], time_s: Curve, kind: Callable[[str], str]) -> dict[str, Curve]:

@@ -44,11 +44,7 @@ def find_rest_frames(motion: Motion, units: Timeline[Unit], opening: Curve | Non
 
 
 def add_rest(motion: Motion, units: Timeline[Unit], frames: slice) -> tuple[Motion, Timeline[Unit], slice]:
-    """Return frames of a motion with their phones, beside silence in the rest pose of the whole, and where they are.
-
-    So the rest pose of what is returned is that of the whole: there is more of that silence than of others in it. It
-    comes before the frames; after them, where they are the first ones, which nothing then smooths.
-    """
+    """Return frames of a motion with their phones, beside enough silence to have the same rest pose, and where."""
     values, rate_hz, rest = motion.values[frames], motion.rate_hz, find_rest_frames(motion, units)
     still = np.median(motion.values[rest], axis=0)
     count = int(np.count_nonzero(rest[frames])) + len(values) // 5 + 1
@@ -73,14 +69,12 @@ def measure_at_rest(name: str, curve: Curve, rest: NDArray[np.bool_]) -> float:
 
 REST, NATURAL = "rest", "natural"
 """Lips close softly in pauses; or they do in pauses what the model learned, as people who breathe and hold a sound."""
-MIN_PAUSE_S: Final = 0.25
-"""In shorter pauses the mouth goes on; silence at both ends of a line counts at any length."""
+MIN_PAUSE_S: Final = 0.25  # in shorter pauses the mouth goes on; silence at both ends of a line counts at any length
 CLOSING_S, OPENING_S = 0.2, 0.12
 """Lips take so long to close after a phrase, and begin to part so long before the next one; less in short pauses."""
 BREATH_GAP, BREATH_S = 0.03, 0.04
 """The lips are parted by this, in eye distances, for a breath, so long before a phrase that begins with open lips."""
-MIN_BREATH_S: Final = 0.4
-"""Pauses in which a breath is taken last at least so long."""
+MIN_BREATH_S: Final = 0.4  # pauses in which a breath is taken last at least so long
 INHALING_GAP = 0.05
 """The lips are parted by this for a breath that is detected, as GRID speaker 1 does (docs/expression.md)."""
 LAUGH_GAP, LAUGH_SHARE = 0.18, 0.4
@@ -88,8 +82,7 @@ LAUGH_GAP, LAUGH_SHARE = 0.18, 0.4
 CALL_S, EVENT_EDGE_S = 0.05, 0.08
 """How long a call of laughter opens the mouth (a standard deviation); laughter and breaths part the lips so long before
 and let them close so long after."""
-PINNED_S: Final = 0.15
-"""Within this time of a pin the motion stays as it is."""
+PINNED_S: Final = 0.15  # within this time of a pin the motion stays as it is
 
 
 def find_pauses(units: Timeline[Unit]) -> list[tuple[float, float, bool, bool]]:

@@ -21,6 +21,10 @@ from packaging.specifiers import SpecifierSet
 
 from lipmotion.errors import LipMotionError, MissingDependencyError, ModelFormatError
 from lipmotion.extensions import find_version, install_command, load_provided
+from lipmotion.pipeline.job import Job
+from lipmotion.pipeline.request import Outputs, Request
+from lipmotion.storage.sources import hash_file
+from lipmotion.types.delivery import Staging
 
 if TYPE_CHECKING:
     from lipmotion.types import Audio
@@ -64,10 +68,10 @@ class Requirement:
 
 def parse_requirement(text: str) -> Requirement:
     """Return a requirement from its text in the metadata of a package: ``NAME>=1 ; MARKER``."""
-    found = requirements.Requirement(text)
-    marker = str(found.marker or "")
+    parsed = requirements.Requirement(text)
+    marker = str(parsed.marker or "")
     extra = EXTRA.search(marker)
-    return Requirement(found.name, str(found.specifier), EXTRA.sub("", marker).strip(), extra[1] if extra else "")
+    return Requirement(parsed.name, str(parsed.specifier), EXTRA.sub("", marker).strip(), extra[1] if extra else "")
 
 
 def list_requirements() -> tuple[Requirement, ...]:
@@ -229,7 +233,6 @@ def _face_tracking() -> str:
 
 def _model() -> str:
     from lipmotion.pipeline.model import find_shipped, load_model, read_header
-    from lipmotion.storage.sources import hash_file
 
     path = find_shipped()
     try:
@@ -293,10 +296,7 @@ def _say_mama() -> Audio:
 def _main_path() -> str:
     """Animate the made-up speech, and write motion, cues and video; return what came out."""
     from lipmotion.formats.sound import write_sound
-    from lipmotion.pipeline.job import Job
-    from lipmotion.pipeline.request import Outputs, Request
     from lipmotion.storage.locks import open_temporary
-    from lipmotion.types.delivery import Staging
 
     with open_temporary() as folder:
         sound = folder / "mama.wav"

@@ -47,10 +47,10 @@ def _run(words: Sequence[str], stopper: Stopper, events: Events) -> int:
 
         command_line.run(words, stopper, events)
     except BrokenPipeError:  # the reader of standard output has gone
-        from lipmotion.cli.terminal.progress import discard_pending_output
+        from lipmotion.cli.terminal.progress import discard_pending
 
         stopper.settle()
-        discard_pending_output()
+        discard_pending(sys.stdout)
     except (Exception, SystemExit) as error:  # of argparse: help, version, a wrong command line; or of an extension
         is_exit = isinstance(error, SystemExit)
         if not is_exit:

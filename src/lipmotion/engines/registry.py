@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 from lipmotion.engines.base import Engine
 from lipmotion.errors import InputError
@@ -13,7 +13,7 @@ ENGINES: Registry[type[Engine[Any]]] = Registry(
     "engine",
     "lipmotion.engines",
     {
-        "trajectory": "lipmotion.engines.trajectory.engine:TrajectoryEngine",
+        "trajectory": "lipmotion.engines.trajectory.model:TrajectoryEngine",
         "coupled": "lipmotion.engines.coupled.engine:CoupledEngine",
         "joint": "lipmotion.engines.joint.engine:JointEngine",
         "selection": "lipmotion.engines.selection.engine:SelectionEngine",
@@ -36,10 +36,10 @@ def engine_named(name: str, configuration: Mapping[str, Any] | None = None, *, s
     >>> engine.name, engine.config.components, engine.config.states
     ('trajectory', 8, 5)
     """
-    chosen = ENGINES.load(name)
-    parsed = chosen.Config.stored if stored else chosen.Config.parsed
+    engine: Any = ENGINES.load(name)  # a dataclass with one field
+    parsed = engine.Config.stored if stored else engine.Config.parsed
     try:
-        return _create(chosen, parsed(configuration or {}))
+        return cast(Engine[Any], engine(parsed(configuration or {})))
     except InputError as error:
         raise InputError(f"engine {name!r}: {error}") from error
 
@@ -60,27 +60,22 @@ def create_engine(
     if preset is not None:
         name, options = _preset(name, preset)
     name = name or DEFAULT
-    chosen = ENGINES.load(name)
+    engine: Any = ENGINES.load(name)
     try:
         if units is not None:
-            options |= chosen.Config.values_of([f"units={units}"])
-        options |= chosen.Config.values_of(settings)
-        engine = _create(chosen, chosen.Config.parsed(options))
-        engine.config.check_files()
+            options |= engine.Config.values_of([f"units={units}"])
+        options |= engine.Config.values_of(settings)
+        config = engine.Config.parsed(options)
+        config.check_files()
+        return cast(Engine[Any], engine(config))
     except InputError as error:
         raise InputError(f"engine {name!r}: {error}") from error
-    return engine
 
 
 def find_visual(preset: str | None) -> str | None:
     """Return the kind of motion that a preset is trained on where none is asked for; None: the default of ``train``."""
     kinds = [ENGINES.load(engine).Config.preset_visual for engine in ENGINES.names]
     return next((kind[each] for kind in kinds for each in (preset or "").split() if each in kind), None)
-
-
-def _create(chosen: type[Engine[Any]], config: Any) -> Engine[Any]:
-    constructor: Any = chosen  # every engine is a dataclass with one field
-    return constructor(config)
 
 
 def _preset(name: str | None, preset: str) -> tuple[str, dict[str, Any]]:

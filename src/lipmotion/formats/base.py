@@ -9,9 +9,10 @@ import json
 import logging
 import re
 from array import array
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,6 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
-from lipmotion.formats.keys import Thinning
 from lipmotion.meshes.model.shape_names import is_known
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json
@@ -30,17 +30,13 @@ from lipmotion.types import EYE_DISTANCE, WEIGHT, Generation, Motion, Timeline, 
 LOG = logging.getLogger("lipmotion")
 Array = NDArray[np.float64]
 About = Mapping[str, str]
-LARGEST_MOTION_BYTES = 1 << 31
-"""Most bytes of a motion file: four hours of a hundred channels."""
+LARGEST_MOTION_BYTES = 1 << 31  # most bytes of a motion file: four hours of a hundred channels
 
-LARGEST_UNITS_BYTES = 1 << 28
-"""Most bytes of a file of units alone: phones of a day."""
+LARGEST_UNITS_BYTES = 1 << 28  # most bytes of a file of units alone: phones of a day
 
 
-LARGEST_WEIGHT = 4.0
-"""Largest weight of a blendshape that is read; captures and sculpted faces go a little over 1."""
-TOLERATED_WEIGHT = 0.1
-"""By how much weights may go beyond 0 to 1 without a warning."""
+LARGEST_WEIGHT = 4.0  # largest weight of a blendshape that is read; captures and sculpted faces go a little over 1
+TOLERATED_WEIGHT = 0.1  # by how much weights may go beyond 0 to 1 without a warning
 
 
 @dataclass(frozen=True)
@@ -93,9 +89,9 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
         "anim": "lipmotion.formats.game_engines:UNITY",
         "tres": "lipmotion.formats.game_engines:GODOT",
         "vmd": "lipmotion.formats.vmd:MOTION_FORMAT",
-        "bvh": "lipmotion.formats.bvh:MOTION_FORMAT",
+        "bvh": "lipmotion.formats.c3d:BVH",
         "a2f.json": "lipmotion.formats.motion_document:AUDIO2FACE",
-        "motion3.json": "lipmotion.formats.live2d:MOTION_FORMAT",
+        "motion3.json": "lipmotion.formats.game_engines:LIVE2D",
     },
 )
 """Motion formats by suffix, without the first dot; a suffix may have several parts, as ``livelink.csv``."""
@@ -120,8 +116,7 @@ OTHER_JSON = {
     b'"visemes":': ".tsv",
 }
 """What the beginnings of ``.json`` files hold, and the suffix of files that are read alike; the first counts."""
-JSON_HEAD = 1 << 16
-"""How many bytes of a ``.json`` are searched for them."""
+JSON_HEAD = 1 << 16  # how many bytes of a ``.json`` are searched for them
 CUE_LINE = re.compile(
     rb'^"?[0-9][0-9:.,]{0,20}"?(?:[;,]\s?"?[0-9:.,]{1,20}"?)?[;,]\s?"?([A-Za-z_0-9]{0,19}[A-Za-z])"?\s*$', re.M
 )
@@ -143,21 +138,17 @@ def list_read_suffixes() -> tuple[str, ...]:
     return (*suffixes, *(f".{name}" for name in MOTION_READERS.names))
 
 
-def find_suffix(path: Path) -> str:
+def find_suffix(path: Path, known: Collection[str] | None = None) -> str:
     """Return the suffix that chooses the motion format of a file, in lower case, with the dot; empty: there is none.
 
     The longest known suffix counts: ``take.livelink.csv`` has ``.livelink.csv``, ``take.1.csv`` ``.csv``.
+    known : suffixes; None: those of all motion formats
 
     >>> from pathlib import Path
     >>> find_suffix(Path("take.1.CSV")), find_suffix(Path("take.fbx"))
     ('.csv', '')
     """
-    return _longest(path, list_suffixes())
-
-
-def _longest(path: Path, known: Collection[str]) -> str:
-    """Return the longest ending of a file's name that is known, in lower case, with the dot; empty: there is none."""
-    suffixes = [suffix.lower() for suffix in path.suffixes]
+    suffixes, known = [suffix.lower() for suffix in path.suffixes], list_suffixes() if known is None else known
     endings = ("".join(suffixes[first:]) for first in range(len(suffixes)))
     return next((ending for ending in endings if ending in known), "")
 
@@ -208,7 +199,7 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     path = Path(path)
     check_kind(path, "motion file")
     named = _name_by_content(path)
-    other = _longest(named, [f".{name}" for name in MOTION_READERS.names])
+    other = find_suffix(named, [f".{name}" for name in MOTION_READERS.names])
     if find_suffix(named):
         read = _format_of(named).read
     else:
@@ -254,10 +245,7 @@ def _name_errors(path: Path) -> Iterator[None]:
 
 
 def read_units(path: Path) -> Timeline[Unit]:
-    """Return the units of a motion file, or of a ``.json`` that holds the member ``units`` without motion.
-
-    Raises InputError: as ``read_motion``.
-    """
+    """Return the units of a motion file, or of a ``.json`` of units alone. Raises InputError: as ``read_motion``."""
     read = _format_of(path).units if find_suffix(path) else None
     if read is not None and path.is_file() and path.stat().st_size <= LARGEST_UNITS_BYTES:
         with _name_errors(path):
@@ -297,12 +285,9 @@ def _suffix(path: Path) -> str:
     return repr(find_suffix(path) or path.suffix) if path.suffix else "a file without a suffix"
 
 
-DECIMALS = 5
-"""A hundred-thousandth of the distance between the eyes is about a micrometre."""
-BLOCK_ROWS = 2000
-"""Rows that are formatted at a time: the text of an hour of all channels would not fit in memory."""
-LARGEST_VALUE = 1e9
-"""Blocks with larger values are formatted number by number: their digits do not fit in 64 bits."""
+DECIMALS = 5  # a hundred-thousandth of the distance between the eyes is about a micrometre
+BLOCK_ROWS = 2000  # rows that are formatted at a time: the text of an hour of all channels would not fit in memory
+LARGEST_VALUE = 1e9  # blocks with larger values are formatted number by number: their digits do not fit in 64 bits
 
 
 def format_rows(values: NDArray[np.floating[Any]]) -> Iterator[str]:
@@ -338,13 +323,11 @@ def format_rows(values: NDArray[np.floating[Any]]) -> Iterator[str]:
         yield from text[used].tobytes().decode("ascii").splitlines()
 
 
-def write_json(
-    path: Path, before: Mapping[str, Any], rows_of: str, values: NDArray[Any], after: Mapping[str, Any]
-) -> None:
-    """Write one JSON object: members ``before``, one called ``rows_of`` with a row a line, members ``after``."""
+def write_json(path: Path, before: Mapping[str, Any], key: str, values: NDArray[Any], after: Mapping[str, Any]) -> None:
+    """Write one JSON object: members ``before``, one called ``key`` with a row a line, members ``after``."""
     start, end = as_json(before, ensure_ascii=False)[:-1], as_json(after, ensure_ascii=False)[1:]
     with path.open("w", encoding="utf-8") as file:
-        file.write(f'{start}, "{rows_of}": [\n')
+        file.write(f'{start}, "{key}": [\n')
         for number, row in enumerate(format_rows(values)):
             file.write(f",\n[{row}]" if number else f"[{row}]")
         file.write(f"\n]{', ' if after else ''}{end}\n")
@@ -360,10 +343,8 @@ def list_key_frames(time_s: Array, values: Array, tolerance: float, *, stepped: 
     return Thinning(tolerance).choose(time_s, values[:, None]).tolist()
 
 
-MAX_ITEMS = 1 << 20
-"""Most items of a list that has not one item a frame."""
-MAX_ROWS = 1 << 22
-"""Most rows of numbers: eleven hours of frames of 10 ms."""
+MAX_ITEMS = 1 << 20  # most items of a list that has not one item a frame
+MAX_ROWS = 1 << 22  # most rows of numbers: eleven hours of frames of 10 ms
 _BLANK = re.compile(r"\s*")
 _DECODER = json.JSONDecoder()
 
@@ -384,45 +365,32 @@ def read_members(text: str, rows_of: str, numbers_of: str = "") -> dict[str, Any
         if text[at : at + 1] != "[":
             members[name], at = _DECODER.raw_decode(text, at)
             return at
-        if name == rows_of:
-            members[name], at = _read_rows(text, at)
-            return at
-        items: list[Any] = []
-        members[name], limit = items, MAX_ROWS if name == numbers_of else MAX_ITEMS
+        items, numbers, widths = list[Any](), array("d"), array("q")
+        limit = MAX_ROWS if name in (rows_of, numbers_of) else MAX_ITEMS
 
         def take_item(at: int) -> int:
             value, at = _DECODER.raw_decode(text, at)
-            items.append(value)
-            if len(items) > limit:
+            if name != rows_of:
+                items.append(value)
+            elif not value or not isinstance(value, list) or len(value) != (widths[0] if widths else len(value)):
+                row = f"row {len(widths) + 1} of the values"
+                raise ValueError(f"{row} is not a list of as many numbers as the first: no shape")
+            else:
+                numbers.extend(value)
+                widths.append(len(value))
+            if max(len(items), len(widths)) > limit:
                 raise ValueError(f"a list of more than {limit} items")
             return at
 
-        return _read_each(text, at, "[]", take_item)
+        at = _read_each(text, at, "[]", take_item)
+        table = np.array(numbers, np.float64).reshape(len(widths), widths[0] if widths else 0)
+        members[name] = table if name == rows_of else items
+        return at
 
     end = find_next_at(text, _read_each(text, find_next_at(text, 0), "{}", take))
     if end < len(text):
         raise json.JSONDecodeError("Extra data", text, end)
     return members
-
-
-def _read_rows(text: str, at: int) -> tuple[NDArray[np.float64], int]:
-    """Return the rows of a list of lists of numbers [shape=(T, P)], and the position of its end."""
-    numbers, widths = array("d"), array("q")
-
-    def take_row(at: int) -> int:
-        values, at = _DECODER.raw_decode(text, at)
-        if not values or not isinstance(values, list) or len(values) != (widths[0] if widths else len(values)):
-            row = f"row {len(widths) + 1} of the values"
-            raise ValueError(f"{row} is not a list of as many numbers as the first: no shape")
-        numbers.extend(values)
-        widths.append(len(values))
-        if len(widths) > MAX_ROWS:
-            raise ValueError(f"more than {MAX_ROWS} rows of values")
-        return at
-
-    end = _read_each(text, at, "[]", take_row)
-    table = np.array(numbers, np.float64)
-    return table.reshape(len(widths), widths[0] if widths else 0), end
 
 
 def _read_each(text: str, at: int, brackets: str, take: Callable[[int], int]) -> int:
@@ -448,3 +416,74 @@ def _pass(text: str, at: int, character: str) -> int:
     if text[at : at + 1] != character:
         raise json.JSONDecodeError(f"Expecting {character!r}", text, at)
     return at + 1
+
+
+JUMP_S = 1e-3  # how long a change at once may last, in seconds
+
+
+@dataclass(frozen=True)
+class Thinning:
+    """Which keys may be left out.
+
+    tolerance : of every curve, between the keys that are kept, in the curves' own unit; 0: none is left out
+    closed_s  : seconds at which the lips close: the keys there are kept, and those beside them
+    """
+
+    tolerance: float = 0.0
+    closed_s: tuple[float, ...] = ()
+
+    def choose(self, time_s: Array, rows: Array) -> NDArray[np.intp]:
+        """Return the numbers of the keys that stay, rising, the first and the last among them.
+
+        time_s : seconds, rising [shape=(K,)]; rows : of curves [shape=(K, N)]
+        Source: Ramer 1972; Douglas & Peucker 1973. Deviations: the distance is that of the values, not of the points;
+        all curves have the same keys, so the largest distance of any counts.
+        """
+        if not self.tolerance or len(rows) < 3:
+            return np.arange(len(rows))
+        is_kept = np.zeros(len(rows), bool)
+        is_kept[[0, -1]] = True
+        for each_s in self.closed_s:
+            nearest = int(np.abs(time_s - each_s).argmin())
+            is_kept[max(nearest - 1, 0) : nearest + 2] = True
+        open_ends = list(pairwise(np.flatnonzero(is_kept).tolist()))
+        while open_ends:
+            first, last = open_ends.pop()
+            if last - first < 2:
+                continue
+            those_s, those = time_s[first : last + 1], rows[first : last + 1]
+            share = (those_s - those_s[0]) / (those_s[-1] - those_s[0])
+            errors = np.abs(those - those[0] - share[:, None] * (those[-1] - those[0])).max(axis=1, initial=0.0)
+            errors[[0, -1]] = 0.0
+            if errors.max() > self.tolerance:
+                middle = first + int(errors.argmax())
+                is_kept[middle] = True
+                open_ends += [(first, middle), (middle, last)]
+        return np.flatnonzero(is_kept)
+
+
+EVERY_KEY = Thinning()
+
+
+def with_jumps(time_s: Array, rows: Array, stepped: Sequence[bool]) -> tuple[Array, Array]:
+    """Return evenly spaced keys with those added that let some curves change at once between straight lines.
+
+    time_s  : seconds [shape=(T,)]; rows : of curves [shape=(T, N)]; stepped : which curves change at once [N values]
+    An added key is ``JUMP_S`` before a change, or a tenth of the time between two keys, whichever is shorter.
+    """
+    chosen = np.array(stepped, bool)
+    changed = np.flatnonzero(np.diff(rows[:, chosen], axis=0).any(axis=1)) + 1
+    if not len(changed):
+        return time_s, rows
+    step_s = float(time_s[1] - time_s[0])
+    early_s = min(JUMP_S, step_s / 10)
+    before = rows[changed] - early_s / step_s * (rows[changed] - rows[changed - 1])
+    before[:, chosen] = rows[changed - 1][:, chosen]
+    return np.insert(time_s, changed, time_s[changed] - early_s), np.insert(rows, changed, before, axis=0)
+
+
+def place_keys(time_s: Array, rows: Array, stepped: Sequence[bool], thinning: Thinning) -> tuple[Array, Array]:
+    """Return times and values of keys, with straight lines between, of even rows; arguments as of ``with_jumps``."""
+    all_s, all_rows = with_jumps(time_s, rows, stepped)
+    chosen = thinning.choose(all_s, all_rows)
+    return all_s[chosen], all_rows[chosen]

@@ -27,10 +27,8 @@ FOLDER = "lipmotion_blender"
 ADDON_PLACES = (Path(__file__).parents[1] / "addons", Path(__file__).parents[3] / "extras")
 """Where the add-on's folder is: in an installed package; in a copy of the repository."""
 MODULES = ("__init__.py", "curves.py", "keying.py", "panel.py", "takes.py")
-OLDEST = (1980, 1, 1, 0, 0, 0)
-"""The time of every file in an archive: the same version gives the same bytes."""
-NO_VERSION = "0.0.0"
-"""The version where lipmotion is not installed; Blender takes three numbers."""
+OLDEST = (1980, 1, 1, 0, 0, 0)  # the time of every file in an archive: the same version gives the same bytes
+NO_VERSION = "0.0.0"  # the version where lipmotion is not installed; Blender takes three numbers
 MANIFEST = """schema_version = "1.0.0"
 id = "lipmotion"
 version = "{version}"
@@ -91,11 +89,7 @@ def read_addon(names: Iterable[str]) -> dict[str, str]:
 
 
 def write_addon(program: str, path: str | Path) -> None:
-    """Write the add-on for a program to a file.
-
-    program : ``blender``: a ``.zip`` that Blender 4.2 and later installs from disk
-    Raises ExportError: no such program, another suffix, or the file cannot be written.
-    """
+    """Write the add-on for Blender 4.2 and later to a ``.zip``. Raises ExportError: another program or suffix."""
     path = Path(path)
     if program not in PROGRAMS:
         raise ExportError(f"there is no add-on for {program!r}, required one of {', '.join(PROGRAMS)}")

@@ -1,11 +1,18 @@
 """``.c3d``: lip and jaw points as markers of motion capture, other channels as analog curves; and markers as motion.
+``.bvh``: lip and jaw points as joints that shift, for programs that know motion capture of bodies.
 
-A file has labelled points, a place of each in every frame, and analog channels. Written points are in millimetres, with
-two markers more, ``EYE_L`` and ``EYE_R``, at the outer eye corners. Markers of others become channels ``x_NAME``,
-``y_NAME``, ``z_NAME`` in the head's frame (``markers``). Files of Intel's, DEC's and MIPS' processors are read, points
-as fractions or as scaled whole numbers; written are Intel's.
+A ``.c3d`` has labelled points, a place of each in every frame, and analog channels. Written points are in millimetres,
+with two markers more, ``EYE_L`` and ``EYE_R``, at the outer eye corners. Markers of others become channels ``x_NAME``,
+``y_NAME``, ``z_NAME`` in the head's frame: eye distances, origin between the outer eye corners, x to the speaker's
+left, y up, z out of the face. Files of Intel's, DEC's and MIPS' processors are read, points as fractions or as
+scaled whole numbers; written are Intel's.
 
-Source: The C3D File Format, A Technical User Guide (Motion Lab Systems); c3d.org, "The C3D frame count".
+A ``.bvh`` is in centimetres, y up, z out of the face: an eye distance is ``CENTIMETRES``. Every point is a joint
+``LIP_13`` or ``JAW_152`` under the joint ``head``, with three channels of its place; offsets are the rest pose. It is
+not read back.
+
+Source: The C3D File Format, A Technical User Guide (Motion Lab Systems); c3d.org, "The C3D frame count"; M. Meredith
+and S. Maddock, "Motion Capture File Formats Explained", 2001.
 """
 
 from __future__ import annotations
@@ -23,9 +30,9 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import CHIN, build_mouth
 from lipmotion.errors import ExportError, InputError, shorten
-from lipmotion.formats.base import MotionFormat
-from lipmotion.formats.markers import MARKER, MILLIMETRES, measure_markers, to_head_frame
+from lipmotion.formats.base import MotionFormat, format_rows
 from lipmotion.formats.steady_rate import exact_rate
+from lipmotion.meshes.fitting.blendshape_motion import move_points
 from lipmotion.types import EYE_DISTANCE, Channel, Generation, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
@@ -38,8 +45,7 @@ INTEL_PROCESSOR, DEC_PROCESSOR, MIPS_PROCESSOR = 84, 85, 86
 """The processor types: the lowest byte first; the same, but fractions of DEC's own kind; the highest byte first."""
 MAX_FRAMES, OVERFLOW = 65_535, 65_536
 """Most frames that the header can number, and after how many it may begin at 0 again."""
-LARGEST_FILE_BYTES = 1 << 28
-"""Most bytes of a file that is read."""
+LARGEST_FILE_BYTES = 1 << 28  # most bytes of a file that is read
 MAX_POINTS, MAX_ANALOG_CHANNELS = 2_000, 5_000
 LONGEST_LABEL_CHARACTERS = 64
 LOG = logging.getLogger("lipmotion")
@@ -119,15 +125,12 @@ def read_c3d(path: Path) -> C3dFile:
         places = placed[..., :3] * (1.0 if scale < 0 else scale)
         unseen = (placed[..., 3] < 0) | ~np.isfinite(places).all(axis=2) | (places == 0).all(axis=2)
         places[unseen] = np.nan
-        labels = [
-            label for name in ("POINT.LABELS", "POINT.LABELS2", "POINT.LABELS3") for label in _texts(parameters, name)
-        ]
+        labels = [label for n in ("", "2", "3") for label in _texts(parameters, f"POINT.LABELS{n}")]
         labels = [*labels, *(f"point{number}" for number in range(len(labels) + 1, points + 1))][:points]
         curves = rows[:, points * 4 :] if samples == 1 else rows[:, :0]
-        names = [*_texts(parameters, "ANALOG.LABELS"), *(f"analog{n}" for n in range(curves.shape[1]))][
-            : curves.shape[1]
-        ]
-        units = [*_texts(parameters, "ANALOG.UNITS"), *[""] * curves.shape[1]][: curves.shape[1]]
+        count = curves.shape[1]
+        names = [*_texts(parameters, "ANALOG.LABELS"), *(f"analog{n}" for n in range(count))][:count]
+        units = [*_texts(parameters, "ANALOG.UNITS"), *[""] * count][:count]
         unit, software = (next(iter(_texts(parameters, name)), "") for name in ("POINT.UNITS", "MANUFACTURER.SOFTWARE"))
         exact_hz = exact_rate(float(f"{rate_hz:.7g}"), 5e-6)
         return C3dFile(tuple(labels), places, exact_hz, unit or "mm", software, curves, tuple(names), tuple(units))
@@ -346,3 +349,138 @@ def _points(motion: Motion) -> list[int]:
 
 
 MOTION_FORMAT = MotionFormat(write, read, check)
+
+
+MILLIMETRES = 90.0  # the distance between the outer eye corners of a grown person, where markers do not show it
+UNITS = {"mm": 1.0, "millimeter": 1.0, "cm": 10.0, "m": 1000.0, "meter": 1000.0, "in": 25.4, "inch": 25.4}
+"""Units of length in millimetres."""
+LEFT_EYE = frozenset(("eyel", "leye", "lefteye", "eyeleft", "exl", "lex", "leyeouter", "eyelouter", "lefteyeouter"))
+"""Names of a marker at the outer corner of the speaker's left eye: without capitals, spaces and underscores."""
+RIGHT_EYE = frozenset(("eyer", "reye", "righteye", "eyeright", "exr", "rex", "reyeouter", "eyerouter", "righteyeouter"))
+RIGID = ("forehead", "head", "nasion", "nosebridge", "glabella", "temple", "ear", "mastoid", "fhd", "lfhd", "rfhd")
+"""Beginnings of names, after a side, of other markers that do not move against the skull."""
+MIN_RIGID_MARKERS = 3
+LARGEST_COORDINATE = 1e6
+MIN_DISTANCE = 1e-3  # least distance of the eye corners in any frame, as a share of the median
+
+DISTANCES = {"opening": (13, 14), "width": (61, 291), "outer": (0, 17)}  # channels that are the distance of two points
+MARKER = re.compile(r"(?:lip|jaw|p|point)[ _]?(\d{1,3})$", re.IGNORECASE)
+"""The name of a marker at a point of the face mesh."""
+
+
+def measure_markers(markers: Mapping[str, Array], rate_hz: float) -> Motion:
+    """Return the channels of markers in the head's frame, and the distances between those of the lips."""
+    points = {int(match[1]): places for name, places in markers.items() if (match := MARKER.match(name))}
+    names = [str(int(match[1])) if (match := MARKER.match(name)) else name for name in markers]
+    curves = {
+        name: np.linalg.norm(points[one] - points[other], axis=1)
+        for name, (one, other) in DISTANCES.items()
+        if one in points and other in points
+    }
+    curves |= {
+        f"{axis}_{name}": places[:, column]
+        for name, places in zip(names, markers.values(), strict=True)
+        for column, axis in enumerate("xyz")
+    }
+    return Motion(np.stack(list(curves.values()), axis=1), rate_hz, tuple(map(Channel, curves)))
+
+
+def to_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
+    """Return the places of all markers but the rigid ones, in the head's frame [each shape=(T, 3)].
+
+    markers : places by name, in ``unit`` [each shape=(T, 3)]
+    With both eye corners and a further rigid marker, movements of the head are taken out whole. With the eye corners
+    alone, its shifts and the turns that they show. Without them, places are as they were recorded, and an eye distance
+    is ``MILLIMETRES``. Axes are turned by quarters, so that the mouth is below the eyes.
+    Raises InputError: an unknown unit, or eye corners in one place.
+    """
+    millimetres = UNITS.get(unit.strip().lower().removesuffix("s"))
+    if millimetres is None:
+        raise InputError(f"its unit of length is {unit[:20]!r}, required one of {', '.join(UNITS)}")
+    if max(float(np.abs(places).max()) for places in markers.values()) > LARGEST_COORDINATE:
+        raise InputError(f"a marker is further than {LARGEST_COORDINATE:g} {unit} away; export the capture again")
+    left, right = (next((name for name in markers if _plain(name) in names), "") for names in (LEFT_EYE, RIGHT_EYE))
+    if not (left and right):
+        return {name: places * millimetres / MILLIMETRES for name, places in markers.items()}
+    rigid = [left, right]
+    for name in markers:
+        plain = _plain(name)
+        beginnings = (plain.removeprefix("left").removeprefix("right"), plain[1:])
+        if name not in rigid and any(each.startswith(RIGID) for each in beginnings):
+            rigid.append(name)
+    moving = [name for name in markers if name not in rigid]
+    if not moving:
+        raise InputError(f"all markers are those of the head ({', '.join(rigid[:6])}), required markers of the mouth")
+    places = np.stack([markers[name] for name in (*rigid, *moving)], axis=1)
+    if len(rigid) >= MIN_RIGID_MARKERS:
+        places = _steady(places, len(rigid))
+    centre = places[:, :2].mean(axis=1, keepdims=True)
+    across = places[:, 0] - places[:, 1]
+    distances = np.linalg.norm(across, axis=1)
+    distance = float(np.median(distances))
+    if not distances.min() > MIN_DISTANCE * max(distance, MIN_DISTANCE):
+        raise InputError("the two eye corners are in one place, required the outer corners of both eyes")
+    if len(rigid) >= MIN_RIGID_MARKERS:
+        across = np.broadcast_to(across.mean(axis=0), across.shape)
+    turned = np.einsum("tij,tnj->tni", _find_rotations(across), (places - centre)) / distance
+    _, y, z = turned[:, len(rigid) :].mean(axis=(0, 1))  # about x by quarters, so that the mouth is below the eyes
+    cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[round(float(np.arctan2(z, -y) / (np.pi / 2))) % 4]
+    turned = turned @ np.array([[1.0, 0, 0], [0, cosine, -sine], [0, sine, cosine]]).T
+    return {name: turned[:, len(rigid) + column] for column, name in enumerate(moving)}
+
+
+def _plain(name: str) -> str:
+    return "".join(letter for letter in name.lower() if letter.isalnum())
+
+
+def _steady(places: Array, rigid: int) -> Array:
+    """Return places [shape=(T, N, 3)] moved so that the first ones lie as in the first frame (Kabsch 1976)."""
+    centres = places[:, :rigid].mean(axis=1, keepdims=True)
+    covariances = np.einsum("tni,nj->tij", places[:, :rigid] - centres, places[0, :rigid] - centres[0])
+    left, _, right = np.linalg.svd(covariances)
+    signs = np.ones((len(places), 3))
+    signs[:, 2] = np.sign(np.linalg.det(left @ right))
+    rotations = np.einsum("tji,tj,tkj->tik", right, signs, left)
+    return np.einsum("tij,tnj->tni", rotations, (places - centres)) + centres[0]
+
+
+def _find_rotations(across: Array) -> Array:
+    """Return the least rotations that turn directions into the axis x [shape=(T, 3, 3)]; half turns are about y."""
+    x, y, z = (across / np.linalg.norm(across, axis=1, keepdims=True)).T
+    opposite = x < -1 + 1e-9
+    share = 1 / np.where(opposite, 1.0, 1 + x)
+    rows = np.array([[x, y, z], [-y, 1 - y * y * share, -y * z * share], [-z, -y * z * share, 1 - z * z * share]])
+    rotations = np.moveaxis(rows, 2, 0)
+    rotations[opposite] = np.diag([-1.0, 1.0, -1.0])
+    return rotations
+
+
+CENTIMETRES = 9.0
+ROOT_CHANNELS = "Xposition Yposition Zposition Zrotation Xrotation Yrotation"
+POINT_CHANNELS = "Xposition Yposition Zposition"
+
+
+def check_bvh(motion: Motion) -> None:
+    """Raise ExportError if motion has no opening, or no frames."""
+    if "opening" not in motion.names or not len(motion.values):
+        raise ExportError("the motion has no channel 'opening' to place lip points by, or no frame; write .json, .csv")
+
+
+def write_bvh(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write the points; of motion with distances alone, they move as mouths do (``fitting.blendshape_motion``)."""
+    motion, template = generation.motion, build_mouth()
+    moved = move_points(motion, generation.units).expressed
+    offsets = [" ".join(f"{value:.5f}" for value in place * CENTIMETRES) for place in template.places]
+    lines = ["HIERARCHY", "ROOT head", "{", "  OFFSET 0 0 0", f"  CHANNELS 6 {ROOT_CHANNELS}"]
+    for point, jaw, offset in zip(template.points, template.jaw, offsets, strict=True):
+        lines += [f"  JOINT {'JAW' if jaw else 'LIP'}_{point}", "  {", f"    OFFSET {offset}"]
+        lines += [f"    CHANNELS 3 {POINT_CHANNELS}", "    End Site", "    {", "      OFFSET 0 0 0.5", "    }", "  }"]
+    lines += ["}", "MOTION", f"Frames: {len(motion.values)}", f"Frame Time: {1 / motion.rate_hz:.9f}"]
+    places = ((template.places + moved) * CENTIMETRES).reshape(len(moved), -1)
+    with path.open("w", encoding="ascii", newline="\n") as file:
+        file.write("\n".join(lines) + "\n")
+        for row in format_rows(places):
+            file.write(f"0 0 0 0 0 0 {row.replace(',', ' ')}\n")
+
+
+BVH = MotionFormat(write_bvh, check=check_bvh, mouth=True)

@@ -21,8 +21,7 @@ from lipmotion.formats.steady_rate import exact_rate
 from lipmotion.meshes.fitting.blendshape_motion import move_points
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 
-FAP = "fap"
-"""The unit of these channels: whole steps of a 1024th of a distance in the face, of either sign."""
+FAP = "fap"  # the unit of these channels: whole steps of a 1024th of a distance in the face, of either sign
 STEPS = 1024.0
 MOUTH_TO_NOSE = 0.30
 """The distance from the nose to where the lips meet (MNS0) in a mean face, in eye distances; the width of the mouth
@@ -58,8 +57,7 @@ PARAMETERS = (
 """The parameters of lips and jaw that points show; left and right are the speaker's own."""
 VERSION = "2.1"
 COUNT = 68
-MANY_VALUES = {1: 4, 2: 6}
-"""How many values the first two parameters have."""
+MANY_VALUES = {1: 4, 2: 6}  # how many values the first two parameters have
 NAMES = {number: f"fap{number}_{name}" for number, name, *_ in PARAMETERS}
 LARGEST_VALUE = 1_000_000
 LONGEST_LINE = 1 << 14
@@ -89,10 +87,7 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
-    """Return the parameters of a file, and an empty timeline; where one is not given, it keeps its value.
-
-    Raises InputError: not such a file, cut short, or values that no face has.
-    """
+    """Return the parameters of a file; one that is not given keeps its value. Raises InputError: not such a file."""
     try:
         with path.open(encoding="utf-8-sig") as file:
             lines = (line for line in iter(partial(file.readline, LONGEST_LINE), "") if line[0] != "#" and line.strip())
@@ -145,8 +140,7 @@ def move_faps(motion: Motion, units: Timeline[Unit]) -> Motion:
         np.rint(sign * moved[:, template.row(point), axis] / lengths[unit] * STEPS)
         for _, _, point, axis, sign, unit in PARAMETERS
     ]
-    channels = tuple(Channel(name, FAP) for name in NAMES.values())
-    return Motion(np.stack(columns, axis=1), motion.rate_hz, channels)
+    return Motion(np.stack(columns, axis=1), motion.rate_hz, tuple(Channel(name, FAP) for name in NAMES.values()))
 
 
 MOTION_FORMAT = MotionFormat(write, read, check, curves="fap")

@@ -1,14 +1,15 @@
-"""Animations of blendshapes for game engines, as text.
+"""Animations for game engines, as text.
 
 ``.anim``: an animation clip of Unity that moves blendshapes of the object that it is put on.
 ``.tres``: an Animation of Godot 4 that moves the blend shapes of the root node of its AnimationPlayer.
+``.motion3.json``: a motion of Live2D Cubism: how far the mouth is open, and whether it is wide or puckered.
 
 Unity's AnimationClip is as Unity 2019 and later serialise it (YAML), serializedVersion 6; weights go to 100. Godot's
 tracks (``TYPE_BLEND_SHAPE``) have keys of time, transition and value, one after another.
-In both, everything is linear between keys. Keys that a straight line between others replaces are left out, and held
-poses change at once (constant tangents; ``interp`` 0).
+In all, everything is linear between keys. Keys that a straight line between others replaces are left out, and held
+poses change at once (constant tangents; ``interp`` 0; segments of type 2).
 
-Source: files of Unity; Godot 4, scene/resources/animation.cpp.
+Source: files of Unity; Godot 4, scene/resources/animation.cpp; Live2D, Cubism specifications, "motion3.json".
 """
 
 from __future__ import annotations
@@ -21,28 +22,27 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, build_mouth
+from lipmotion.articulation.mouth import find_mouth
 from lipmotion.errors import ExportError
 from lipmotion.formats.base import MotionFormat, list_key_frames
+from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
+from lipmotion.storage.json_text import as_json
 from lipmotion.types import WEIGHT, Generation, Motion
 
 Array = NDArray[np.float64]
-FULL = 100.0
-"""A blendshape's weight in Unity where it has its whole effect."""
+FULL = 100.0  # a blendshape's weight in Unity where it has its whole effect
 UNITY_TOLERANCE, GODOT_TOLERANCE = 0.01, 1e-4
 """Largest error of a curve through the keys that are kept, of 100 and of 1."""
 UNITY_DECIMALS, GODOT_DECIMALS = 4, 5
-RENDERER = 137
-"""The class of SkinnedMeshRenderer."""
+RENDERER = 137  # the class of SkinnedMeshRenderer
 LINEAR, CONSTANT = 69, 103
 """Modes of the tangents of a key in Unity: straight, or held until the next key, on both sides."""
 RATE_HZ = 60.0
-_PLAIN = re.compile(r"[A-Za-z][\w.]*", re.ASCII)
-"""Names that need no quotes."""
+_PLAIN = re.compile(r"[A-Za-z][\w.]*", re.ASCII)  # names that need no quotes
 _EMPTY = ("m_RotationCurves", "m_CompressedRotationCurves", "m_EulerCurves", "m_PositionCurves", "m_ScaleCurves")
-NODE = "."
-"""The node whose blend shapes move in Godot: the root node of the AnimationPlayer itself."""
-FORBIDDEN = frozenset('".:@/%')
-"""Characters that no name in a path of Godot has."""
+NODE = "."  # the node whose blend shapes move in Godot: the root node of the AnimationPlayer itself
+FORBIDDEN = frozenset('".:@/%')  # characters that no name in a path of Godot has
 
 
 def _list_weights(motion: Motion) -> list[str]:
@@ -124,9 +124,7 @@ def check_godot(motion: Motion) -> None:
     for name in names:
         if FORBIDDEN & {*name}:
             letters = '. : @ / % "'
-            raise ExportError(
-                f"the blendshape {name!r} has one of the letters {letters}, which Godot replaces; rename it"
-            )
+            raise ExportError(f"the blendshape {name!r} has one of the letters {letters}, which Godot replaces: rename")
 
 
 def write_godot(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
@@ -138,9 +136,8 @@ def write_godot(path: Path, generation: Generation, _source: Mapping[str, str], 
     ]
     for number, name in enumerate(_list_weights(motion)):
         times_s, values, steps = _choose_keys(generation, name, 1.0, GODOT_DECIMALS, GODOT_TOLERANCE)
-        keys = ", ".join(
-            f"{time_s:.6g}, 1, {value:.{GODOT_DECIMALS}g}" for time_s, value in zip(times_s, values, strict=True)
-        )
+        rows = zip(times_s, values, strict=True)
+        keys = ", ".join(f"{time_s:.6g}, 1, {value:.{GODOT_DECIMALS}g}" for time_s, value in rows)
         track = f"tracks/{number}"
         lines += [
             *(f'{track}/type = "blend_shape"', f"{track}/imported = false", f"{track}/enabled = true"),
@@ -153,3 +150,76 @@ def write_godot(path: Path, generation: Generation, _source: Mapping[str, str], 
 
 UNITY = MotionFormat(write_unity, check=check_unity, curves="face", rate_hz=RATE_HZ, other_curves=True, keyed=True)
 GODOT = MotionFormat(write_godot, check=check_godot, curves="face", other_curves=True, keyed=True)
+
+
+OPEN, FORM = "ParamMouthOpenY", "ParamMouthForm"
+"""Live2D's standard parameters: 0 closed to 1 open; −1 puckered to 1 wide, as in a smile."""
+FULL_GAP = 0.20  # the gap between the lips that is drawn as wholly open, eye distances
+LARGEST_WIDENING, LARGEST_NARROWING = 0.08, 0.12
+"""By how much the mouth is wider and narrower than at rest where the form is 1 and −1, eye distances."""
+FPS = 30.0  # the frame rate that the file states; its keys are at any time
+TOLERANCE = 0.005  # largest error of a curve through the keys that are kept
+DECIMALS = 3
+LINEAR_SEGMENT, STEPPED_SEGMENT = 0, 2  # types of segments: straight to the next key, or held until it
+SHOWING = frozenset(("opening", "jawOpen"))  # channels that say how far the mouth is open
+
+
+def check_live2d(motion: Motion) -> None:
+    """Raise ExportError if motion shows neither an opening nor an open jaw, or has fewer than two frames."""
+    if not SHOWING & set(motion.names) or len(motion.values) < 2:
+        raise ExportError("the motion has no channel 'opening' or 'jawOpen', or no two frames; write .json or .csv")
+
+
+def write_live2d(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write two curves, and how many keys they have."""
+    motion = generation.motion
+    curves, points, steps = [], 0, bool(SHOWING & set(generation.stepped))
+    for name, values in ((OPEN, measure_mouth_open(generation)), (FORM, measure_mouth_form(generation))):
+        rounded = np.round(values, DECIMALS) + 0.0
+        frames = list_key_frames(motion.time_s, rounded, TOLERANCE, stepped=steps)
+        keys = [(round(float(motion.time_s[frame]), 6), float(rounded[frame])) for frame in frames]
+        segments: list[float] = [*keys[0]]
+        for time_s, value in keys[1:]:
+            segments += [STEPPED_SEGMENT if steps else LINEAR_SEGMENT, time_s, value]
+        curves.append({"Target": "Parameter", "Id": name, "Segments": segments})
+        points += len(keys)
+    meta = {
+        **{"Duration": round(float(motion.time_s[-1]), 6), "Fps": FPS, "Loop": False, "AreBeziersRestricted": True},
+        **{"CurveCount": len(curves), "TotalSegmentCount": points - len(curves), "TotalPointCount": points},
+        **{"UserDataCount": 0, "TotalUserDataSize": 0},
+    }
+    path.write_text(as_json({"Version": 3, "Meta": meta, "Curves": curves}) + "\n", encoding="utf-8")
+
+
+def measure_mouth_open(generation: Generation) -> Array:
+    """Return how far the mouth is open, 0 to 1 [shape=(T,)]; 0 where the lips touch."""
+    motion = generation.motion
+    if "opening" in motion.names:
+        gap = find_mouth(motion, generation.units).gap
+    else:
+        gap = _sum_effects(motion, arkit_mouth().gap)
+    return np.clip(gap / FULL_GAP, 0.0, 1.0)
+
+
+def measure_mouth_form(generation: Generation) -> Array:
+    """Return the form of the mouth, −1 puckered to 1 wide [shape=(T,)]; 0 at rest, and where no channel says it."""
+    motion = generation.motion
+    if "opening" in motion.names and "width" in motion.names:
+        wider = (find_mouth(motion, generation.units).width - 1) * build_mouth().width
+    else:
+        template = build_mouth()
+        corners = arkit_mouth().moved[:, [template.row(LEFT_CORNER), template.row(RIGHT_CORNER)], 0]
+        wider = _sum_effects(motion, corners[:, 0] - corners[:, 1])
+    return np.clip(wider / np.where(wider > 0, LARGEST_WIDENING, LARGEST_NARROWING), -1.0, 1.0)
+
+
+def _sum_effects(motion: Motion, effects: Array) -> Array:
+    """Return the sum of the effects of blendshapes by their weights [shape=(T,)]."""
+    total = np.zeros(len(motion.values))
+    for name, effect in zip(arkit_mouth().known, effects, strict=True):
+        if name in motion.names:
+            total += effect * motion[name]
+    return total
+
+
+LIVE2D = MotionFormat(write_live2d, check=check_live2d, mouth=True)

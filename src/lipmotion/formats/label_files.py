@@ -30,7 +30,7 @@ from lipmotion.formats.label_tiers import (
     with_words,
 )
 from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, parse_subtitles, write_subtitles
-from lipmotion.formats.textgrid import is_textgrid, parse_interval_tiers, write_textgrid
+from lipmotion.formats.textgrid import TEXTGRID, parse_interval_tiers, write_textgrid
 from lipmotion.formats.timed_lines import parse_line_tiers
 from lipmotion.formats.xml_labels import READ_ROOTS, ROOT, read_xml_tiers
 from lipmotion.printable import is_line
@@ -49,23 +49,18 @@ FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".eaf", ".lab", ".wrd", *RECOGNIS
 may be recognised last."""
 FOR_PHONES = (".TextGrid", ".textgrid", ".eaf", ".lab", ".phn", ".txt")
 """Suffixes in whose files phones are searched, in order."""
-LARGEST_LABELS = 1 << 24
-"""Most bytes of a label file: labels of a day."""
-MOTION = re.compile(r'"lipmotion\.motion"|time_s,')
-"""How our own motion files begin: a quick answer for large ones."""
+LARGEST_LABELS = 1 << 24  # most bytes of a label file: labels of a day
+MOTION = re.compile(r'"lipmotion\.motion"|time_s,')  # how our own motion files begin: a quick answer for large ones
 MASTER = re.compile(r'^(?:#!MLF!#|\.)[ \t\r]*\n"(.*)"[ \t\r]*$', re.MULTILINE)
 """The line before each recording's labels in HTK's master label files, and that with its name."""
-MARKUP = re.compile(r'\{\\rtf|<[!?a-zA-Z]|\{\s*"|\[\s*[\[{]')
-"""The start of RTF, HTML, XML and JSON."""
+MARKUP = re.compile(r'\{\\rtf|<[!?a-zA-Z]|\{\s*"|\[\s*[\[{]')  # the start of RTF, HTML, XML and JSON
 CHAPTER = ".trans.txt"
 """Ends the name of the transcripts of a chapter in LibriSpeech: in each line the name of a recording, and its words."""
-JUDGED_LINES = 1000
-"""Lines of a text that are judged for whether they hold times."""
+JUDGED_LINES = 1000  # lines of a text that are judged for whether they hold times
 NUMBERED = re.compile(r"[-+.]?\d|nan\b|[-+]?inf\b")
 TIME = re.compile(r"(?<![\w.])(?:\d*\.\d+|\d{5,})(?![\w.])")
 """Seconds with decimals, or a number that counts parts of a second."""
-NAMED_TIERS = 12
-"""Most names in a message."""
+NAMED_TIERS = 12  # most names in a message
 _WRITERS = {".TextGrid": write_textgrid, ".vtt": write_subtitles, ".srt": write_subtitles}
 LABEL_SUFFIXES = tuple(_WRITERS)
 """Suffixes of label files that are written, as programs write them; capitals do not matter."""
@@ -212,12 +207,26 @@ def holds_timings(path: Path) -> bool:
 
 
 def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
-    """Return the labels of a file; None for JSON of another kind, if that is expected, else an error."""
+    """Return the labels of a file; None for JSON of another kind, if expected. Raises InputError: none is of speech."""
     text = "" if unknown_json and path.stat().st_size > LARGEST_LABELS else _read_text(path)
-    tiers = _read_tiers(text, str(path)) if is_json(text) or not unknown_json else None
-    if tiers is not None or unknown_json:
-        return None if tiers is None else _choose_labels(tiers, str(path))
-    return _read_plain(text, path)
+    where = str(path)
+    tiers = _read_tiers(text, where) if is_json(text) or not unknown_json else None
+    if tiers is None:
+        return None if unknown_json else _read_plain(text, path)
+    chosen = _choose_tiers(tiers, where)
+    phones = _choose_phones(chosen, where)
+    transcript = _choose_transcript(tiers, where)
+    if not phones:
+        if transcript is None and any(tier.role != LINES and tier.labels for tier in chosen):
+            raise InputError(f"{where}: {chosen[0].name} holds no word; remove the file if the words are not known")
+        return RecordingLabels(transcript)
+    several = len(phones) > 1
+    timeline = merge_timelines([read_phone_tier(t, _choose_words(t, chosen), where, with_gaps=several) for t in phones])
+    unknown_s = [span.start_s for span in timeline if span.label.unit == UNKNOWN_PHONES]
+    if unknown_s:
+        what = f"the phones of {len(unknown_s)} stretches of speech are not known, the first at {unknown_s[0]:.2f} s"
+        LOG.warning("%s: %s; its phones are left out, and its words are aligned", where, what)
+    return RecordingLabels(transcript, None if unknown_s else timeline)
 
 
 def _read_plain(text: str, path: Path) -> RecordingLabels:
@@ -234,32 +243,10 @@ def _read_plain(text: str, path: Path) -> RecordingLabels:
     return RecordingLabels(TimedTranscript((TranscriptLine(tuple(map(TimedWord, require_tokens(text)))),), tags))
 
 
-def _choose_labels(tiers: list[LabelTier], where: str) -> RecordingLabels:
-    """Return the words and the phones of tiers. Raises InputError: there are labels, and none is a phone or a word."""
-    chosen = _choose_tiers(tiers, where)
-    phones = _choose_phones(chosen, where)
-    transcript = _choose_transcript(tiers, where)
-    if not phones:
-        if transcript is None and any(tier.role != LINES and tier.labels for tier in chosen):
-            raise InputError(f"{where}: {chosen[0].name} holds no word; remove the file if the words are not known")
-        return RecordingLabels(transcript)
-    several = len(phones) > 1
-    timeline = merge_timelines(
-        [read_phone_tier(tier, _choose_words(tier, chosen), where, with_gaps=several) for tier in phones]
-    )
-    unknown = [span for span in timeline if span.label.unit == UNKNOWN_PHONES]
-    if unknown:
-        what = (
-            f"the phones of {len(unknown)} stretches of speech are not known, the first at {unknown[0].start_s:.2f} s"
-        )
-        LOG.warning("%s: %s; its phones are left out, and its words are aligned", where, what)
-    return RecordingLabels(transcript, None if unknown else timeline)
-
-
 def _read_tiers(text: str, where: str) -> list[LabelTier] | None:
     """Return the tiers of a text whose form has times, in the phones of the inventory; None of any other text."""
     try:
-        if is_textgrid(text):
+        if TEXTGRID.match(text):
             tiers: list[LabelTier] | None = parse_seconds(parse_interval_tiers(text, where), where)
         elif (root := ROOT.match(text)) and root[1] in READ_ROOTS:
             tiers = read_xml_tiers(text, where)
@@ -349,7 +336,7 @@ def read_plain_text(path: Path) -> str:
     Raises InputError: no such file, larger than ``LARGEST_TRANSCRIPT_BYTES``, not UTF-8 text, or labels in time.
     """
     text = read_text_file(path, "transcript", LARGEST_TRANSCRIPT_BYTES)
-    if is_textgrid(text) or parse_line_tiers(text, str(path)) is not None:
+    if TEXTGRID.match(text) or parse_line_tiers(text, str(path)) is not None:
         raise InputError(f"{path}: holds labels in time, required the words alone; write them into a text file")
     _check_no_labels(text, str(path))
     return text
@@ -407,10 +394,7 @@ def _read_text(path: Path, kind: str = "label") -> str:
 
 
 def write_labels(path: Path, units: Timeline[Unit]) -> None:
-    """Write phones and words in time in the format of the suffix.
-
-    Raises ExportError: a label that is no line of text, or the file cannot be written.
-    """
+    """Write phones and words in time in the format of the suffix. Raises ExportError: a label that is no line."""
     for label in [span.label for span in units]:
         if not is_line(label.phone + label.unit + label.word):
             what = "a line end, a control character or half a character"

@@ -44,15 +44,12 @@ from lipmotion.units.text_normalisation import find_words
 
 LOG = logging.getLogger("lipmotion")
 _TEXT = values.text(1 << 20)
-Objects = list[tuple[str, dict[str, Any]]]
-"""Objects of a file, each with its place, for messages."""
-LATEST_S = 1e6
-"""Times beyond eleven days are an error, or in another unit."""
+Objects = list[tuple[str, dict[str, Any]]]  # objects of a file, each with its place, for messages
+LATEST_S = 1e6  # times beyond eleven days are an error, or in another unit
 SINGLE_SHARE, LONGEST_JUDGED, DEEPEST = 0.9, 1000, 12
 """A list is one of words where so many of its texts are single ones; letters of a text that are judged; how deep lists
 are searched in lists."""
-ROUNDING_S = 1.0
-"""An end may be so much before its start; recognisers write that at the edges of their windows."""
+ROUNDING_S = 1.0  # an end may be so much before its start; recognisers write that at the edges of their windows
 
 
 class Times(NamedTuple):
@@ -113,8 +110,7 @@ LINE_LISTS = (
     "paragraphs result results transcript alternatives nbest data response output prediction predictions documents"
 ).split()
 """Members in which lines or further lists are searched, in this order."""
-MISSED = "not-found-in-audio"
-"""Gentle's case of a word that is not said."""
+MISSED = "not-found-in-audio"  # Gentle's case of a word that is not said
 KINDS = ("type", "boundarytype", "kind", "category")
 NOT_SAID = re.compile(r"punct|spac|audio.?event|sentence|ssml|pause|silence|non.?speech|blank|laugh|noise|session")
 """Kinds of items that are no words."""
@@ -128,13 +124,11 @@ POLLY_VISEMES = {
 AZURE_VISEMES = "sil ah aa ao eh er ih uw ow aw oy ay hh r l s sh th f t k p".split()
 """A phone with the mouth of each of Azure's 22 visemes, by its number."""
 KOKORO_LETTERS = {"A": "eɪ", "I": "aɪ", "W": "aʊ", "Y": "ɔɪ", "O": "oʊ", "Q": "əʊ", "ᵊ": "ə", "T": "ɾ"}
-KOKORO_FRAMES_PER_S = 40
-"""Durations are in frames of 600 samples at 24 kHz."""
+KOKORO_FRAMES_PER_S = 40  # durations are in frames of 600 samples at 24 kHz
 EVENTS = ("audiooffset", "time", "timeseconds")
 """Starts of events, which last to the next one: of Azure, of Amazon Polly, of Google's marks."""
 POLLY_KINDS = ("sentence", "word", "viseme", "ssml")
-MARK = re.compile(r"[^\W\d_]+(?:['’-][^\W\d_]+)*[.,;:!?]?")
-"""A name of one of Google's marks that is the word after it."""
+MARK = re.compile(r"[^\W\d_]+(?:['’-][^\W\d_]+)*[.,;:!?]?")  # a name of one of Google's marks that is the word after it
 COLUMNS = (
     ("characters", ("characters", "characterstarttimesseconds", "characterendtimesseconds"), 1),  # ElevenLabs
     ("characters", ("chars", "charstarttimesms", "chardurationsms"), 1000),  # ElevenLabs' web socket
@@ -183,10 +177,7 @@ def is_json(text: str) -> bool:
 
 
 def parse_service_tiers(text: str, where: str) -> list[LabelTier] | None:
-    """Return the tiers of words, lines and phones of the JSON of a service; None: it has none.
-
-    Raises InputError: it is damaged (with its line), a symbol in it is not known, or a time is none.
-    """
+    """Return the tiers of the JSON of a service; None: it has none. Raises InputError: it is damaged, with its line."""
     numbered = [(f"line {line}", value) for line, value in _decode_documents(text, where)]
     if len(numbered) == 1 and isinstance(numbered[0][1], list):
         if numbered[0][1] and all(map(_name_stamp, numbered[0][1])):
@@ -407,16 +398,18 @@ def _read_gentle_phones(item: dict[str, Any], word: Row, place: str, where: str)
 
 
 def _find_speaker(item: dict[str, Any]) -> str:
-    return next(
-        (str(item[name]) for name in SPEAKERS if isinstance(item.get(name), str | int) and item[name] != ""), ""
-    )
+    names = (item[name] for name in SPEAKERS if isinstance(item.get(name), str | int))
+    return next((str(name) for name in names if name != ""), "")
 
 
 def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     """Return lists of items in time: phones, and a tier of each speaker, of words if nearly all are, else of lines."""
     rows = [row for place, item in objects for row in _find_rows(item, place if len(objects) > 1 else "", where)]
     check_count(len(rows), where)
-    _warn_of_missed_words(objects, where)
+    words = [word for _, item in objects if isinstance(item.get("words"), list) for word in item["words"]]
+    missed = sum(isinstance(word, dict) and word.get("case") == MISSED for word in words)
+    if missed and where:
+        LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
     timed = any(row.parts or not math.isnan(row.start) or row.times.end for row in rows)
     if not timed and not (rows and all(item.keys() <= TEXT_ALONE for _, item in objects)):
         lists = [item[name] for _, item in objects for name in (*LINE_LISTS, *WORD_LISTS) if name in item]
@@ -427,28 +420,16 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     if any(len({part.speaker for part in row.parts}) > 1 for row in spoken):
         spoken = [part for row in spoken for part in row.parts or (row,)]
     tiers = [LabelTier(PHONE_LABELS, tuple(_scale_rows(phones, PHONE_LABELS, where)), PHONE_LABELS)] if phones else []
-    return tiers + _group_by_speaker(spoken, where, may_be_phones=not phones)
-
-
-def _warn_of_missed_words(objects: Objects, where: str) -> None:
-    words = [word for _, item in objects if isinstance(item.get("words"), list) for word in item["words"]]
-    missed = sum(isinstance(word, dict) and word.get("case") == MISSED for word in words)
-    if missed and where:
-        LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
-
-
-def _group_by_speaker(rows: list[Row], where: str, *, may_be_phones: bool) -> list[LabelTier]:
-    """Return a tier of each speaker: of words if nearly all rows are single ones, else of lines, or of phones."""
-    counts = [len(find_words(extract_spoken_text(row.text[:LONGEST_JUDGED]))) for row in rows]
-    check_word_count(sum(counts) + sum(len(row.parts) for row in rows), where)
-    single = sum(row.role == WORDS or count < 2 for row, count in zip(rows, counts, strict=True))
-    role = WORDS if single >= SINGLE_SHARE * len(rows) and not any(row.parts for row in rows) else LINES
+    counts = [len(find_words(extract_spoken_text(each.text[:LONGEST_JUDGED]))) for each in spoken]
+    check_word_count(sum(counts) + sum(len(each.parts) for each in spoken), where)
+    single = sum(each.role == WORDS or count < 2 for each, count in zip(spoken, counts, strict=True))
+    role = WORDS if single >= SINGLE_SHARE * len(spoken) and not any(each.parts for each in spoken) else LINES
     by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
-    for row, label in zip(rows, _scale_rows(rows, role, where), strict=True):
-        by_speaker[row.speaker or (row.parts[0].speaker if row.parts else "")].append(label)
-    if may_be_phones and all(row.role != WORDS and not row.parts for row in rows):
+    for each, label in zip(spoken, _scale_rows(spoken, role, where), strict=True):
+        by_speaker[each.speaker or (each.parts[0].speaker if each.parts else "")].append(label)
+    if not phones and all(each.role != WORDS and not each.parts for each in spoken):
         role = PHONE_LABELS if all(holds_phones(LabelTier("", tuple(each))) for each in by_speaker.values()) else role
-    return [LabelTier(who or role, tuple(labels), role, who) for who, labels in by_speaker.items()]
+    return tiers + [LabelTier(who or role, tuple(labels), role, who) for who, labels in by_speaker.items()]
 
 
 def _drop_first_pass(rows: list[Row]) -> list[Row]:

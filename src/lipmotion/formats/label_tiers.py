@@ -9,6 +9,7 @@ from bisect import bisect_left, bisect_right
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from statistics import median
 
 from lipmotion.errors import InputError, shorten
@@ -29,8 +30,7 @@ from lipmotion.units.spoken_text import (
 )
 
 LOG = logging.getLogger("lipmotion")
-EARLIEST_S = -1.0
-"""A time up to this is none; recognisers write others a little before 0, where the sound begins."""
+EARLIEST_S = -1.0  # a time up to this is none; recognisers write others a little before 0, where the sound begins
 WORDS, LINES, PHONE_LABELS, RECOGNISED_PHONES, OTHER = "words", "lines", "phones", "recognised", "other"
 """What a tier holds. ``OTHER`` is neither said nor seen: pronunciations, syllables, translations, notes."""
 ROLES = (
@@ -43,25 +43,19 @@ ROLES = (
 aligners, of ELAN's users, in some languages."""
 SPEAKERS = (r"(?P<speaker>.+?)\s*[-_/:]\s*(?:words?|phones?|phonemes?)", r"[^@]+@(?P<speaker>.+)")
 """Names of tiers that hold a speaker's, too: ``ann - words`` of the Montreal Forced Aligner, ``words@ANN`` of ELAN."""
-PHONES_SHARE = 0.75
-"""A tier of which this share of the labels are phones is one of phones; the other labels are errors."""
+PHONES_SHARE = 0.75  # a tier of which this share of the labels are phones is one of phones; the other labels are errors
 SHARED_TIME = 0.5
 """Tiers of unknown kinds of which so much is at the same time are versions of one text; else they are of speakers."""
-ROUNDING_S = 1e-3
-"""Times may differ by this much: they are written with three digits or more."""
-WHOLE_WORD_S = 0.03
-"""A span of unknown phones whose ends are so near to those of a word is all of it."""
+ROUNDING_S = 1e-3  # times may differ by this much: they are written with three digits or more
+WHOLE_WORD_S = 0.03  # a span of unknown phones whose ends are so near to those of a word is all of it
 IN_CONTEXT = re.compile(r"\A[^-+]*-([^-+]+)\+.*\Z")
 """Triphones and full-context labels of HTK and HTS: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
-GLOTTAL_STOP = "q"
-"""TIMIT's: a sound of the throat, with any lips."""
+GLOTTAL_STOP = "q"  # TIMIT's: a sound of the throat, with any lips
 STATE_NUMBER = re.compile(r"\[(\d{1,9})\]$")
 RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")
 """A phone or unit, and its confidence from 0 to 1."""
-MAX_LABELS = 250_000
-"""Most labels of a file: phones of five hours of speech."""
-TYPICAL_PHONE_S, TYPICAL_WORD_S = 0.08, 0.3
-"""How long a phone, and a word, alone or of a line, last."""
+MAX_LABELS = 250_000  # most labels of a file: phones of five hours of speech
+TYPICAL_PHONE_S, TYPICAL_WORD_S = 0.08, 0.3  # how long a phone, and a word, alone or of a line, last
 UNIT_LIMITS = ((150, 1), (6000, 1000), (300_000, 0), (3_200_000, 1_000_000))
 """If they last up to so many times as long as is typical, so many units are a second; 0: these are samples."""
 WHOLE_LIMITS = ((15, 1), (70, 0), (220, 100), *UNIT_LIMITS[1:])
@@ -71,8 +65,7 @@ UNITS = {1: "seconds", 100: "hundredths of a second", 1000: "milliseconds", 1_00
 UNITS[TICKS_PER_S] = "ticks of 100 ns"
 PAUSES = frozenset((" ", *' ^ $ . , ; : ! ? — – … ( ) “ ” " « » ¡ ¿'.split(" ")))
 """Symbols of voices for silence: padding, blanks and punctuation, which last as long as the pause."""
-LONGEST_SYMBOL = 40
-"""Most letters of a phone with all its marks."""
+LONGEST_SYMBOL = 40  # most letters of a phone with all its marks
 WITH_GLIDES = {"aj": "aɪ", "ej": "eɪ", "ɔj": "ɔɪ", "ow": "oʊ", "əw": "əʊ", "aw": "aʊ", "ɐ": "ʌ"}
 """Diphthongs, and the vowel of "cut", as the Montreal Forced Aligner writes them."""
 
@@ -158,11 +151,7 @@ def find_time_unit(spans: Sequence[tuple[float, float, str]], role: str, where: 
 
 
 def parse_seconds(tiers: list[LabelTier], where: str, per_s: float = 0) -> list[LabelTier]:
-    """Return tiers in seconds; times of which a word would last a minute are in the unit that they seem to be.
-
-    per_s : how many of their units are a second; 0: how long words last decides
-    Raises InputError: as ``find_time_unit``.
-    """
+    """Return tiers in seconds; ``per_s``: units in one, 0: as words last. Raises InputError: as ``find_time_unit``."""
     spoken = [tier for tier in tiers if tier.role != OTHER]
     judged = next((tier for tier in spoken if tier.role == WORDS or holds_phones(tier)), next(iter(spoken), None))
     spans = [(label.start_s, label.end_s, label.text) for label in judged.labels] if judged else []
@@ -196,9 +185,8 @@ def split_speakers(tiers: list[LabelTier]) -> list[LabelTier]:
     if any(map(holds_phones, unknown)) or not all(spoken):
         return tiers
     first, others = spoken[0], [label for labels in spoken[1:] for label in labels]
-    shared_s = sum(
-        max(min(a.end_s, b.end_s) - max(a.start_s, b.start_s), 0.0) for a in first[:1000] for b in others[:1000]
-    )
+    pairs = product(first[:1000], others[:1000])
+    shared_s = sum(max(min(a.end_s, b.end_s) - max(a.start_s, b.start_s), 0.0) for a, b in pairs)
     spoken_s = sum(min(label.end_s - label.start_s, 60.0) for label in first[:1000])
     if shared_s > SHARED_TIME * spoken_s:
         return tiers
@@ -206,10 +194,7 @@ def split_speakers(tiers: list[LabelTier]) -> list[LabelTier]:
 
 
 def with_words(units: Timeline[Unit], labels: Sequence[TimedLabel]) -> Timeline[Unit]:
-    """Return phones in time, each with the word of a tier in which its middle lies; silence has none.
-
-    A span of unknown phones has a word only if it is all of it.
-    """
+    """Return phones in time with the words in which their middles lie; unknown phones only where they are all of it."""
     timed = [label for label in labels if not math.isnan(label.start_s + label.end_s)]
     starts_s = [label.start_s for label in timed]
     spans: list[Span[Unit]] = []
@@ -262,9 +247,8 @@ def _find_times(label: TimedLabel, where: str) -> tuple[float | None, float | No
 
 
 def _reverse(label: TimedLabel, where: str) -> InputError:
-    return InputError(
-        f"{where}: {label.position} ends at {label.end_s:g} s, before its start at {label.start_s:g} s; correct it"
-    )
+    ends = f"{label.position} ends at {label.end_s:g} s, before its start"
+    return InputError(f"{where}: {ends} at {label.start_s:g} s; correct it")
 
 
 def read_phone_tier(
@@ -408,14 +392,10 @@ def split_ipa(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
 
 
 def map_to_inventory(tier: LabelTier, where: str) -> LabelTier:
-    """Return a tier; one of phones in the phones of the inventory, from those, X-SAMPA or IPA, as they make sense.
-
-    Raises InputError: as ``split_ipa``.
-    """
+    """Return a tier; phones in X-SAMPA or IPA become those of the inventory. Raises InputError: as ``split_ipa``."""
     labels = tier.labels if tier.role == PHONE_LABELS else ()
-    spoken = [
-        WITH_GLIDES.get(label.text, label.text) for label in labels if classify_label(label.text) is SpokenAs.SPEECH
-    ]
+    texts = [label.text for label in labels if classify_label(label.text) is SpokenAs.SPEECH]
+    spoken = [WITH_GLIDES.get(text, text) for text in texts]
     known = sum(to_phone(text) is not None for text in spoken)
     in_xsampa = sum(bool(xsampa_to_ipa(text)) for text in spoken)
     if known == len(spoken) or (known >= PHONES_SHARE * len(spoken) and in_xsampa < len(spoken)):

@@ -44,8 +44,7 @@ from lipmotion.units import RECOGNISED, RecognisedPhone, list_recognised_phones,
 
 FORMAT = "lipmotion.motion"
 VERSION = 1
-FRAMES_AT_ONCE = 4096
-"""Frames whose variance is computed at once."""
+FRAMES_AT_ONCE = 4096  # frames whose variance is computed at once
 
 
 def _describe(
@@ -72,10 +71,7 @@ def list_unit_rows(units: Timeline[Unit]) -> dict[str, Any]:
 
 
 def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:
-    """Return the motion and the units of a document and its values.
-
-    Raises InputError: not a motion document, a newer version, or members that are missing or do not fit.
-    """
+    """Return motion and units of a document and its values. Raises InputError: another one, newer, or damaged."""
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise InputError(f"not a motion document: its 'format' must be {FORMAT!r}")
     version = document.get("version")
@@ -154,10 +150,7 @@ def read_json(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
 
 def read_json_units(path: Path) -> Timeline[Unit] | None:
-    """Return the units of a file with the member ``units`` and neither values nor channels; None of any other file.
-
-    Raises InputError: units that are damaged.
-    """
+    """Return the units of a file without values and channels; None of another one. Raises InputError: damaged units."""
     try:
         text = path.read_text(encoding="utf-8-sig")
         document = json.loads(text) if '"values"' not in text and text.lstrip().startswith("{") else None
@@ -216,10 +209,8 @@ NPZ = MotionFormat(write_npz, read_npz)
 
 LOG = logging.getLogger("lipmotion")
 NAMES, WEIGHTS, RATE = "facsNames", "weightMat", "exportFps"
-SOUND, POSES, FRAMES = "trackPath", "numPoses", "numFrames"
-"""The members of a file."""
-RATE_HZ = 60.0
-"""What Audio2Face exports by default."""
+SOUND, POSES, FRAMES = "trackPath", "numPoses", "numFrames"  # the members of a file
+RATE_HZ = 60.0  # what Audio2Face exports by default
 AZURE_NAMES, AZURE_HZ = (*ARKIT_52, "headRoll", "leftEyeRoll", "rightEyeRoll"), 60.0
 """The 55 facial positions of Azure in their order, and how many frames of them make a second."""
 TICKS_PER_S = 1e7
@@ -242,10 +233,7 @@ def write_audio2face(path: Path, generation: Generation, source: Mapping[str, st
 
 
 def read_audio2face(path: Path) -> tuple[Motion, Timeline[Unit]]:
-    """Return the weights of a file, and an empty timeline. Joints, where a file has them, are passed over.
-
-    Raises InputError: not such a file, no rate, or rows that do not fit the names.
-    """
+    """Return the weights of a file; joints are passed over. Raises InputError: no rate, or rows of another length."""
     with catch_errors("the file of Audio2Face"):
         document = read_members(path.read_text(encoding="utf-8-sig"), WEIGHTS)
         checked = _AUDIO2FACE(document)
@@ -255,9 +243,7 @@ def read_audio2face(path: Path) -> tuple[Motion, Timeline[Unit]]:
         LOG.warning("%s: %d frames are stated, %d are there", path, stated, len(rows))
     if not isinstance(rows, np.ndarray) or rows.ndim != 2 or rows.shape[1] != len(names):
         shape = rows.shape if isinstance(rows, np.ndarray) else "no"
-        raise InputError(
-            f"the member {WEIGHTS!r} has {shape} rows and columns, required a column for each of {NAMES!r}"
-        )
+        raise InputError(f"the member {WEIGHTS!r} has {shape} rows and columns, required a column for each of {NAMES}")
     return Motion(rows, rate_hz, tuple(Channel(name, WEIGHT) for name in names)), Timeline(())
 
 
@@ -268,10 +254,7 @@ AUDIO2FACE = MotionFormat(write_audio2face, read_audio2face, curves="face", rate
 
 
 def read_frames(path: Path) -> tuple[Motion, Timeline[Unit]]:
-    """Return the weights of a file, and an empty timeline.
-
-    Raises InputError: not JSON, none of these forms, frames without a time, or pieces that contradict one another.
-    """
+    """Return the weights of a file. Raises InputError: none of these forms, no times, or contradicting pieces."""
     with catch_errors("the file of frames of weights"):
         documents = list(_decode_documents(path.read_text(encoding="utf-8-sig")))
         objects = [_list_key_members(each) for each in _find_objects(documents, DEEPEST)]

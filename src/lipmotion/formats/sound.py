@@ -15,8 +15,7 @@ SOUND_CODECS: dict[str, tuple[str, str, int | None]] = {
     ".ogg": ("ogg", "libopus", 48_000),
 }
 """Container and codec of every suffix, and the only sampling rate that the codec has (None: it has any)."""
-BLOCK = 1 << 16
-"""Samples that are encoded at a time."""
+BLOCK = 1 << 16  # samples that are encoded at a time
 
 
 def write_sound(path: Path, audio: Audio) -> None:

@@ -30,14 +30,10 @@ ROUNDING_SHARE = 0.002
 """Rounding of times, as a share of a step: rows that are about as even at a usual rate have that rate."""
 TELEVISION_RATIO, RATIO_OFF = 1.001, 0.0002
 """By how much sound is longer than motion whose timecode counts 30 where 29.97 frames pass, and how exactly so."""
-SHORTEST_RATIO_S = 100.0
-"""In less sound, 0.001 of it is no more than a frame or two."""
-LONGEST_GAP = 3
-"""Most frames of the steady rate for each row: a table whose time is mostly gaps is refused."""
-SPARE_FRAMES = 600
-"""Frames of gaps that are allowed besides, so that a short take may have a long gap."""
-ANGLES = ("Yaw", "Pitch", "Roll")
-"""Endings of the curves that are angles of the head and of the eyes."""
+SHORTEST_RATIO_S = 100.0  # in less sound, 0.001 of it is no more than a frame or two
+LONGEST_GAP = 3  # most frames of the steady rate for each row: a table whose time is mostly gaps is refused
+SPARE_FRAMES = 600  # frames of gaps that are allowed besides, so that a short take may have a long gap
+ANGLES = ("Yaw", "Pitch", "Roll")  # endings of the curves that are angles of the head and of the eyes
 PER_SECOND = {"ms": 1e3, "msec": 1e3, "milliseconds": 1e3, "us": 1e6, "microseconds": 1e6, "ns": 1e9}
 TIME_COLUMN = re.compile(
     rf"(?:(?:time(?:stamp|code)?|t)(?:s|secs?|seconds?|{'|'.join(PER_SECOND)})?|seconds?|milliseconds)"
@@ -45,10 +41,8 @@ TIME_COLUMN = re.compile(
 """Names of columns of times, without blanks, brackets and underscores."""
 BACKWARDS_S = 0.5
 """A row whose time is earlier than that of the row before by less than this is left out; more is an error."""
-LEFT_OUT_SHARE, LEFT_OUT = 0.1, 3
-"""So many rows may be left out: a share of all, or a few."""
-LONGEST_STEP_S = 2.0
-"""Rows that are further apart are not seconds apart: the column of times has another unit."""
+LEFT_OUT_SHARE, LEFT_OUT = 0.1, 3  # so many rows may be left out: a share of all, or a few
+LONGEST_STEP_S = 2.0  # rows that are further apart are not seconds apart: the column of times has another unit
 
 
 def exact_rate(hertz: float, off_hz: float = 1e-6) -> float:

@@ -22,48 +22,42 @@ TIME = r"((?:\d{1,4}:)?\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?)"
 ARROW = r"(?:(?:[-=–—−]\s?){1,3}(?:[>›»]|&gt;)|→)"
 """The arrow between the times, also as people and programs damage it: ``->``, ``- ->``, ``–>``, ``--&gt;``."""
 CUE = re.compile(
-    rf"^.{{0,40}}\d\s*-->\s*\d|^.{{0,20}}:\d{{1,2}}(?:[.,]\d{{1,6}})?\s{{0,4}}{ARROW}\s{{0,4}}\d{{1,4}}:\d",
-    re.MULTILINE,
+    rf"^.{{0,40}}\d\s*-->\s*\d|^.{{0,20}}:\d{{1,2}}(?:[.,]\d{{1,6}})?\s{{0,4}}{ARROW}\s{{0,4}}\d{{1,4}}:\d", re.M
 )
 """The times of a subtitle."""
 FULL_CLOCK = r"(?:\d{1,4}:\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?|\d{1,2}:\d{1,2}[.,]\d{1,6})"
 FRAMES, GAP = r"\d\d(?:[:;]\d\d){3}", r"[^\w\n]{1,12}"
-NO_ARROW = re.compile(rf"^\s{{0,20}}(?:{FULL_CLOCK}{GAP}{FULL_CLOCK}\s{{0,20}}$|{FRAMES}{GAP}{FRAMES})", re.MULTILINE)
+NO_ARROW = re.compile(rf"^\s{{0,20}}(?:{FULL_CLOCK}{GAP}{FULL_CLOCK}\s{{0,20}}$|{FRAMES}{GAP}{FRAMES})", re.M)
 """A line of two times without an arrow that is known, or that begins with two timecodes; times of day do not count."""
 TIMES = re.compile(rf"\s*{TIME}\s*{ARROW}\s*{TIME}(?:\s.*)?")
-SBV = re.compile(r"^TIME\s?,\s?TIME\s*?$".replace("TIME", r"((?:\d{1,4}:)?\d{1,2}:\d\d[.,]\d{1,6})"), re.MULTILINE)
+SBV = re.compile(r"^TIME\s?,\s?TIME\s*?$".replace("TIME", r"((?:\d{1,4}:)?\d{1,2}:\d\d[.,]\d{1,6})"), re.M)
 """The times of YouTube's own format and of SubViewer, ``0:00:01.000,0:00:02.500``."""
-COUNTED = re.compile(
-    r"^([{\[])(\d{1,7})[}\]][{\[](\d{0,7})[}\]][ \t/]*(.*)$|^(\d{1,2}:\d\d:\d\d)[:=](?!\d)", re.MULTILINE
-)
+COUNTED = re.compile(r"^([{\[])(\d{1,7})[}\]][{\[](\d{0,7})[}\]][ \t/]*(.*)$|^(\d{1,2}:\d\d:\d\d)[:=](?!\d)", re.M)
 """The start of lines of MicroDVD (``{25}{63}Hello``, frames), MPL2 (``[10][25]``, tenths), TMPlayer (``00:00:01:``)."""
-RATE = re.compile(r"\{\d\}\{\d\}(\d{2,3}(?:[.,]\d{1,6})?)[ \t]*$", re.MULTILINE)  # MicroDVD's: {1}{1}23.976
+RATE = re.compile(r"\{\d\}\{\d\}(\d{2,3}(?:[.,]\d{1,6})?)[ \t]*$", re.M)  # MicroDVD's: {1}{1}23.976
 WORD_TIME = re.compile(rf"<{TIME}>")
 """The time at which the words after it are said, as in the captions that YouTube makes."""
-NO_CUE = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")
-"""The start of a block of WebVTT that is not shown."""
+NO_CUE = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")  # the start of a block of WebVTT that is not shown
 BRIDGE_S, BRIDGES_SHARE, NEAR_S = 0.1, 0.2, 0.1
 """Captions that scroll repeat each line, and between them are bridges shorter than this; if so large a share of cues
 of a file are bridges, lines that the cue before, which ends so near, showed already are left out."""
-SUBSTATION = re.compile(rf"\A\s*\[(?i:Script Info)\]|^Dialogue:[^,\n]{{0,40}},\s*{TIME}\s*,\s*{TIME}\s*,", re.MULTILINE)
+SUBSTATION = re.compile(rf"\A\s*\[(?i:Script Info)\]|^Dialogue:[^,\n]{{0,40}},\s*{TIME}\s*,\s*{TIME}\s*,", re.M)
 """SubStation Alpha: its first line, or, where an editor saved none, a line that is shown, with its start and end."""
 DEFAULT_FIELDS = "layer start end style name marginl marginr marginv effect text".split()
 """The fields of a line where no line ``Format:`` says them."""
 STYLES = re.compile(r"(\{[^{}]{0,200}\})")
 DRAWING_MODE = re.compile(r"\\p(\d)")
 """Begins a drawing (``{\\p1}``) or ends it (``{\\p0}``): the numbers in between are no words."""
-BREAK = re.compile(r"\\[Nnh]")
-"""Line breaks and hard blanks within the text."""
+BREAK = re.compile(r"\\[Nnh]")  # line breaks and hard blanks within the text
 LYRICS_TAG = r"\[(?:[a-zA-Z]{2,10}|#):[^\]\n]{0,500}\]"
 """What lyrics say of themselves: ``[ar:Anna]``, ``[offset:+250]``."""
 SPAN = rf"\[([\d:.,]{{1,20}})s?\s{{0,3}}{ARROW}\s{{0,3}}([\d:.,]{{1,20}})s?\]"
-LYRICS = re.compile(rf"\A(?:\s{{0,20}}{LYRICS_TAG}){{0,40}}\s{{0,20}}\[{TIME}\]|^[ \t]{{0,20}}{SPAN}", re.MULTILINE)
+LYRICS = re.compile(rf"\A(?:\s{{0,20}}{LYRICS_TAG}){{0,40}}\s{{0,20}}\[{TIME}\]|^[ \t]{{0,20}}{SPAN}", re.M)
 """The start of lyrics, or of a text whose lines begin with their times: ``[00:12.50]Hello``, ``[0.00s -> 2.50s] Hello``
 as Whisper's programs print, perhaps after other lines."""
 LYRICS_TIME = re.compile(rf"\[{TIME}\]|{SPAN}")
 LYRICS_LINE = re.compile(rf"((?:(?:\[{TIME}\]|{SPAN})\s{{0,4}}){{1,100}}).*")
-PHONES = ".phones"
-"""A file whose name ends so before its suffix, as ``talk.phones.vtt``, holds phones, not words."""
+PHONES = ".phones"  # a file whose name ends so before its suffix, as ``talk.phones.vtt``, holds phones, not words
 _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
 
 
@@ -228,30 +222,22 @@ def _read_dialogue(text: str, where: str) -> Iterator[TimedLabel]:
             yield TimedLabel(*times, BREAK.sub("\n", shown), f"line {number}")
 
 
-def list_shown_labels(path: Path, units: Timeline[Unit]) -> list[tuple[float, float, str]]:
-    """Return start, end and text of each word, or of each phone where the name of the file asks for them; no silence.
-
-    Words are those of ``units.group_words``.
-    """
-    if path.stem.lower().endswith(PHONES):
-        spoken = [span for span in units if not is_silent(span.label.phone)]
-        return [(span.start_s, span.end_s, span.label.phone or span.label.unit) for span in spoken]
-    return [(span.start_s, span.end_s, span.label) for span in group_words(units) if span.label]
-
-
 def clock(seconds: float, mark: str) -> str:
     """Return a time as ``HH:MM:SS.mmm``; ``mark``: what stands before the thousandths."""
-    thousandths = round(seconds * 1000)
-    minutes, rest = divmod(thousandths, 60_000)
+    minutes, rest = divmod(round(seconds * 1000), 60_000)
     return f"{minutes // 60:02d}:{minutes % 60:02d}:{rest // 1000:02d}{mark}{rest % 1000:03d}"
 
 
 def write_subtitles(path: Path, units: Timeline[Unit]) -> None:
     """Write the words in time as SubRip or WebVTT, or the phones where the name ends with ``.phones.srt``, one a cue.
 
-    Silence has no cue. After a failure there is no partial file. Raises ExportError: the file cannot be written.
+    Words are those of ``units.group_words``; silence has no cue. After a failure there is no partial file.
+    Raises ExportError: the file cannot be written.
     """
-    cues = list_shown_labels(path, units)
+    cues = [(span.start_s, span.end_s, span.label) for span in group_words(units) if span.label]
+    if path.stem.lower().endswith(PHONES):
+        spoken = [span for span in units if not is_silent(span.label.phone)]
+        cues = [(span.start_s, span.end_s, span.label.phone or span.label.unit) for span in spoken]
     if path.suffix.lower() == ".srt":
         lines = [f"{n}\n{clock(a, ',')} --> {clock(b, ',')}\n{text}\n\n" for n, (a, b, text) in enumerate(cues, 1)]
     else:

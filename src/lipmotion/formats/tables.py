@@ -23,15 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError, shorten
+from lipmotion.formats import steady_rate
 from lipmotion.formats.base import MotionFormat, format_rows
-from lipmotion.formats.steady_rate import (
-    TIME_COLUMN,
-    clean_column,
-    convert_times,
-    exact_rate,
-    resample_rows,
-    tabulate_frames,
-)
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, is_known, to_arkit
 from lipmotion.storage.text_table import LONGEST_LINE, open_table, parse_numbers
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, Timeline, Unit
@@ -39,10 +32,8 @@ from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, T
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")
 
-TIME = "time_s"
-"""The first column."""
-LONGEST_S = 1e6
-"""Largest time that is accepted: more than eleven days."""
+TIME = "time_s"  # the first column
+LONGEST_S = 1e6  # largest time that is accepted: more than eleven days
 CURVES = (
     *("EyeBlinkLeft", "EyeLookDownLeft", "EyeLookInLeft", "EyeLookOutLeft", "EyeLookUpLeft", "EyeSquintLeft"),
     *("EyeWideLeft", "EyeBlinkRight", "EyeLookDownRight", "EyeLookInRight", "EyeLookOutRight", "EyeLookUpRight"),
@@ -70,11 +61,9 @@ NO_CURVES = re.compile(r"(?:|unnamed:?0|(?:frame|face)?(?:index|idx|id|number|no
 """The same of columns that are no curves: numbers of frames and faces, and what MediaPipe calls neutral."""
 SCORES = ("score", "value", "weight", "coefficient")
 TIMECODE_RATES = (24, 25, 30, 48, 50, 60, 120)
-APP_RATE = 60
-"""Frames a second of the timecode where a take does not show it: what the app has by default."""
+APP_RATE = 60  # frames a second of the timecode where a take does not show it: what the app has by default
 DAY_S = 86_400.0
-MISREAD_ROWS = 10
-"""More rows a second apart are frames, of which a spreadsheet made seconds."""
+MISREAD_ROWS = 10  # more rows a second apart are frames, of which a spreadsheet made seconds
 MAX_CURVES = 2000
 _TIMECODE = re.compile(r"(\d{1,2})[:;](\d{1,2})[:;](\d{1,2})(?:([:;.,])(\d{1,9}(?:[.,]\d{1,9})?))?", re.ASCII)
 
@@ -123,7 +112,7 @@ def read_table_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
     step_s = (time_s[-1] - time_s[0]) / (len(time_s) - 1)
     if time_s[0] != 0 or not step_s > 0 or np.abs(np.diff(time_s) - step_s).max() > 1e-6:
         raise InputError("the column time_s must begin at 0 and rise in even steps")
-    return Motion(values[:, 1:], exact_rate(round(float(1 / step_s), 6)), channels), Timeline(())
+    return Motion(values[:, 1:], steady_rate.exact_rate(round(float(1 / step_s), 6)), channels), Timeline(())
 
 
 def timecode(time_s: float) -> str:
@@ -132,8 +121,7 @@ def timecode(time_s: float) -> str:
     >>> timecode(3725.025)
     '01:02:05:01.500'
     """
-    thousandths = round(time_s * TICKS_HZ * 1000)
-    seconds, part = divmod(thousandths, TICKS_HZ * 1000)
+    seconds, part = divmod(round(time_s * TICKS_HZ * 1000), TICKS_HZ * 1000)
     frames, part = divmod(part, 1000)
     return f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}:{frames:02d}.{part:03d}"
 
@@ -191,8 +179,8 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
     """
     with open_table(path) as table:
         names = table.names
-        keys = list(map(clean_column, names))
-        timed = next((column for column, key in enumerate(keys) if TIME_COLUMN.fullmatch(key)), None)
+        keys = list(map(steady_rate.clean_column, names))
+        timed = next((column for column, key in enumerate(keys) if steady_rate.TIME_COLUMN.fullmatch(key)), None)
         used = [n for n, key in enumerate(keys) if n != timed and not NO_CURVES.fullmatch(key)]
         if timed is None or not 0 < len(used) <= MAX_CURVES:
             raise ValueError(
@@ -204,8 +192,9 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
         if coded:
             time_s = _read_timecodes([_parse_timecode(text, line) for line, text in times])
         else:
-            time_s = convert_times(np.array([parse_numbers([text], line)[0] for line, text in times]), keys[timed])
-        return resample_rows(names, time_s, values, WEIGHT if coded else EYE_DISTANCE)
+            written = np.array([parse_numbers([text], line)[0] for line, text in times])
+            time_s = steady_rate.convert_times(written, keys[timed])
+        return steady_rate.resample_rows(names, time_s, values, WEIGHT if coded else EYE_DISTANCE)
 
 
 def _read_rows(
@@ -269,7 +258,7 @@ def _read_single_scores(
         time = fields[timed].strip()
         lines.setdefault(time, line)
         frames.setdefault(time, {})[fields[named].strip()] = parse_numbers([fields[score]], line)[0]
-    known, values = tabulate_frames(list(frames.values()))
+    known, values = steady_rate.tabulate_frames(list(frames.values()))
     return [(line, time) for time, line in lines.items()], known, values
 
 
@@ -299,9 +288,7 @@ def _read_timecodes(codes: list[tuple[int, float, str]]) -> Array:
     if not mark:
         starts = np.flatnonzero(np.diff(seconds)) + 1
         if len(starts) < 2:
-            raise ValueError(
-                "the timecodes have no frames (HH:MM:SS), required HH:MM:SS:FF: a spreadsheet has shortened them"
-            )
+            raise ValueError("the timecodes have no frames (HH:MM:SS), required HH:MM:SS:FF: a spreadsheet cut them")
         rate = (starts[-1] - starts[0]) / ((seconds[starts[-1]] - seconds[starts[0]]) % DAY_S)
         LOG.warning("the timecodes have no frames: %d rows are taken as even, %.2f a second", len(seconds), rate)
         return np.asarray(np.arange(len(seconds)) / rate)
@@ -319,10 +306,8 @@ def _read_timecodes(codes: list[tuple[int, float, str]]) -> Array:
         first = np.flatnonzero((np.diff(seconds) == 1) & (seconds[1:] % 60 == 0) & (seconds[1:] % 600 != 0)) + 1
         jumps = (frames[first - 1] >= rate - 1) & (np.floor(frames[first]) == rate // 15)
         if mark == ";" or (rate in {30, 60} and len(first) and jumps.all()):
-            time_s, day_s = (
-                _drop_frames(seconds, frames, rate),
-                float(_drop_frames(np.array(DAY_S), np.array(0.0), rate)),
-            )
+            time_s = _drop_frames(seconds, frames, rate)
+            day_s = float(_drop_frames(np.array(DAY_S), np.array(0.0), rate))
     over = np.concatenate([[0.0], np.cumsum(np.diff(time_s) < -DAY_S / 2)])
     return time_s + day_s * over
 

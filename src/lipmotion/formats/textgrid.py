@@ -19,19 +19,12 @@ TOKEN = re.compile(
     r'"(?P<text>[^"]*)"|![^\n]*|<(?P<flag>\w+)>|(?<!\S)(?P<number>[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)(?!\S)'
 )
 """What Praat itself reads: texts in quotes, flags, and numbers between blanks. All else (``xmin =``) is ignored."""
-MARK = re.compile(r'\s*(?:File type\s*=\s*)?"?oo(Text|Binary)File')
-Interval = tuple[float, float, str]
-"""Start and end in seconds, and the text."""
+TEXTGRID = re.compile(r'\s*(?:File type\s*=\s*)?"?oo(Text|Binary)File')  # how Praat's files begin
 INTERVALS, POINTS = "IntervalTier", "TextTier"
 
 
 class _DamagedError(Exception):
     """The file ends too early, or another token was expected."""
-
-
-def is_textgrid(text: str) -> bool:
-    """Return whether a text begins as Praat's files do."""
-    return MARK.match(text) is not None
 
 
 def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
@@ -110,16 +103,16 @@ def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
     phones = [(float(span.start_s), float(span.end_s), span.label.phone or span.label.unit) for span in units]
     words = [(float(span.start_s), float(span.end_s), span.label) for span in group_words(units)]
     tiers = [("phones", phones), ("words", words)]
-    recognised = [
-        (phone.start_s, phone.end_s, f"{phone.name} {phone.confidence}") for phone in list_recognised_phones(units)
-    ]
+    recognised = [(p.start_s, p.end_s, f"{p.name} {p.confidence}") for p in list_recognised_phones(units)]
     if recognised:
         tiers.append((RECOGNISED, recognised))
     end_s = max((float(span.end_s) for span in units), default=0.0)
     lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", "xmin = 0", f"xmax = {end_s}"]
     lines += ["tiers? <exists>", f"size = {len(tiers)}", "item []:"]
     for number, (name, intervals) in enumerate(tiers, 1):
-        filled: list[Interval] = []  # what is a gap has no text: Praat requires intervals that follow each other
+        filled: list[
+            tuple[float, float, str]
+        ] = []  # what is a gap has no text: Praat requires intervals that follow each other
         reached_s = 0.0
         for start_s, stop_s, text in [*intervals, (end_s, end_s, "")]:
             filled += [(reached_s, start_s, "")] if start_s > reached_s else []

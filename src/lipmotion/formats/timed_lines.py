@@ -32,8 +32,7 @@ from lipmotion.units.spoken_text import SpokenAs, classify_label
 
 SHORTEST_TICKS = 10_000
 """Whole numbers below a millisecond are not taken as ticks at sight: "20 30 people" is a sentence."""
-LONG_SPAN = 45
-"""Whole numbers in order that are further apart than this are no seconds."""
+LONG_SPAN = 45  # Whole numbers in order that are further apart than this are no seconds
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?|nan|inf"
 WHOLE = re.compile(r"(\d+)[\s,;]\s*(\d+)[\s,;]\s*(\S+)(?:\s.*)?")
 POINTS = re.compile(r"(\d+|\d*\.\d+)\s+(?:-?\d{1,3}\s+)?([^\d\s;]\S*)\s*(?:;.*)?")
@@ -47,8 +46,7 @@ STM = re.compile(rf"(\S+)\s+\S+\s+(\S+)\s+({NUMBER})\s+({NUMBER})\s+(?:<[^<>]*>\
 """Recording, channel, speaker, start and end in seconds, kind, words."""
 RTTM = re.compile(r"(?:SPEAKER|SPKR-INFO)\s+\S+\s+\S+\s")
 COMMENT = (";;", "#")
-LRS_TEXT = re.compile(r"\s*Text:[ \t]+(\S.*)")
-"""The first line of a text of LRS: what is said."""
+LRS_TEXT = re.compile(r"\s*Text:[ \t]+(\S.*)")  # the first line of a text of LRS: what is said
 LRS_WORDS = re.compile(r"^WORD[ \t]+START[ \t]+END\b.*$", re.MULTILINE)
 COLUMNS = {
     "start": {"begin", "begintime", "start", "starttime", "starts", "tmin", "onset", "startframe", "framestart"},
@@ -84,25 +82,21 @@ def parse_line_tiers(text: str, where: str) -> list[LabelTier] | None:
     One time a line is that of the end under the header of ESPS, or where the first label is silence and ends after 0.
     Raises InputError: a later line is of another form, or has a time that is none; or starts that may be ends.
     """
-    if header := ESPS.match(text):
-        return _read_points("\n" * header[0].count("\n") + text[header.end() :], where, ends=True)
+    if esps := ESPS.match(text):
+        return _read_points("\n" * esps[0].count("\n") + text[esps.end() :], where, ends=True)
     first = next((line for _, line in _lines(text)), "")
     if RTTM.match(first):
         raise InputError(f"{where}: is RTTM, which says who speaks and no words; give a transcript or labels")
     if SECONDS.fullmatch(first):
         return [_read_spans(text, SECONDS, where)]
-    for read in (_read_columns, _read_lrs, _read_wholes, _read_starts, _read_nist):
+    header = next((header for form, header in HEADLESS if form.fullmatch(first)), "")
+    if columns := _find_columns(header or first):
+        return _read_table(text, columns, where, header)
+    for read in (_read_lrs, _read_wholes, _read_starts, _read_nist):
         tiers = read(text, first, where)
         if tiers is not None:
             return tiers
     return None
-
-
-def _read_columns(text: str, first: str, where: str) -> list[LabelTier] | None:
-    """Return the tiers of a table whose columns are known by their names, or by the form of its first line."""
-    header = next((header for form, header in HEADLESS if form.fullmatch(first)), "")
-    columns = _find_columns(header or first)
-    return _read_table(text, columns, where, header) if columns else None
 
 
 def _read_wholes(text: str, first: str, where: str) -> list[LabelTier] | None:
@@ -250,8 +244,7 @@ def _read_table(text: str, columns: dict[str, int], where: str, given: str = "")
             raise InputError(f"{where}: {place} is {shorten(line)!r}; required, as in line 1: {header}") from error
         start_s, end_s = (require_time(time, place, where) for time in times)
         end_s += 0.0 if row.get("end") else start_s
-        key = (row.get("kind", named), row.get("speaker", ""))
-        kinds[key].append(TimedLabel(start_s, end_s, row["text"], place))
+        kinds[(row.get("kind", named), row.get("speaker", ""))].append(TimedLabel(start_s, end_s, row["text"], place))
     tiers = [find_tier(kind, labels, speaker) for (kind, speaker), labels in kinds.items()]
     whole = all(label.start_s % 1 == 0 == label.end_s % 1 for tier in tiers for label in tier.labels)
     return parse_seconds(tiers, where, 1000 if whole and header == "start\tend\ttext" else 0)  # Whisper's

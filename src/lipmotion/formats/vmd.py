@@ -22,10 +22,8 @@ from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, CLOSED, VRM_VOWELS, 
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit
 from lipmotion.types.motion import RADIAN
 
-Keys = Sequence[tuple[int, float]]
-"""Frames and values."""
-Turns = Sequence[tuple[int, tuple[float, float, float, float]]]
-"""Frames and rotations, as quaternions x, y, z, w."""
+Keys = Sequence[tuple[int, float]]  # frames and values
+Turns = Sequence[tuple[int, tuple[float, float, float, float]]]  # frames and rotations, as quaternions x, y, z, w
 
 RATE_HZ = 30.0
 MARK, OLD_MARK = b"Vocaloid Motion Data 0002", b"Vocaloid Motion Data file"
@@ -43,8 +41,7 @@ LINEAR = (
 )
 """The bytes of a bone's key that say: straight on to the next one."""
 LARGEST_FILE_BYTES = 1 << 28
-LAST_FRAME = 86_400 * 30
-"""Frames of a day."""
+LAST_FRAME = 86_400 * 30  # frames of a day
 MORPHS: Mapping[str, tuple[str, ...]] = {
     "あ": ("aa",),
     "い": ("ih",),
@@ -59,12 +56,10 @@ MORPHS: Mapping[str, tuple[str, ...]] = {
 }
 """The standard morphs of models, and the channels whose mean each is: vowels, pressed lips, blinks, raised brows; of
 moods, lowered brows and wide eyes."""
-HEAD, EYES = "頭", "両目"
-"""The bones of the head, and of both eyes."""
+HEAD, EYES = "頭", "両目"  # the bones of the head, and of both eyes
 MIRRORED = np.array([-1.0, -1.0, 1.0, 1.0])
 """Signs that turn a rotation of glTF's axes into one of MikuMikuDance's, whose z goes into the face, and back."""
-TOLERANCE = 1e-7
-"""Keys are left out where a straight line is that near."""
+TOLERANCE = 1e-7  # keys are left out where a straight line is that near
 
 
 def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
@@ -114,8 +109,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
             f"the motion has none of the morphs あ い う え お; its morphs are: {named}; "
             f"it moves {len(bones)} bones and has {camera} keys of a camera; save the motion of the face"
         )
-    last = max(keys[-1][0] for keys in (*morphs.values(), *bones.values()))
-    frames = np.arange(last + 1)
+    frames = np.arange(max(keys[-1][0] for keys in (*morphs.values(), *bones.values())) + 1)
     curves: dict[str, tuple[np.ndarray, str]] = {}
     for morph, keys in sorted(morphs.items(), key=lambda each: each[0] not in MORPHS):
         at, values = zip(*keys, strict=True)

@@ -20,10 +20,7 @@ NEAR_S, DEEPEST = 0.01, 20
 
 
 def read_xml_tiers(text: str, where: str) -> list[LabelTier]:
-    """Return the tiers of an ``.eaf``, or the lines of captions.
-
-    Raises InputError: damaged XML, or a time that cannot be read.
-    """
+    """Return the tiers of an ``.eaf``, or the lines of captions. Raises InputError: damaged XML, or such times."""
     if re.search(r"<!(?:DOCTYPE|ENTITY)", text, re.IGNORECASE):
         raise InputError(f"{where}: its XML declares entities, which are not read; save it without them")
     try:

@@ -24,13 +24,13 @@ MAX_BASE_ARCS, ARCS_A_FRAME = 1_000_000, 10
 class StateSequence:
     """The states of a sequence of units, one after another.
 
-    names     : of each state, its full name in context, and its density without context
+    names     : of each state, its full name in context
     densities : [shape=(S,)], the density of each state
     plain     : [shape=(S,)], its density without context, which has its duration
     positions : [shape=(S,)], the unit of the sequence that it belongs to
     """
 
-    names: tuple[tuple[str, int], ...]
+    names: tuple[str, ...]
     densities: NDArray[np.intp]
     plain: NDArray[np.intp]
     positions: NDArray[np.intp]
@@ -40,15 +40,14 @@ def expand_states(hmm: UnitHmm, units: Sequence[str]) -> StateSequence:
     """Return the context-dependent states of a unit sequence; beyond its ends lies silence."""
     table, silence = hmm.table, hmm.table.free[0]
     neighbours = [silence, *(silence if unit in table.free else unit for unit in units), silence]
-    names: list[tuple[str, int]] = []
-    densities, positions = [], []
+    names, densities, plain, positions = list[str](), list[int](), list[int](), list[int]()
     for i, unit in enumerate(units):
         for state in range(table.count(unit)):
-            names.append((table.name(neighbours[i], unit, neighbours[i + 2], state), table.density(unit, state)))
+            names.append(table.name(neighbours[i], unit, neighbours[i + 2], state))
+            plain.append(table.density(unit, state))
             densities.append(table.density(unit, state, table.neighbour(neighbours[i], unit, neighbours[i + 2], state)))
             positions.append(i)
-    plain = np.array([plain for _, plain in names], np.intp)
-    return StateSequence(tuple(names), np.array(densities, np.intp), plain, np.array(positions, np.intp))
+    return StateSequence(tuple(names), *(np.array(numbers, np.intp) for numbers in (densities, plain, positions)))
 
 
 def align_states(

@@ -225,15 +225,8 @@ def build_unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
     return UnitLoop(builder.build(), tuple(owners), entries)
 
 
-def decode_units(
-    loop: UnitLoop, log_likelihoods: LogLikelihoods, beam: float | None = None
-) -> tuple[tuple[str, ...], NDArray[np.intp]]:
-    """Return the most probable units, their first frames, the frame count; ``beam`` as in ``Network.best_path``."""
-    return decode_path(loop, loop.network.best_path(log_likelihoods, beam=beam))
-
-
 def decode_path(loop: UnitLoop, path: NDArray[np.intp]) -> tuple[tuple[str, ...], NDArray[np.intp]]:
-    """Return the units of a path through the loop [shape=(T,)], and their frames as ``decode_units`` does."""
+    """Return the units of a path through the loop [shape=(T,)], their first frames, and the frame count at the end."""
     starts = [t for t in range(len(path)) if t == 0 or (path[t] != path[t - 1] and path[t] in loop.entries)]
     return tuple(loop.owners[path[t]] for t in starts), np.array([*starts, len(path)], np.intp)
 

@@ -61,15 +61,14 @@ def lay_out_arcs(arc_from: Index, arc_start: Index) -> ArcLayout:
     order = _order_states(states, groups, arc_from[rest], arc_to[rest])
     place = np.empty(states, np.intp)
     place[order] = np.arange(states)
-    runs, positions = _find_runs(place[arc_from[rest]], place[arc_to[rest]])
+    source, target = place[arc_from[rest]], place[arc_to[rest]]
+    positions = np.lexsort((target, target - source))
+    source, target = source[positions], target[positions]
+    broken = (np.diff(target) != 1) | (np.diff(source) != 1)
+    firsts = np.append(0, np.flatnonzero(broken) + 1) if len(target) else np.empty(0, np.intp)
+    lengths = np.diff(firsts, append=len(target))
+    runs = np.stack([target[firsts], source[firsts], lengths, firsts], axis=1).astype(np.intp)
     return ArcLayout(order, place, runs, rest[positions], *_fill_blocks(groups, arc_from, place))
-
-
-def arrange_weights(layout: ArcLayout, values: NDArray[Any], padding: float) -> ArcWeights:
-    """Return the values of arcs [shape=(E,)] by run and by block; ``padding`` where a block is padded."""
-    blocks = values[layout.block_arcs]
-    blocks[layout.block_arcs < 0] = padding
-    return ArcWeights(values[layout.run_arcs], blocks)
 
 
 _Groups = list[tuple[Index, Index]]
@@ -104,16 +103,6 @@ def _order_states(states: int, groups: _Groups, source: Index, target: Index) ->
         depth[after] = depth[before] + 1
     depth[group < len(groups)] = 0
     return np.lexsort((group, depth))
-
-
-def _find_runs(source: Index, target: Index) -> tuple[Index, Index]:
-    """Return the runs, and the positions of arcs in order of the runs; sources and targets are places."""
-    positions = np.lexsort((target, target - source))
-    source, target = source[positions], target[positions]
-    broken = (np.diff(target) != 1) | (np.diff(source) != 1)
-    firsts = np.append(0, np.flatnonzero(broken) + 1) if len(target) else np.empty(0, np.intp)
-    lengths = np.diff(firsts, append=len(target))
-    return np.stack([target[firsts], source[firsts], lengths, firsts], axis=1).astype(np.intp), positions
 
 
 def _fill_blocks(groups: _Groups, arc_from: Index, place: Index) -> tuple[Index, Index, Index]:

@@ -127,25 +127,23 @@ class _Kernel:
     def prepare(self) -> Any:
         """Make the kernel and return it. Kernels call one another by global names, under which numba must find it."""
         if self.kernel is None:
-            self.kernel = self._in_machine_code() if numba_works() else self.form or self._in_python()
+            if numba_works():
+                import numba
+
+                self.kernel = numba.njit(nogil=True, error_model="numpy", fastmath=self.fastmath)(self.function)
+                with suppress(RuntimeError):  # neither beside the file nor in the user's cache folder can be written
+                    self.kernel._cache = _open_disk_cache()(self.function)  # as its ``enable_caching``
+            elif self.form is not None:
+                self.kernel = self.form
+            else:
+                _warn_once()
+                self.kernel = np.errstate(all="ignore")(self.function)
             names = self.function.__globals__
             for name, value in list(names.items()):
                 if isinstance(value, _Kernel):
                     names[name] = value.prepare()
             self._is_ready = True
         return self.kernel
-
-    def _in_machine_code(self) -> Any:
-        import numba
-
-        kernel = numba.njit(nogil=True, error_model="numpy", fastmath=self.fastmath)(self.function)
-        with suppress(RuntimeError):  # neither beside the file nor in the user's cache folder can anything be written
-            kernel._cache = _open_disk_cache()(self.function)  # as its ``enable_caching``
-        return kernel
-
-    def _in_python(self) -> Callable[..., Any]:
-        _warn_once()
-        return np.errstate(all="ignore")(self.function)
 
 
 @cache

@@ -89,10 +89,22 @@ def infer_factorial(
     order = np.lexsort(logs.pairs.T[::-1])
     logs = logs._replace(pair=logs.pair[:, order], pairs=logs.pairs[order])
     ways: list[_Scaled | _InLogs] = []
-    if min(_find_min_probability(loop) for loop in (audio, visual)) >= MIN_PROBABILITY:
+    probabilities = (
+        part
+        for loop in (audio, visual)
+        for part in (loop.stay, loop.onward, loop.leave[:, None] * loop.enter, loop.initial, loop.final)
+    )
+    if min(float(part.min(where=part > 0, initial=1.0)) for part in probabilities) >= MIN_PROBABILITY:
         ways += [_Scaled(audio, visual, logs, kind) for kind in OFF if kind in (DOUBLE, logs.audio.dtype)]
-    found = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
-    result = next((each for each in found if each is not None), None) or _create_posteriors(audio, visual, logs)
+    results = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
+    result = next((each for each in results if each is not None), None)
+    if result is None:  # there is no path
+        of_audio, of_visual = (
+            LoopCounts(*(np.zeros_like(part) for part in (loop.stay, loop.onward, loop.enter, loop.initial)))
+            for loop in (audio, visual)
+        )
+        in_audio, in_visual, in_pairs = (np.zeros(log.shape) for log in (logs.audio, logs.visual, logs.pair))
+        return FactorialPosteriors(in_audio, in_visual, in_pairs, of_audio, of_visual, -np.inf)
     return result._replace(pair=result.pair[:, np.argsort(order)])
 
 
@@ -148,7 +160,7 @@ def _forward_backward(
         for t in range(start + len(forward) - 1, start - 1, -1):
             before = forward[t - start][0]
             step = way.end(before) if t == last else way.back(before, backward, leaving, t)
-            if not step.frame.log_overlap > way.least_log_overlap:
+            if not step.frame.log_overlap > way.min_log_overlap:
                 return None
             if t == last:
                 log_likelihood += step.frame.log_overlap
@@ -171,14 +183,12 @@ class _Scaled:
         self.initial, self.final = log_ends(audio, visual)
         self.audio, self.visual = _moves(audio, kind), _moves(visual, kind)
         self.start, self.densities = 0, list[FrameDensity]()
+        self.pairs: tuple[Index, Index] = logs.pairs[:, 0], logs.pairs[:, 1]
         # In a frame, what was raised is 1 / whole² at most for each joint state, forward and backward, times the sum of
         # all that leads to a state or from it: up to U + 2 ≤ 3 U in each loop.
         raised = 2 * len(logs.audio) * 9 * self.initial.size / self.whole**2
-        self.least_log_overlap = math.log(raised / OFF[kind])
-
-    @property
-    def frame_bytes(self) -> int:
-        return self.initial.size * self.kind.itemsize
+        self.min_log_overlap = math.log(raised / OFF[kind])
+        self.frame_bytes = self.initial.size * kind.itemsize
 
     def forward(self, start: int, stop: int, before: Array | None, found: list[tuple[Array, Array]]) -> float:
         """Append the forward probabilities of some frames, and those of leaving the last visual states after the audio
@@ -196,7 +206,7 @@ class _Scaled:
             moved = _move_to_last(before, *self.audio[:2], entering, count)
             total = _forward(
                 before, *self.audio[:2], entering, *self.visual[:2], moved @ self.visual[2],
-                density.audio, density.visual, density.pair, density.pair_audio, density.pair_visual,
+                density.audio, density.visual, density.pair, *self.pairs,
                 MIN_PRODUCT[self.kind], self.whole, after,
             )  # fmt: skip
             if not total > MIN_TOTAL[self.kind]:
@@ -223,7 +233,7 @@ class _Scaled:
         after, sums = np.empty_like(before), [np.empty(len(part)) for part in density[:3]]
         total = _backward(
             before, moved, *self.audio[:2], self.audio[2] @ moved[:units], density.audio, density.visual, density.pair,
-            density.pair_audio, density.pair_visual,
+            *self.pairs,
             MIN_PRODUCT[self.kind], self.whole, after, *sums,
         )  # fmt: skip
         met = float(sums[0].sum())
@@ -254,15 +264,12 @@ def _moves(loop: Loop, kind: np.dtype[Any]) -> tuple[Array, Array, Array]:
 class _InLogs:
     """The steps of ``_Scaled`` in logarithms: those of backward probabilities and densities, too."""
 
-    least_log_overlap = -math.inf
+    min_log_overlap = -math.inf
 
     def __init__(self, audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -> None:
         self.audio, self.visual, self.logs = LogTransitions.of(audio), LogTransitions.of(visual), logs
         self.initial, self.final = log_ends(audio, visual)
-
-    @property
-    def frame_bytes(self) -> int:
-        return self.initial.nbytes
+        self.frame_bytes = self.initial.nbytes
 
     def forward(self, start: int, stop: int, before: Array | None, found: list[tuple[Array, Array]]) -> float:
         for t in range(start, stop):
@@ -318,20 +325,6 @@ def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:
     left = np.maximum(enter.sum(axis=1) + after, 0)
     stay = np.maximum(frames[:-1].sum(axis=0) - left, 0)
     return LoopCounts(stay, left[:-1], enter, frames[0])
-
-
-def _find_min_probability(loop: Loop) -> float:
-    parts = (loop.stay, loop.onward, loop.leave[:, None] * loop.enter, loop.initial, loop.final)
-    return min(float(part.min(where=part > 0, initial=1.0)) for part in parts)
-
-
-def _create_posteriors(audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -> FactorialPosteriors:
-    counts = [
-        LoopCounts(*(np.zeros_like(part) for part in (loop.stay, loop.onward, loop.enter, loop.initial)))
-        for loop in (audio, visual)
-    ]
-    in_audio, in_visual, in_pairs = (np.zeros(log.shape) for log in (logs.audio, logs.visual, logs.pair))
-    return FactorialPosteriors(in_audio, in_visual, in_pairs, counts[0], counts[1], -np.inf)
 
 
 @compile_to_rounding

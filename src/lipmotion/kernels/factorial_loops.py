@@ -65,11 +65,6 @@ class FactorialLogLikelihoods(NamedTuple):
     pair: Logs
     pairs: Index
 
-    @classmethod
-    def of(cls, audio: Logs, visual: Logs) -> FactorialLogLikelihoods:
-        """Return the log densities of loops without pairs."""
-        return cls(audio, visual, np.empty((len(audio), 0), audio.dtype), np.empty((0, 2), np.intp))
-
     def joint(self, t: int) -> Array:
         """Return the log densities of all joint states in a frame [shape=(Na, Nv)]."""
         joint = np.add.outer(self.audio[t], self.visual[t], dtype=np.float64)
@@ -85,11 +80,7 @@ class FactorialLogLikelihoods(NamedTuple):
         audio, visual, pair = (
             np.exp(log - top[:, None]) for log, top in zip(logs, (top_audio, best - top_audio, best), strict=True)
         )
-        pair_audio, pair_visual = self.pairs.T
-        return [
-            FrameDensity(audio[t], visual[t], pair[t], pair_audio, pair_visual, float(best[t]))
-            for t in range(stop - start)
-        ]
+        return [FrameDensity(*rows) for rows in zip(audio, visual, pair, best.tolist(), strict=True)]
 
 
 class FrameDensity(NamedTuple):
@@ -97,15 +88,12 @@ class FrameDensity(NamedTuple):
 
     audio, visual : [shapes=(Na,), (Nv,)], whose products are the densities of joint states, except for pairs
     pair          : [shape=(P,)], the densities of pairs
-    pair_audio, pair_visual : [shape=(P,)], the states of pairs
     best          : the logarithm of the bound
     """
 
     audio: Array
     visual: Array
     pair: Array
-    pair_audio: Index
-    pair_visual: Index
     best: float
 
 
@@ -154,7 +142,8 @@ class LogTransitions(NamedTuple):
         after = score + self.stay[:, None]
         decision = np.full(score.shape, units, np.min_scalar_type(units + 1))
         moved = score[: len(self.onward)] + self.onward[:, None]
-        _take_better(after[units:], decision[units:], moved, units + 1)
+        np.copyto(decision[units:], units + 1, where=moved > after[units:])
+        np.maximum(after[units:], moved, out=after[units:])
         last, first = score[len(score) - units :], (after[:units], decision[:units])
         _take_best_entering(last, self.leaving, *first)
         return after, decision
@@ -216,11 +205,6 @@ def find_factorial_path(
 
 _Decisions = tuple[NDArray[Any], NDArray[Any]]
 """For each loop, the decision at each joint state [shape=(N, M)], the loop's own states along axis 0."""
-
-
-def _take_better(score: Array, decision: NDArray[Any], other: Array, number: int) -> None:
-    np.copyto(decision, number, where=other > score)
-    np.maximum(score, other, out=score)
 
 
 class _FactorialSearch(NamedTuple):

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.arcs import PADDING_ROWS, ArcLayout, ArcWeights, arrange_weights, lay_out_arcs
+from lipmotion.kernels.arcs import PADDING_ROWS, ArcLayout, ArcWeights, lay_out_arcs
 from lipmotion.kernels.compiler import compile_to_rounding
 from lipmotion.kernels.forward_backward import log_forward_backward
 
@@ -87,17 +87,6 @@ class Chunks(NamedTuple):
     weight: Array
     arcs: Index
 
-    @classmethod
-    def of(cls, layout: ArcLayout, weights: ArcWeights) -> Chunks:
-        """Return the padded runs of a layout."""
-        runs = layout.runs.copy()
-        runs[:, 2] = -(-runs[:, 2] // CHUNK) * CHUNK
-        runs[:, 3] = np.cumsum(runs[:, 2]) - runs[:, 2]
-        weight = np.zeros(runs[:, 2].sum())
-        arcs = np.arange(len(weights.runs)) + np.repeat(runs[:, 3] - layout.runs[:, 3], layout.runs[:, 2])
-        weight[arcs] = weights.runs
-        return cls(runs.astype(np.uintp), weight, arcs)
-
 
 class ForwardBackwardNetwork(NamedTuple):
     """A network prepared for forward–backward.
@@ -140,22 +129,14 @@ class ForwardBackwardNetwork(NamedTuple):
     ) -> ForwardBackwardNetwork:
         """Return the network with other probabilities of arcs [shape=(E,)] and of beginnings [shape=(S,)]."""
         logs, initial = arc_log.astype(np.float64), log_initial.astype(np.float64)
-        best_arc, weights, transposed, chunks = _weigh(self.layout, logs)
-        changed = self._replace(best_arc=best_arc, weights=weights, transposed=transposed, chunks=chunks)
-        return changed._replace(arc_log=logs, log_initial=initial)
+        return ForwardBackwardNetwork(
+            self.arc_from, logs, self.arc_start, initial, self.log_final, self.layout, *_weigh(self.layout, logs)
+        )
 
-    def posteriors(self, log_emission: NDArray[np.floating[Any]], columns: Index, frames: Index) -> NetworkPosteriors:
-        """Return the posteriors of recordings, which are concatenated in ``log_emission``.
-
-        log_emission : [shape=(T, G)], finite or -inf; the posteriors have the same precision
-        columns      : [shape=(S,)], the density of the state at each place
-        """
-        return self.product_posteriors([log_emission], [columns], frames)
-
-    def product_posteriors(
+    def posteriors(
         self, log_emissions: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index], frames: Index
     ) -> NetworkPosteriors:
-        """Return the posteriors of recordings whose densities are products of one factor from each chain.
+        """Return the posteriors of recordings, concatenated; their densities are products of one factor a chain.
 
         log_emissions : one or more [shape=(T, G_c)], all of one precision, finite or -inf; the log density of the state
             at place s is the sum over chains of ``log_emissions[c][:, columns[c][s]]``
@@ -175,7 +156,13 @@ class ForwardBackwardNetwork(NamedTuple):
             if precision == np.float32:
                 again = self._scale(logs, columns, frames[u : u + 1])
             if again is None or np.isneginf(again.log_likelihood[0]):
-                again = self._in_logs(_joint(logs, columns))
+                arc_to = np.repeat(np.arange(len(self.arc_start)), np.diff(self.arc_start, append=len(self.arc_from)))
+                log_posterior, counts, log_likelihood = log_forward_backward(
+                    self.log_initial, _joint(logs, columns)[:, self.layout.place], self.arc_from, arc_to, self.arc_log,
+                    self.log_final,
+                )  # fmt: skip
+                posterior = np.exp(log_posterior)[:, self.layout.order]
+                again = NetworkPosteriors(posterior, counts, np.array([log_likelihood]))
             expected.posterior[of_recording], expected.log_likelihood[u] = again.posterior, again.log_likelihood[0]
             expected.counts[:] += again.counts
         return expected
@@ -199,19 +186,15 @@ class ForwardBackwardNetwork(NamedTuple):
         )  # fmt: skip
         counts = np.zeros(len(self.arc_log))
         counts[layout.run_arcs] = run_counts[self.chunks.arcs] * self.weights.runs
-        _count_blocks(counts, layout, self.weights, leaving, entering)
+        start = 0
+        for _, targets, place, sources in layout.blocks:  # one matrix product each
+            arcs = slice(place, place + sources), slice(0, targets)
+            pairs = leaving[:, arcs[0]].T @ entering[:, start : start + targets]
+            counts[layout.block_arcs[arcs]] = pairs * self.weights.blocks[arcs]
+            start += targets
         with np.errstate(divide="ignore"):
             log_likelihood = np.add.reduceat(np.log(scales) + best, edges[:-1]) + (np.log(ends) + first + last)
         return NetworkPosteriors(root, counts, log_likelihood + (frames - 1) * self.best_arc)
-
-    def _in_logs(self, log_density: Array) -> NetworkPosteriors:
-        """Return the posteriors of one recording, of log densities by place [shape=(T, S)], by NumPy in logarithms."""
-        arc_to = np.repeat(np.arange(len(self.arc_start)), np.diff(self.arc_start, append=len(self.arc_from)))
-        log_emission = log_density[:, self.layout.place]
-        log_posterior, counts, log_likelihood = log_forward_backward(
-            self.log_initial, log_emission, self.arc_from, arc_to, self.arc_log, self.log_final
-        )
-        return NetworkPosteriors(np.exp(log_posterior)[:, self.layout.order], counts, np.array([log_likelihood]))
 
 
 def _roots(log_density: NDArray[np.floating[Any]]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -268,28 +251,22 @@ def _probabilities(log: Array) -> tuple[Array, float]:
 def _weigh(layout: ArcLayout, arc_log: Array) -> tuple[float, ArcWeights, Array, Chunks]:
     """Return the log of an arc's greatest probability, and all probabilities relative to it, in the kernels' forms."""
     relative, best = _probabilities(arc_log)
-    weights = arrange_weights(layout, relative, 0.0)
-    return best, weights, _transpose(layout, weights), Chunks.of(layout, weights)
-
-
-def _transpose(layout: ArcLayout, weights: ArcWeights) -> Array:
-    """Return the weights of all blocks, targets as rows, sources as columns, padded."""
-    transposed = [np.empty((0, -(-layout.blocks[:, 3].max(initial=0) // PADDING_ROWS) * PADDING_ROWS))]
+    blocks = relative[layout.block_arcs]
+    blocks[layout.block_arcs < 0] = 0
+    weights = ArcWeights(relative[layout.run_arcs], blocks)
+    width = -(-layout.blocks[:, 3].max(initial=0) // PADDING_ROWS) * PADDING_ROWS
+    transposed = [np.empty((0, width))]  # targets as rows, sources as columns, padded
     for _, targets, first, sources in layout.blocks:
-        matrix = np.zeros((targets, transposed[0].shape[1]))
-        matrix[:, :sources] = weights.blocks[first : first + sources, :targets].T
+        matrix = np.zeros((targets, width))
+        matrix[:, :sources] = blocks[first : first + sources, :targets].T
         transposed.append(matrix)
-    return np.concatenate(transposed)
-
-
-def _count_blocks(counts: Array, layout: ArcLayout, weights: ArcWeights, leaving: Array, entering: Array) -> None:
-    """Fill in the expected counts of the arcs of all blocks: one matrix product each."""
-    start = 0
-    for _, targets, first, sources in layout.blocks:
-        of_recording = slice(first, first + sources), slice(0, targets)
-        pairs = leaving[:, of_recording[0]].T @ entering[:, start : start + targets]
-        counts[layout.block_arcs[of_recording]] = pairs * weights.blocks[of_recording]
-        start += targets
+    runs = layout.runs.copy()
+    runs[:, 2] = -(-runs[:, 2] // CHUNK) * CHUNK
+    runs[:, 3] = np.cumsum(runs[:, 2]) - runs[:, 2]
+    weight = np.zeros(runs[:, 2].sum())
+    arcs = np.arange(len(weights.runs)) + np.repeat(runs[:, 3] - layout.runs[:, 3], layout.runs[:, 2])
+    weight[arcs] = weights.runs
+    return best, weights, np.concatenate(transposed), Chunks(runs.astype(np.uintp), weight, arcs)
 
 
 @compile_to_rounding

@@ -112,7 +112,7 @@ class _Block:
     """Some frames, and the states that may have one of them: consecutive ones, in a network of their own."""
 
     def __init__(self, network: NetworkArrays, windows: Windows | None, start: int, stop: int):
-        self.whole, self.windows, self.start, self.stop = network, windows, start, stop
+        self.full_network, self.windows, self.start, self.stop = network, windows, start, stop
         self.states = slice(0, len(network.emission))
         if windows is not None:
             first = int(np.searchsorted(windows.end, start, side="right"))
@@ -124,7 +124,9 @@ class _Block:
     def first_row(self, log_emission: LogEmission) -> Scores:
         """Return the scores of the states in the first frame of all."""
         values = self._mask(log_emission(0, 1), 0)[0]
-        return self.whole.log_initial[self.states] + (values[self.whole.emission] if self.windows is None else values)
+        if self.windows is None:
+            values = values[self.full_network.emission]
+        return self.full_network.log_initial[self.states] + values
 
     def row_after(self, before: _Block, last: Scores) -> Scores:
         """Return the scores in the first frame, from those of the block before in its last frame."""
@@ -143,7 +145,7 @@ class _Block:
     def _mask(self, values: Scores, start: int) -> Scores:
         if self.windows is None:
             return values
-        values = values[:, self.whole.emission[self.states]]
+        values = values[:, self.full_network.emission[self.states]]
         frames = np.arange(start, start + len(values))[:, None]
         outside = (frames < self.windows.first[self.states]) | (frames >= self.windows.end[self.states])
         values[outside] = -np.inf
@@ -153,18 +155,18 @@ class _Block:
     def network(self) -> NetworkArrays:
         """The network of the states; arcs from others are left out."""
         if self.windows is None:
-            return self.whole
-        first, whole = self.states.start, self.whole
-        kept = (whole.arc_from[self._arcs] >= first) & (whole.arc_from[self._arcs] < self.states.stop)
-        starts = whole.arc_start[self.states] - self._arcs.start
-        position = np.append(0, np.cumsum(kept))
+            return self.full_network
+        first, network = self.states.start, self.full_network
+        sources = network.arc_from[self._arcs]
+        inside = (sources >= first) & (sources < self.states.stop)
+        position = np.append(0, np.cumsum(inside))
         return NetworkArrays(
             np.arange(self.states.stop - first),
-            whole.arc_from[self._arcs][kept] - first,
-            whole.arc_log[self._arcs][kept],
-            position[starts],
-            whole.log_initial[self.states],
-            whole.log_final[self.states],
+            sources[inside] - first,
+            network.arc_log[self._arcs][inside],
+            position[network.arc_start[self.states] - self._arcs.start],
+            network.log_initial[self.states],
+            network.log_final[self.states],
         )
 
 
@@ -271,14 +273,27 @@ def find_cheapest(start: Array, steps: Array) -> tuple[Array, NDArray[np.uint8]]
     Cost: O(T·C³) time in O(√T) array operations, O(T·C²) memory.
     """
     states, frames = len(start), steps.shape[2]
-    pieces = _work_in_pieces(steps)
-    before = np.empty((len(pieces), states, pieces.shape[3]))
-    before[0] = _entries(start, _products(pieces))
-    for frame in range(len(pieces) - 1):
+    length = isqrt(frames - 1) + 1
+    count = -(-frames // length)
+    padded = np.empty((states, states, count * length))
+    padded[..., :frames] = steps
+    padded[..., frames:] = np.where(np.eye(states), 0.0, np.inf)[..., None]  # to stay costs nothing
+    pieces = np.ascontiguousarray(padded.reshape(states, states, count, length).transpose(3, 0, 1, 2))
+    products = pieces[0]
+    for step in pieces[1:]:
+        products = (products[:, :, None] + step).min(axis=1)
+    before = np.empty((length, states, count))  # the cost of every state before each frame of every piece
+    before[0, :, 0] = start
+    for piece in range(count - 1):
+        before[0, :, piece + 1] = (before[0, :, piece, None] + products[:, :, piece]).min(axis=0)
+    for frame in range(length - 1):
         before[frame + 1] = (before[frame][:, None] + pieces[frame]).min(axis=0)
-    arrivals, pointers = _cheapest(before[:, :, None] + pieces)
-    in_order = pointers.transpose(2, 0, 1).reshape(-1, states)[:frames]
-    return arrivals[-1, :, -1], in_order
+    ways = before[:, :, None] + pieces
+    arrivals, pointers = ways[:, 0].copy(), np.zeros((length, states, count), np.uint8)
+    for state in range(1, states):
+        pointers[ways[:, state] < arrivals] = state
+        np.minimum(arrivals, ways[:, state], out=arrivals)
+    return arrivals[-1, :, -1], pointers.transpose(2, 0, 1).reshape(-1, states)[:frames]
 
 
 def trace_back(pointers: NDArray[np.uint8], last: int) -> NDArray[np.intp]:
@@ -288,43 +303,6 @@ def trace_back(pointers: NDArray[np.uint8], last: int) -> NDArray[np.intp]:
     for row in range(len(table) - states, 0, -states):
         path.append(table[row + path[-1]])
     return np.array(path[::-1], np.intp)
-
-
-def _work_in_pieces(steps: Array) -> Array:
-    """Return the steps [shape=(length, C, C, pieces)]; in padding, staying in a state costs nothing."""
-    states, _, frames = steps.shape
-    length = isqrt(frames - 1) + 1
-    count = -(-frames // length)
-    padded = np.empty((states, states, count * length))
-    padded[..., :frames] = steps
-    padded[..., frames:] = np.where(np.eye(states), 0.0, np.inf)[..., None]
-    return np.ascontiguousarray(padded.reshape(states, states, count, length).transpose(3, 0, 1, 2))
-
-
-def _products(pieces: Array) -> Array:
-    """Return the cost of the cheapest path through each piece, from each state to each [shape=(C, C, pieces)]."""
-    product = pieces[0]
-    for step in pieces[1:]:
-        product = (product[:, :, None] + step).min(axis=1)
-    return product
-
-
-def _entries(start: Array, products: Array) -> Array:
-    """Return the cost of every state before each piece [shape=(C, pieces)]."""
-    entries = np.empty((len(start), products.shape[2]))
-    entries[:, 0] = start
-    for piece in range(entries.shape[1] - 1):
-        entries[:, piece + 1] = (entries[:, piece, None] + products[:, :, piece]).min(axis=0)
-    return entries
-
-
-def _cheapest(ways: Array) -> tuple[Array, NDArray[np.uint8]]:
-    """Return the least cost over earlier states, and which [(length, C, pieces)], of ways [(length, C, C, pieces)]."""
-    least, which = ways[:, 0].copy(), np.zeros((len(ways), *ways.shape[2:]), np.uint8)
-    for state in range(1, ways.shape[1]):
-        which[ways[:, state] < least] = state
-        np.minimum(least, ways[:, state], out=least)
-    return least, which
 
 
 def find_segments(cost: NDArray[np.float64], hold: int, change: float) -> list[tuple[int, int]]:
@@ -354,13 +332,8 @@ def find_segments(cost: NDArray[np.float64], hold: int, change: float) -> list[t
         np.minimum(begun, open_segments, out=open_segments)
         label[end] = open_segments.argmin()
         best[end] = open_segments[label[end]]
-    return _segments(label, began, hold)
-
-
-def _segments(label: NDArray[np.intp], began: NDArray[np.bool_], hold: int) -> list[tuple[int, int]]:
-    """Return the segments, from the best label at each end, and whether one of it began ``hold`` frames before."""
     segments: list[tuple[int, int]] = []
-    end = len(label) - 1
+    end = frames
     while end > 0:
         current = int(label[end])
         while not began[end, current]:

@@ -79,8 +79,7 @@ def open_consumer(to: str, print_line: Callable[[str], None], sound: LiveSound |
     to         : ``-`` (lines of JSON), FILE.csv, or a name as ``vmc``, perhaps with :HOST:PORT behind it
     print_line : prints a line
     sound      : that the frames belong to; None: 16 kHz, with the usual look-ahead
-    Raises InputError: none of these. ExportError: the file cannot be written. MissingDependencyError: it needs a
-    package that is not installed.
+    Raises InputError: none of these. ExportError: no writable file. MissingDependencyError: a package is not installed.
     """
     kind = to.partition(":")[0]
     if to == "-":
@@ -179,6 +178,5 @@ def live_link_packet(frame: LiveFrame) -> bytes:
     values = [frame.weights.get(name, 0.0) for name in ARKIT_52] + turned + [0.0] * EYES
     name, rate = SUBJECT.encode(), round(1 / STEP_S)
     head = struct.pack("<I", 6) + DEVICE.encode() + struct.pack(">i", len(name)) + name
-    return (
-        head + struct.pack(">IfII", frame.number, 0.0, rate, 1) + struct.pack(f">B{len(values)}f", len(values), *values)
-    )
+    head += struct.pack(">IfII", frame.number, 0.0, rate, 1)
+    return head + struct.pack(f">B{len(values)}f", len(values), *values)

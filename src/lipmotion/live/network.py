@@ -23,7 +23,7 @@ from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.network_steps import ConvolutionalShape
 from lipmotion.speech.features.mfcc import BANDS, FFT_SIZE, HOP, WINDOW, mel_filters
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.stats.convolution import ConvolutionalNetwork
+from lipmotion.stats.networks import ConvolutionalNetwork
 from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS
 
 TAPS, BLOCK = 16, 160
@@ -72,8 +72,8 @@ class Resampler:
 
     def finish(self) -> NDArray[np.float32]:
         """Return the rest, with silence after it."""
-        seconds = self.seconds
-        pushed, rest = self.pushed, self.push(np.zeros(2 * self._reach + self._rate_hz // 50, np.float32))
+        seconds, pushed = self.seconds, self.pushed
+        rest = self.push(np.zeros(2 * self._reach + self._rate_hz // 50, np.float32))
         self.pushed = pushed
         return rest[: max(int(np.ceil(seconds * SPEECH_RATE_HZ)) - (self._made - len(rest)), 0)]
 
@@ -91,8 +91,7 @@ def mono_samples(samples: Any) -> NDArray[np.float32]:
     if (
         values.ndim not in (1, 2)
         or 0 in values.shape[1:]
-        or values.dtype.kind not in "if"
-        or (values.dtype.kind == "i" and values.itemsize != 2)
+        or not (values.dtype.kind == "f" or (values.dtype.kind == "i" and values.itemsize == 2))
     ):
         raise InputError(
             f"samples of shape {values.shape} and type {values.dtype}, required (N,) or (N, C), floats or int16"
@@ -120,8 +119,7 @@ OUTPUTS = len(ARTICULATORS) + len(VISEMES_15)
 SHAPE = ConvolutionalShape("live", "live-network", STEP_FRAMES * (SPECTRUM_BANDS + 1), 256, (1, 2, 4, 8, 16, 1, 2, 4))
 """It hears the last 1.5 s."""
 START_LEVEL, QUIETEST_LEVEL = 1.0, -2.0
-"""Natural logarithm of the power of loud speech that is assumed before anything is heard, and the least: sound that is
-quieter than this is not made louder."""
+"""Natural logarithm of the power of loud speech that is assumed at first, and the least: quieter sound stays quiet."""
 FALL = 2.3 / (6 * FRAME_RATE_HZ)
 """The level that is assumed falls by so much a frame, 10 dB in 6 s: who begins too loud is not lost afterwards."""
 ATTACK = 0.25

@@ -28,7 +28,7 @@ from lipmotion.live.network import (
     mono_samples,
     silent_steps,
 )
-from lipmotion.live.timings import GivenPhones
+from lipmotion.live.timings import TimedPhones
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VISEMES_15
 from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.pipeline.generate.animate import animate
@@ -58,7 +58,7 @@ TIMED_SHARE = 0.3
 """Weight of phones that are given with their times in the articulators; the rest is what is heard."""
 CORRELATED_STEPS = 0.02
 """The network's errors are alike for about so many steps."""
-KEPT_STEPS, SHOWN_FRAMES = LAGS[-1] + 3, 500
+ANSWER_STEPS, POSE_FRAMES = LAGS[-1] + 3, 500
 OPENING_ROW, SILENT_ROW = ARTICULATORS.index("opening"), VISEMES_15.index("sil")
 LOWEST_RATE_HZ, HIGHEST_RATE_HZ = 4_000, 384_000
 
@@ -108,10 +108,10 @@ class Stream:
         self._smoother = _Smoother(live_network(), self._lag)
         self._first = 0  # the frame at which the sound that is heard now begins
         self._next = 0
-        self._shown: deque[tuple[Array, Array]] = deque([self._face.resting], maxlen=SHOWN_FRAMES)
+        self._poses: deque[tuple[Array, Array]] = deque([self._face.resting], maxlen=POSE_FRAMES)
         self._features = SoundFeatures(live_network().typical)
         self._idling = None if seed is None else Idling(seed)
-        self._given, self._lexicon = GivenPhones(), lexicon or Lexicon()
+        self._timings, self._lexicon = TimedPhones(), lexicon or Lexicon()
         self._listen()
 
     def push(self, samples: Any) -> list[LiveFrame]:
@@ -136,7 +136,7 @@ class Stream:
         while self._next < wanted:
             frames += self._hear(np.zeros(BLOCK, np.float32))
         for _ in range(self._next - wanted):
-            self._shown.pop()
+            self._poses.pop()
         self._next, self._first = wanted, wanted
         self._listen()
         return [replace(frame, known_s=min(frame.known_s, end_s)) for frame in frames if frame.number < wanted]
@@ -152,16 +152,15 @@ class Stream:
         if time_s is not None and not np.isfinite(time_s):
             raise InputError(f"a rest from {time_s} s on, required a time of the stream")
         last = self._next if time_s is None else min(max(int(time_s / STEP_S) + 1, 0), self._next)
-        for _ in range(min(self._next - last, len(self._shown) - 1)):
-            self._shown.pop()
+        for _ in range(min(self._next - last, len(self._poses) - 1)):
+            self._poses.pop()
             self._next -= 1
-        shown, frames = self._shown[-1], []
+        pose, frames = self._poses[-1], []
         for number in range(1, REST_STEPS + 1):
             share = (1 - np.cos(np.pi * number / REST_STEPS)) / 2
-            frames.append(self._frame(between(shown, self._face.resting, share), self._next * STEP_S))
-        self._first, self._given = self._next, GivenPhones()
-        if self._sound is not None:
-            self._sound = []
+            frames.append(self._frame(between(pose, self._face.resting, share), self._next * STEP_S))
+        self._first, self._timings = self._next, TimedPhones()
+        self._sound = None if self._sound is None else []
         self._listen()
         return frames
 
@@ -182,11 +181,11 @@ class Stream:
         mouth then says these words, not what is recognised. Markup and punctuation alone are silence.
         Raises InputError: times that overlap or are no seconds; the stream stays as it was.
         """
-        self._given.add(words, phones=False, lexicon=self._lexicon, now_s=self.time_s)
+        self._timings.add(words, phones=False, lexicon=self._lexicon, now_s=self.time_s)
 
     def add_phones(self, phones: Iterable[tuple[str, float, float]]) -> None:
         """Take phones (ARPAbet; "" is silence) as ``add_words`` does words. Raises InputError: also an unknown one."""
-        self._given.add(phones, phones=True, lexicon=self._lexicon, now_s=self.time_s)
+        self._timings.add(phones, phones=True, lexicon=self._lexicon, now_s=self.time_s)
 
     def look_at(self, yaw_rad: float, pitch_rad: float = 0.0) -> None:
         """Turn eyes and head to somebody, so far to the face's left and upwards; ``look_at(0)``: to the viewer.
@@ -220,12 +219,12 @@ class Stream:
         self._features.restart()
         self._steps = copy.deepcopy(silent_steps())
         self._rows: list[NDArray[np.float32]] = []
-        self._answers = deque([self._smoother.silent] * KEPT_STEPS, KEPT_STEPS)
+        self._answers = deque([self._smoother.silent] * ANSWER_STEPS, ANSWER_STEPS)
         self._heard = 0  # steps
         self._before = [self._smoother.rest] * 2
         self._closing, self._resting, self._opening = 0.0, 1.0, 0.0
-        self._told, self._timed = self._smoother.rest, 0.0  # the phones that were given last, and how far they count
-        self._last, self._leaving = self._shown[-1], 1.0  # the pose from which the mouth goes on
+        self._timed, self._timed_share = self._smoother.rest, 0.0  # by timings, and how far these count
+        self._last, self._leaving = self._poses[-1], 1.0  # the pose from which the mouth goes on
 
     def _hear(self, samples: NDArray[np.float32]) -> list[LiveFrame]:
         frames = []
@@ -244,39 +243,38 @@ class Stream:
     def _speak(self) -> tuple[Array, Array]:
         """Return pose and weights of the frame that is known now."""
         smooth, known = self._smoother.solve(self._answers, self._before)
-        said, silent = known[0], float(known[: AHEAD_STEPS + 1, SILENT_ROW].min())
+        visemes, silent = known[0], float(known[: AHEAD_STEPS + 1, SILENT_ROW].min())
         self._before = [smooth, self._before[0]]
-        given = self._given.row(self._next)
-        share = 0.0
-        if given is not None:
-            self._told, said = np.split(given, [len(ARTICULATORS)])
-            silent = float(said[SILENT_ROW])
+        timed, share = self._timings.row(self._next), 0.0
+        if timed is not None:
+            self._timed, visemes = np.split(timed, [len(ARTICULATORS)])
+            silent = float(visemes[SILENT_ROW])
             share = TIMED_SHARE * (1 - silent)
         step = TIMED_SHARE / START_STEPS
-        self._timed += float(np.clip(share - self._timed, -step, step))
-        smooth = smooth + self._timed * (self._told - smooth)
+        self._timed_share += float(np.clip(share - self._timed_share, -step, step))
+        smooth = smooth + self._timed_share * (self._timed - smooth)
         change = 1 / REST_STEPS if silent > SILENT else -1 / START_STEPS if silent < SPOKEN else 0.0
         self._resting = float(np.clip(self._resting + change, 0, 1))
-        wanted = float(np.interp(said[VISEMES_15.index("PP")], CLOSED if given is None else (0, 1), (0, 1)))
-        self._closing += float(np.clip(wanted - self._closing, -1 / OPENING_STEPS, 1 / CLOSING_STEPS))
+        closing = float(np.interp(visemes[VISEMES_15.index("PP")], CLOSED if timed is None else (0, 1), (0, 1)))
+        self._closing += float(np.clip(closing - self._closing, -1 / OPENING_STEPS, 1 / CLOSING_STEPS))
         self._opening = float(smooth[OPENING_ROW])
-        spoken = self._face.pose(smooth, np.clip(said, 0, 1), self._closing)
+        spoken = self._face.pose(smooth, np.clip(visemes, 0, 1), self._closing)
         resting = self._resting if self._pauses == "rest" else 0.0
-        shown = between(spoken, self._face.resting, (1 - np.cos(np.pi * resting)) / 2)
+        pose = between(spoken, self._face.resting, (1 - np.cos(np.pi * resting)) / 2)
         self._leaving = max(self._leaving - 1 / REST_STEPS, 0.0)
-        shown, before = between(shown, self._last, self._leaving), self._shown[-1]
-        moved = abs(shown[0][self._face.opening] - before[0][self._face.opening])
-        return between(before, shown, LARGEST_MOVE / moved) if moved > LARGEST_MOVE else shown
+        pose, before = between(pose, self._last, self._leaving), self._poses[-1]
+        move = abs(pose[0][self._face.opening] - before[0][self._face.opening])
+        return between(before, pose, LARGEST_MOVE / move) if move > LARGEST_MOVE else pose
 
-    def _frame(self, shown: tuple[Array, Array], known_s: float) -> LiveFrame:
-        self._shown.append(shown)
-        pose, weights = shown
+    def _frame(self, pose: tuple[Array, Array], known_s: float) -> LiveFrame:
+        self._poses.append(pose)
+        motion, weights = pose
         named = dict(zip(WEIGHT_NAMES, weights.tolist(), strict=True))
         time_s = self._next * STEP_S
         if self._idling is not None:
             named |= self._idling.step(time_s, self._opening, self._resting < 0.5)
         self._next += 1
-        return LiveFrame(time_s, known_s, pose, self._face.names, named)
+        return LiveFrame(time_s, known_s, motion, self._face.names, named)
 
     def _animate_all(self) -> list[LiveFrame]:
         """Return the frames of ``animate`` of all sound."""

@@ -19,13 +19,13 @@ from lipmotion.units.text_normalisation import find_words
 
 VOWEL_SHARE = 1.6
 """In a word whose phones have no times, a vowel is so many times as long as a consonant."""
-BEFORE_S, KEPT_S = 0.2, 1.0
+BEFORE_S, REMEMBERED_S = 0.2, 1.0
 """Silence before the first word that is known to be silence; and how long phones are kept once they are said."""
 LONGEST_S, LONGEST_GAP_S = 60.0, 600.0
 """A word or a phone that lasts longer, or is so far ahead, has its times in another unit."""
 
 
-class GivenPhones:
+class TimedPhones:
     """The phones that are given so far, and what they make of the mouth in every step."""
 
     def __init__(self) -> None:
@@ -37,7 +37,7 @@ class GivenPhones:
 
         Raises InputError: times that overlap, end before they begin or are no seconds; an unknown phone.
         """
-        spans = [span for span in self._spans if span.end_s > now_s - KEPT_S]
+        spans = [span for span in self._spans if span.end_s > now_s - REMEMBERED_S]
         end_s = spans[-1].end_s if spans else -np.inf
         for timing in timings:
             try:
@@ -54,7 +54,7 @@ class GivenPhones:
                     f"{LONGEST_GAP_S:g} s after what is known"
                 )
             start_s = max(begin_s, end_s)
-            before_s = start_s - BEFORE_S if end_s < now_s - KEPT_S else end_s
+            before_s = start_s - BEFORE_S if end_s < now_s - REMEMBERED_S else end_s
             if start_s - before_s > STEP_S / 2:
                 spans.append(Span(before_s, start_s, Unit(SILENCE)))
             spans += _list_phones(label, start_s, stop_s, lexicon=None if phones else lexicon)

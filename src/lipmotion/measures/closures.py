@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Curve = NDArray[np.float64]
+Clips = Sequence[Curve]
 CLOSED_SHARE = 0.10
 """The mouth is closed at openings below this share of the 95th percentile of opening on the training list."""
-REACH = 2
-"""A generated closing matches an original one within this many frames (Hofer 2008, §6)."""
+REACH = 2  # a generated closing matches an original one within this many frames (Hofer 2008, §6)
 
 
 @dataclass(frozen=True)
@@ -87,9 +87,7 @@ def count_matches(some: NDArray[np.intp], others: NDArray[np.intp], reach: int =
     return int((np.abs(some[:, None] - others) <= reach).any(axis=1).sum())
 
 
-def measure_closures(
-    generated: Sequence[Curve], original: Sequence[Curve], threshold: float, rate_hz: float
-) -> Closures:
+def measure_closures(generated: Clips, original: Clips, threshold: float, rate_hz: float) -> Closures:
     """Return the closure figures of openings, which are given clip by clip."""
     g_closings = [find_closings(g, threshold) for g in generated]
     o_closings = [find_closings(o, threshold) for o in original]
@@ -107,9 +105,7 @@ def measure_closures(
     )
 
 
-def clip_closure_counts(
-    generated: Sequence[Curve], original: Sequence[Curve], threshold: float
-) -> tuple[list[Curve], list[Curve]]:
+def clip_closure_counts(generated: Clips, original: Clips, threshold: float) -> tuple[list[Curve], list[Curve]]:
     """Return two counts for each clip: original closings with a generated one near them, and all original closings.
 
     generated, original : openings [each shape=(T, 1)]
@@ -122,8 +118,8 @@ def clip_closure_counts(
 
 
 def measure_phones(
-    generated: Sequence[Curve],
-    original: Sequence[Curve],
+    generated: Clips,
+    original: Clips,
     intervals: Sequence[Sequence[tuple[float, float]]],
     speech_s: float,
     threshold: float,

@@ -17,8 +17,7 @@ Array = NDArray[np.float64]
 Clips = Sequence[Array]
 HIGHEST_HZ = 12.5
 """Frequencies above it hold noise of trackers rather than speech, and cameras of 25 Hz do not show them."""
-FLOOR = 1e-6
-"""Power under this share of the largest of the original counts as so much: rounding is no movement."""
+FLOOR = 1e-6  # power under this share of the largest of the original counts as so much: rounding is no movement
 
 
 def measure_modulation_distance(generated: Clips, original: Clips, rate_hz: float) -> Array:
@@ -34,15 +33,11 @@ def measure_modulation_distance(generated: Clips, original: Clips, rate_hz: floa
     return np.sqrt(np.square(difference[frequencies <= HIGHEST_HZ]).mean(axis=0))
 
 
-STILL_SHARE = 0.01
-"""Curves that move by less than this share of the widest of the same unit are rounding or noise."""
+STILL_SHARE = 0.01  # curves that move by less than this share of the widest of the same unit are rounding or noise
 
 
 def correlation(generated: Array, original: Array) -> Array:
-    """Return the correlation of every channel over all frames [shape=(P,)]; 0 where one is constant but for rounding.
-
-    Source: Xie & Liu 2007, Eq. 21 (whose ACC is the mean of these over channels).
-    """
+    """Return the correlation of channels over all frames, 0 for constant ones [shape=(P,)] (Xie & Liu 2007, Eq. 21)."""
     a, b = generated - generated.mean(axis=0), original - original.mean(axis=0)
     scale = np.sqrt((a * a).sum(axis=0) * (b * b).sum(axis=0))
     moves = varies(generated) & varies(original) & (scale > 0)
@@ -78,10 +73,7 @@ def rmse(generated: Clips, original: Clips) -> Array:
 
 
 def measure_nrmse(generated: Clips, original: Clips) -> Array:
-    """Return the RMSE of every channel in units of its standard deviation over all frames [shape=(P,)].
-
-    NaN where the original is constant but for rounding, as in ``measure_variance_ratio`` and ``measure_jerk_ratio``.
-    """
+    """Return the RMSE of channels in standard deviations of the original; NaN where that is constant [shape=(P,)]."""
     return rmse(generated, original) / _mark_moving(original, np.concatenate(original).std(axis=0))
 
 
@@ -134,17 +126,13 @@ def _correlate_shifted(generated: Clips, original: Clips, shift: int) -> float:
     return float(correlate_pooled([g for g, _ in pairs], [o for _, o in pairs])[0]) if pairs else 0.0
 
 
-DRAWS = 2000
-"""Bootstrap samples of an interval."""
+DRAWS = 2000  # bootstrap samples of an interval
 
 
 def compute_interval(
     figure: Callable[[Clips, Clips], float], generated: Clips, original: Clips, seed: int, draws: int = DRAWS
 ) -> tuple[float, float]:
-    """Return the 95 % bootstrap interval (lower and upper limit) of a figure over clips.
-
-    figure : function of generated and original clips
-    """
+    """Return the 95 % bootstrap interval over clips, lower and upper limit, of a figure of generated and original."""
     draw = np.random.default_rng(seed)
     values = []
     for _ in range(draws):
@@ -155,18 +143,12 @@ def compute_interval(
 
 
 def measure_lip_error(generated: Clips, original: Clips) -> float:
-    """Return the mean over frames of the largest distance of any lip vertex, in the unit of the places.
-
-    Source: Richard et al. 2021 (MeshTalk), Fan et al. 2022 (FaceFormer, on VOCASET).
-    """
+    """Return the mean over frames of the largest distance of a lip vertex (Richard et al. 2021, Fan et al. 2022)."""
     return float(np.concatenate([each.max(axis=1) for each in _distances(generated, original)]).mean())
 
 
 def measure_landmarks(generated: Clips, original: Clips) -> float:
-    """Return the mean over frames and landmarks of their distance, in the unit of the places.
-
-    Source: Chen et al. 2018 (LMD).
-    """
+    """Return the mean distance of landmarks over frames, in the unit of the places (LMD: Chen et al. 2018)."""
     return float(np.concatenate([each.mean(axis=1) for each in _distances(generated, original)]).mean())
 
 

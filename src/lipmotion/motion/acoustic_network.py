@@ -26,8 +26,8 @@ from lipmotion.motion.network_steps import (
 from lipmotion.motion.posterior_network import PosteriorNetwork, list_posteriors
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
 from lipmotion.motion.prior_regression import EncodingRegression
-from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence
+from lipmotion.stats.networks import ConvolutionalNetwork
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
 from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Speech, sub_monitor
 
@@ -35,10 +35,8 @@ Array = NDArray[np.float64]
 SHAPE = ConvolutionalShape("network", "network", STEP * SPECTRUM_BANDS, 192, (1, 2, 4, 8, 1, 2, 4, 8))
 """Its input is 1.2 s before and after a frame."""
 BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.3, 0
-MIN_STEPS = 600
-"""Smallest number of optimiser steps: with few recordings, each is used more often."""
-MIN_MOTION_S = 120.0
-"""Seconds of measured motion from which on a network is trained."""
+MIN_STEPS = 600  # smallest number of optimiser steps: with few recordings, each is used more often
+MIN_MOTION_S = 120.0  # seconds of measured motion from which on a network is trained
 POSTERIOR_SHARES = (0.85, 1.0)
 """Share of the network that knows posteriors, for a voice that training knows and for one that it does not. It is
 trained on clean speech, the other one in noise and rooms."""
@@ -108,10 +106,7 @@ class AcousticNetwork(Predictor):
         return PredictorFit(cls(network, mean, scale, variances, posterior_network, encoding))
 
     def predict(self, speech: Speech) -> tuple[Array, Array]:
-        """Return motion in the motion space [shape=(T, Q)] and the distortion of the sound, 0 to 1 [shape=(T,)].
-
-        Raises InputError: speech without a spectrum.
-        """
+        """Return motion [shape=(T, Q)] and distortion, 0 to 1 [shape=(T,)]. Raises InputError: no spectrum."""
         if speech.spectrum is None:
             raise InputError("the speech has no spectrum; an engine that uses one says so by ``inputs``")
         spectrum = speech.spectrum
@@ -146,16 +141,14 @@ class AcousticNetwork(Predictor):
         output = self.network.output
         distortion = np.clip(hidden @ output.weights[:, -1].astype(float) + output.biases[-1], 0, 1)
         if self.posterior_network is not None and speech.posteriors is not None:
-            hidden = np.concatenate(
-                [hidden, self.posterior_network.hidden_units(speech.posteriors, len(hidden))], axis=1
-            )
+            beside = self.posterior_network.hidden_units(speech.posteriors, len(hidden))
+            hidden = np.concatenate([hidden, beside], axis=1)
         return hidden, distortion
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Serialise the network, at half precision."""
-        arrays: dict[str, NDArray[Any]] = {
-            name: array.astype(np.float16) for name, array in SHAPE.arrays(self.network).items()
-        }
+        stored = SHAPE.arrays(self.network)
+        arrays: dict[str, NDArray[Any]] = {name: array.astype(np.float16) for name, array in stored.items()}
         arrays |= {"network_targets": np.stack([self.mean, self.scale]), "network_variances": self.variances}
         for part in (self.posterior_network, self.encoding):
             arrays |= part.arrays() if part is not None else {}
@@ -194,8 +187,7 @@ def _train(training: PredictorTraining, mean: Array, scale: Array) -> Convolutio
         versions = pieces()[number]
         return cut_random_piece(versions[int(rng.integers(len(versions)))], rng)
 
-    plan = TrainingPlan(steps, BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED)
-    return SHAPE.train(training, len(mean) + 1, draw, plan)
+    return SHAPE.train(training, len(mean) + 1, draw, TrainingPlan(steps, BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED))
 
 
 def _sequence(version: ConditionSpectrum, targets: Array, valid: NDArray[np.bool_]) -> TrainingSequence:

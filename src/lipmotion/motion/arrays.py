@@ -7,12 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.articulation import (
-    ARTICULATION,
-    ArticulationPrior,
-    articulation_from_arrays,
-    articulation_to_arrays,
-)
+from lipmotion.motion import articulation
 from lipmotion.motion.closure import OPENING, Closure
 from lipmotion.motion.generation import LearnedMotion, VarianceScaling
 from lipmotion.motion.modulation_filter import MODULATION, filter_from_arrays, filter_to_arrays
@@ -22,12 +17,11 @@ from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_err
 from lipmotion.types import Channel
 from lipmotion.units import UNIT_SETS, UnitSet
 
-PHONE_SET = UNIT_SETS["phone"]
-"""The unit set in which each phone is a unit of its own; models do not store it."""
+PHONE_SET = UNIT_SETS["phone"]  # the unit set in which each phone is a unit of its own; models do not store it
 
 
 def motion_to_arrays(
-    units: UnitSet, space: MotionSpace, closure: Closure | None, prior: ArticulationPrior | None = None
+    units: UnitSet, space: MotionSpace, closure: Closure | None, prior: articulation.ArticulationPrior | None = None
 ) -> dict[str, NDArray[Any]]:
     """Serialise the mapping of phones to units, the motion space, the closure and the prior."""
     arrays: dict[str, NDArray[Any]] = {
@@ -40,18 +34,17 @@ def motion_to_arrays(
         arrays |= {"points_mean": space.points.mean, "points_basis": space.points.basis.astype(np.float32)}
     if closure is not None:
         arrays |= {"closure": np.array([closure.column, closure.closed]), "closure_follow": closure.follow}
-    return arrays | articulation_to_arrays(prior)
+    return arrays | articulation.articulation_to_arrays(prior)
 
 
 def learned_motion_to_arrays(motion: LearnedMotion) -> dict[str, NDArray[Any]]:
-    """Serialise learned motion, with its limits, its variance scaling and its modulation filter.
-
-    For engines that do not store these in arrays of their own.
-    """
-    arrays = motion_to_arrays(PHONE_SET, motion.space, motion.closure, motion.prior) | {
-        "limits": np.stack(motion.limits)
-    }
-    return arrays | scaling_to_arrays(motion.scaling) | filter_to_arrays(motion.modulation)
+    """Serialise learned motion with limits, variance scaling and modulation filter, for engines that store no more."""
+    return (
+        motion_to_arrays(PHONE_SET, motion.space, motion.closure, motion.prior)
+        | {"limits": np.stack(motion.limits)}
+        | scaling_to_arrays(motion.scaling)
+        | filter_to_arrays(motion.modulation)
+    )
 
 
 def scaling_to_arrays(scaling: VarianceScaling | None) -> dict[str, NDArray[Any]]:
@@ -67,11 +60,7 @@ def scaling_from_arrays(arrays: Arrays, dimensions: int) -> VarianceScaling | No
 
 
 def learned_motion_from_arrays(arrays: Arrays, *, filtered: bool = False) -> LearnedMotion:
-    """Deserialise what ``learned_motion_to_arrays`` returned; other arrays are ignored.
-
-    filtered : there must be a modulation filter
-    Raises ModelFormatError: an array is missing, or has a wrong shape, type or range.
-    """
+    """Deserialise a learned motion; ``filtered``: with a modulation filter. Raises ModelFormatError: damaged arrays."""
     with format_errors("the learned motion"):
         _, space, closure, prior = motion_from_arrays(arrays, PHONE_SET.name)
         limits = MotionLimits(*check_arrays(arrays, LIMITS, Q=space.dimensions)["limits"])
@@ -83,21 +72,32 @@ def learned_motion_from_arrays(arrays: Arrays, *, filtered: bool = False) -> Lea
 
 def motion_from_arrays(
     arrays: Arrays, units: str
-) -> tuple[UnitSet, MotionSpace, Closure | None, ArticulationPrior | None]:
+) -> tuple[UnitSet, MotionSpace, Closure | None, articulation.ArticulationPrior | None]:
     """Deserialise the mapping of phones to units, the motion space, the closure and the prior.
 
     units : the name of the unit set; the set itself is in the arrays
     Raises KeyError, ValueError, IndexError, TypeError: an array is missing, or has a wrong shape, type or range.
     """
-    space = _restore_space(arrays)
-    closure = None
+    shapes = check_arrays(arrays, CHANNELS)
+    count, direct = shapes.sizes["P"], shapes["direct"]
+    channels = tuple(Channel(name, unit) for name, unit in shapes["channels"].tolist())
+    if len({channel.name for channel in channels}) < count:
+        raise ValueError("channels whose names repeat")
+    if len(set(direct.tolist()) & set(range(count))) < len(direct):
+        raise ValueError(f"direct channels {direct.tolist()}, required different ones under {count}")
+    points = closure = None
+    if len(direct) == count:
+        refuse_undeclared(arrays.keys() & POINTS.keys())
+    else:
+        stored = check_arrays(arrays, POINTS, R=count - len(direct))
+        check_orthonormal("points_basis", stored["points_basis"])
+        points = Pca(stored["points_mean"], stored["points_basis"])
+    space = MotionSpace(channels, direct, points)
     if OPENING in space.direct_names:
         stored = check_arrays(arrays, CLOSURE, Q=space.dimensions)
         column, closed = stored["closure"]
         if column != space.direct_names.index(OPENING) or closed < 0:
-            raise ValueError(
-                f"closure of column {column:g} at {closed:g}, required the column of {OPENING} and 0 or more"
-            )
+            raise ValueError(f"closure of column {column:g} at {closed:g}, required that of {OPENING} and 0 or more")
         closure = Closure(int(column), float(closed), stored["closure_follow"])
     unit_set = PHONE_SET
     if units != PHONE_SET.name:
@@ -106,7 +106,7 @@ def motion_from_arrays(
         if len(unit_of_phone) != len(pairs):
             raise ValueError("a phone with two units")
         unit_set = UnitSet(units, unit_of_phone)
-    return unit_set, space, closure, articulation_from_arrays(arrays, space.dimensions)
+    return unit_set, space, closure, articulation.articulation_from_arrays(arrays, space.dimensions)
 
 
 CHANNELS = {"channels": ArraySpec(np.str_, "P 2"), "direct": ArraySpec(np.intp, "d", 0, 1e6)}
@@ -118,23 +118,7 @@ CLOSURE = {"closure": ArraySpec(np.float64, "2"), "closure_follow": ArraySpec(np
 UNITS = {"units": ArraySpec(np.str_, "N 2")}
 LIMITS = {"limits": ArraySpec(np.float64, "2 Q")}
 SCALING = {"scaling": ArraySpec(np.float64, "2 Q")}
-MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *UNITS, *ARTICULATION)
+MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *UNITS, *articulation.ARTICULATION)
 """Names of the arrays of ``motion_to_arrays``: P channels, of which R are reduced to K dimensions."""
-LEARNED_MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *LIMITS, *SCALING, *ARTICULATION, *MODULATION)
+LEARNED_MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *LIMITS, *SCALING, *articulation.ARTICULATION, *MODULATION)
 """Names of the arrays of ``learned_motion_to_arrays``."""
-
-
-def _restore_space(arrays: Arrays) -> MotionSpace:
-    stored = check_arrays(arrays, CHANNELS)
-    count, direct = stored.sizes["P"], stored["direct"]
-    channels = tuple(Channel(name, unit) for name, unit in stored["channels"].tolist())
-    if len({channel.name for channel in channels}) < count:
-        raise ValueError("channels whose names repeat")
-    if len(set(direct.tolist()) & set(range(count))) < len(direct):
-        raise ValueError(f"direct channels {direct.tolist()}, required different ones under {count}")
-    if len(direct) == count:
-        refuse_undeclared(arrays.keys() & POINTS.keys())
-        return MotionSpace(channels, direct, None)
-    points = check_arrays(arrays, POINTS, R=count - len(direct))
-    check_orthonormal("points_basis", points["points_basis"])
-    return MotionSpace(channels, direct, Pca(points["points_mean"], points["points_basis"]))

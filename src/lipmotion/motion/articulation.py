@@ -29,8 +29,7 @@ def count_unseen(voice: float) -> float:
 
 
 Array = NDArray[np.float64]
-Context = tuple[str, str, str]
-"""The phone before, the phone, and the phone after."""
+Context = tuple[str, str, str]  # the phone before, the phone, and the phone after
 Statistics = tuple[Array, Array]
 """Means and precisions of successive frames [each shape=(T, 3, Q)], or values and variances [each shape=(T, Q)]."""
 Predict = Callable[[slice], Statistics]
@@ -42,26 +41,21 @@ mean of these and of his own: few words, as GRID's, do not show how far a mouth 
 THIRDS = ("begin", "middle", "end")
 SMOOTHING_S = 0.048
 """Standard deviation of the Gaussian that joins the thirds of successive phones: 1.2 pictures at 25 Hz."""
-REST_S = 0.5
-"""Silence further than this from speech is not in the table: the mouth rests."""
+REST_S = 0.5  # silence further than this from speech is not in the table: the mouth rests
 GAIN = 2.0
 """The means of the table are made so much larger. They were measured on recognised words, of which a fifth to a third
 are wrong, so that all are drawn towards 0; of 1.3, 1.8 and 2.2, the largest was best for strangers."""
-RIDGE = 1e-2
-"""Ridge parameter of the map from articulators to the motion space, as a share of the number of frames."""
+RIDGE = 1e-2  # ridge parameter of the map from articulators to the motion space, as a share of the number of frames
 MIN_DEVIATION = 1e-6
-TABLE_WEIGHT = 4.0
-"""Weight of the table beside the means of states, in a context that training never saw."""
-TABLE_WEIGHT_WITH_PREDICTOR = 1.0
-"""The same where a predictor that asks for no context stands beside the states."""
+TABLE_WEIGHT = 4.0  # weight of the table beside the means of states, in a context that training never saw
+TABLE_WEIGHT_WITH_PREDICTOR = 1.0  # the same where a predictor that asks for no context stands beside the states
 KNOWN_VOICE_SHARE = 0.3
 """Share of that weight for a voice that training knows: of its speaker the predictor knows more than the table."""
 POWER = 3
 """The weight of the table grows with this power of the reliability, for phones that are wrong make contexts unknown,
 and of how unknown a context is: the table has a third of the weight where training saw the context once, an eighth
 where twice."""
-HALF_FAMILIAR_COUNT = 1.0
-"""Occurrences in training after which a context counts as half familiar."""
+HALF_FAMILIAR_COUNT = 1.0  # occurrences in training after which a context counts as half familiar
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,10 +76,7 @@ class ArticulationPrior:
     known_voice_share: float = 1.0
 
     def familiarity(self, units: Timeline[Unit], frames: int) -> Array:
-        """Return how well training knows each phone between its neighbours, 0 to 1 [shape=(frames,)].
-
-        Silence at both ends and away from speech, in which the mouth rests, is always well known.
-        """
+        """Return how well training knows each phone between its neighbours, and rest, 0 to 1 [shape=(frames,)]."""
         steps = np.ones((frames, 1))
         for left, span, right in with_neighbours(units):
             at_end = is_silent(span.label.phone) and span in (units[0], units[-1])
@@ -125,10 +116,7 @@ def draw_towards(values: Array, share: Array, statistics: Predict) -> Predict:
 
 
 def slice_dynamics(values: Array, frames: slice) -> Array:
-    """Return static value, Δ and Δ² of a range of N frames [shape=(N, 3, Q)].
-
-    values : of the whole recording [shape=(T, Q)]
-    """
+    """Return static value, Δ and Δ² [shape=(N, 3, Q)] of N frames of the values of a recording [shape=(T, Q)]."""
     start, stop, _ = frames.indices(len(values))
     first = max(start - 1, 0)
     return with_dynamics(values[first : stop + 1])[start - first :][: stop - start]
@@ -160,16 +148,12 @@ def smooth_steps(steps: Array) -> Array:
     reach = int(np.ceil(4 * deviation))
     weights = np.exp(-np.square(np.arange(-reach, reach + 1) / deviation) / 2)
     padded = np.pad(steps, ((reach, reach), (0, 0)), mode="edge")
-    columns = [np.convolve(column, weights / weights.sum(), mode="valid") for column in padded.T]
-    return np.stack(columns, axis=1)
+    return np.stack([np.convolve(column, weights / weights.sum(), mode="valid") for column in padded.T], axis=1)
 
 
 @cache
 def average_classes() -> dict[bool, Array]:
-    """Return the mean of every articulator in each third of consonants (False) and vowels (True) [each shape=(3, 8)].
-
-    Phones count as often as they occur.
-    """
+    """Return the mean of articulators in each third of consonants (False) and vowels (True) [each shape=(3, 8)]."""
     table, counts = read_articulation_table(), {row["phone"]: float(row["count"]) for row in _read_csv()}
     spoken = [phone for phone in table if not is_silent(phone)]
     return {
@@ -265,11 +249,7 @@ def articulation_to_arrays(prior: ArticulationPrior | None) -> dict[str, NDArray
 
 
 def articulation_from_arrays(arrays: Arrays, dimensions: int) -> ArticulationPrior | None:
-    """Deserialise a prior; None where there is none, as in models of earlier versions.
-
-    dimensions : of the motion space, Q
-    Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
-    """
+    """Deserialise a prior in Q dimensions; None: an earlier version. Raises KeyError, ValueError: damaged arrays."""
     if arrays.keys().isdisjoint(ARTICULATION):
         return None
     stored = check_arrays(arrays, ARTICULATION, Q=dimensions)
@@ -291,11 +271,7 @@ def _merge_cells(phone: str) -> str:
 
 
 def measure_articulators(motion: NDArray[np.floating[Any]], names: Sequence[str]) -> dict[str, Array]:
-    """Return the articulators that can be measured on motion, by name [each shape=(N,)].
-
-    motion : values of all channels [shape=(N, P)]
-    names  : of the channels
-    """
+    """Return the articulators that motion of named channels [shape=(N, P)] shows, by name [each shape=(N,)]."""
     curves = {name: np.asarray(curve, float) for name, curve in zip(names, np.asarray(motion).T, strict=True)}
     measured = {name: curves[name] for name in ARTICULATORS[:3] if name in curves}
     for name, (points, measure) in _MEASURES.items():
@@ -325,8 +301,7 @@ NOISY_SHARE = 0.3
 """The same of a voice that training knows, where noise makes its phones unreliable; none where they are reliable."""
 CONFIRMED = -0.5
 """An unreliable p, b or m closes the lips where the general network hears them less open than so many deviations."""
-NEAR_FRAMES = 20
-"""Frames before and after speech in which that holds: elsewhere the mouth rests."""
+NEAR_FRAMES = 20  # frames before and after speech in which that holds: elsewhere the mouth rests
 VOWEL_S, OPENING_BY_DURATION = 0.1, 0.5
 """A vowel of the first duration is as open as the table says; one that is e times as long is more open by so many
 standard deviations of the speaker, and a shorter one less (docs/results/voices.md)."""
@@ -364,10 +339,7 @@ class UnseenSpeaker:
     voice: float
 
     def follow_sound(self, statistics: Predict, articulators: Array) -> Predict:
-        """Draw the motion in and near speech towards what the general network hears in the sound.
-
-        articulators : of ``motion.general_motion`` [shape=(T, 8)]
-        """
+        """Draw motion in and near speech towards articulators that the general network hears [shape=(T, 8)]."""
         spoken = np.zeros((self.frames, 1))
         for span in self.units:
             if not is_silent(span.label.phone):
@@ -382,10 +354,7 @@ class UnseenSpeaker:
         return draw_towards(heard, share, statistics)
 
     def confirm_closures(self, ranges: Sequence[slice], articulators: Array) -> list[slice]:
-        """Return the ranges of frames in which a p, b or m can be relied on, or the general network hears one.
-
-        articulators : of ``motion.general_motion`` [shape=(T, 8)]
-        """
+        """Return the ranges of p, b, m that are reliable, or that heard articulators confirm [shape=(T, 8)]."""
         reliability, opening = np.broadcast_to(self.reliability, self.frames), articulators[:, 0]
         return [r for r in ranges if reliability[r].mean() > 0.5 or opening[r].min() < CONFIRMED]
 
@@ -430,10 +399,7 @@ class UnseenSpeaker:
 
 
 def choose_closing_reach(voice: float) -> float:
-    """Return how many seconds before and after a p, b or m the lips may close; negative: seconds within it.
-
-    voice : how well training knows the voice, 0 to 1
-    """
+    """Return how many seconds around a p, b or m lips may close; negative: within; voice: how well known, 0 to 1."""
     return REACH_S - count_unseen(voice) * (REACH_S + INSET_S)
 
 

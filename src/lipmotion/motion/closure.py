@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from lipmotion.types import FRAME_RATE_HZ, WEIGHT, Channel, Example, Motion, Timeline, Unit
 from lipmotion.units import mark_closing_phones
 
+Array = NDArray[np.float64]
 OPENING = "opening"
-REACH_S = 0.02
-"""Seconds before and after the span of a phone in which the lips may close: the accuracy of alignments."""
+REACH_S = 0.02  # seconds before and after the span of a phone in which the lips may close: the accuracy of alignments
 CLOSED_PERCENTILE = 2.0
 """Lips that touch are open no further than this percentile of all frames, nor than that of the frames of speech. Of six
 GRID speakers with transcripts the median over p, b and m is no more than either; of recognised phones it may be
@@ -82,10 +82,7 @@ def estimate_closed_opening(smallest: Sequence[float], *groups: NDArray[np.float
 
 
 def estimate_closure(
-    values: Sequence[NDArray[np.float64]],
-    valid: Sequence[NDArray[np.bool_]],
-    timelines: Sequence[Timeline[Unit]],
-    column: int,
+    values: Sequence[Array], valid: Sequence[NDArray[np.bool_]], timelines: Sequence[Timeline[Unit]], column: int
 ) -> Closure:
     """Return the closure of the lips, estimated from motion with its phones.
 
@@ -108,9 +105,7 @@ def estimate_closure(
     return Closure(column, closed, opening @ centred / max(float(opening @ opening), 1e-12))
 
 
-def choose_closed_frames(
-    closure: Closure, opening: NDArray[np.float64], ranges: Sequence[slice], pinned: Sequence[int]
-) -> list[int]:
+def choose_closed_frames(closure: Closure, opening: Array, ranges: Sequence[slice], pinned: Sequence[int]) -> list[int]:
     """Return the frames in which the lips must be made to close: the least open frame of each p, b and m.
 
     opening : generated opening [shape=(T,)]
@@ -126,14 +121,8 @@ def choose_closed_frames(
     return closed
 
 
-def fit_closure(
-    names: Sequence[str], values: Sequence[NDArray[np.float64]], examples: Sequence[Example]
-) -> Closure | None:
-    """Return the closure of the lips in some examples, or None where no channel is called ``opening``.
-
-    names  : of the first dimensions of the motion space
-    values : motion of each example in this space [each shape=(T, Q)]
-    """
+def fit_closure(names: Sequence[str], values: Sequence[Array], examples: Sequence[Example]) -> Closure | None:
+    """Return the closure of the lips in motion of examples [each shape=(T, Q)]; None without a channel ``opening``."""
     if OPENING not in names:
         return None
     masks, timelines = [example.valid for example in examples], [example.speech.units for example in examples]

@@ -14,10 +14,8 @@ from lipmotion.storage.schema import LARGEST_MEAN, ArraySpec, CheckedArrays
 
 OFFSETS = (-24, -18, -12, -8, -4, 0, 4, 8, 12, 18, 24)
 """Frames whose features are used, relative to the predicted one: up to 240 ms before and after, denser near it."""
-SCALE = 12.0
-"""Root mean square length of a reduced feature vector: ridge parameters are relative to it."""
-MIN_DEVIATION = 1e-3
-"""Added to the standard deviation of every input, so that constant inputs can be standardised."""
+SCALE = 12.0  # root mean square length of a reduced feature vector: ridge parameters are relative to it
+MIN_DEVIATION = 1e-3  # added to the standard deviation of every input, so that constant inputs can be standardised
 FEATURES = 39
 INPUTS = FEATURES * len(OFFSETS)
 WINDOW = {
@@ -46,16 +44,11 @@ class AcousticContext:
 
 
 def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -> AcousticContext:
-    """Return the acoustic context of some recordings: the principal components of all their frames.
-
-    recordings : acoustic features of each [each shape=(T, D)]
-    size       : number of components, or fewer where there are fewer inputs
-    """
+    """Return the first ``size`` principal components, or all, of acoustic features [each shape=(T, D)]."""
     mean, covariance = measure_covariance(_stack(features, slice(None)) for features in recordings)
     scale = np.sqrt(np.maximum(np.diagonal(covariance), 0)) + MIN_DEVIATION
-    basis = np.ascontiguousarray(
-        find_principal_axes(covariance / np.outer(scale, scale), size).T
-    )  # stored in this order
+    axes = find_principal_axes(covariance / np.outer(scale, scale), size)
+    basis = np.ascontiguousarray(axes.T)  # stored in this order
     factor = SCALE / np.sqrt(basis.shape[1])
     return AcousticContext(*(array.astype(np.float32) for array in (mean, scale, basis * factor)))
 
@@ -66,10 +59,7 @@ def acoustic_context_to_arrays(context: AcousticContext) -> dict[str, NDArray[An
 
 
 def acoustic_context_from_arrays(arrays: CheckedArrays) -> AcousticContext:
-    """Deserialise a context from arrays that were checked against ``WINDOW``.
-
-    Raises ValueError: a scale that is not positive, or a column of the basis that is zero.
-    """
+    """Deserialise a context from checked arrays. Raises ValueError: a scale not positive, or a column of zeros."""
     mean, scale = arrays["window"]
     if not (scale > 0).all():
         raise ValueError("window with a scale that is not more than 0")

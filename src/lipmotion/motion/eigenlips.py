@@ -14,8 +14,7 @@ from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_err
 from lipmotion.types import GREY, Channel
 
 COLOURS = "rgb"
-COMPONENTS = 30
-"""Components of each colour, as in the paper."""
+COMPONENTS = 30  # components of each colour, as in the paper
 Images = NDArray[np.uint8]
 
 
@@ -50,33 +49,21 @@ class Eigenlips:
         return f"{len(self.channels)} of {width} × {height} px, {share:.1f} % of the variance of the pictures"
 
     def project(self, images: Images) -> NDArray[np.float32]:
-        """Return the coefficients [shape=(T, 3·K)] of pictures [shape=(T, H, W, 3)]: g = Aᵀ(I − Ī), Eq. 13.
-
-        Raises InputError: pictures of another size.
-        """
+        """Return coefficients [shape=(T, 3·K)] of pictures: g = Aᵀ(I − Ī), Eq. 13. Raises InputError: another size."""
         _check(images, self.size)
         flat = _sort_by_colour(images)
-        return np.concatenate(
-            [(flat[c] - self.mean[c]) @ self.basis[c].T for c in range(len(COLOURS))], axis=1, dtype=np.float32
-        )
+        colours = [(flat[c] - self.mean[c]) @ self.basis[c].T for c in range(len(COLOURS))]
+        return np.concatenate(colours, axis=1, dtype=np.float32)
 
     def restore(self, coefficients: NDArray[np.floating[Any]]) -> Images:
-        """Return the pictures [shape=(T, H, W, 3)] at some coefficients [shape=(T, 3·K)]: I = Ī + Ag, Eq. 12.
-
-        Raises InputError: another number of coefficients.
-        """
+        """Return pictures [shape=(T, H, W, 3)]: I = Ī + Ag, Eq. 12. Raises InputError: another number of them."""
         return np.clip(np.rint(self.expand(coefficients)), 0, 255).astype(np.uint8)
 
     def expand(self, coefficients: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
-        """Return the same pictures before they are rounded, float32 [shape=(T, H, W, 3)], in grey levels.
-
-        Raises InputError: another number of coefficients.
-        """
+        """Return the same pictures before they are rounded, in grey levels, float32 [shape=(T, H, W, 3)]."""
         wanted = self.basis.shape[0] * self.basis.shape[1]
         if coefficients.ndim != 2 or coefficients.shape[1] != wanted:
-            raise InputError(
-                f"coefficients of shape {coefficients.shape}, required (T, {wanted}), as project gives them"
-            )
+            raise InputError(f"coefficients of shape {coefficients.shape}, required (T, {wanted}), as of project")
         parts = np.split(coefficients.astype(np.float32), len(COLOURS), axis=1)
         flat = np.stack([part @ self.basis[c] + self.mean[c] for c, part in enumerate(parts)], axis=-1)
         return flat.reshape(-1, *self.size, len(COLOURS))
@@ -99,7 +86,10 @@ def fit_eigenlips(images: Images, components: int = COMPONENTS) -> Eigenlips:
         raise InputError(f"{len(images)} mouth pictures, all the same; required at least two that differ")
     basis = np.stack([space.basis[:count] for space in spaces]).astype(np.float32)
     mean = np.stack([space.mean for space in spaces]).astype(np.float32)
-    explained = np.array([_share(colour - m, b) for colour, m, b in zip(flat, mean, basis, strict=True)])
+    explained = np.zeros(len(COLOURS))
+    for c, (colour, axes) in enumerate(zip(flat, basis, strict=True)):
+        centred = colour - mean[c]
+        explained[c] = np.square(centred @ axes.T).sum(dtype=float) / np.square(centred).sum(dtype=float)
     height, width = images.shape[1:3]
     return Eigenlips(mean, basis, explained, (height, width))
 
@@ -115,11 +105,7 @@ def eigenlips_to_arrays(eigenlips: Eigenlips) -> dict[str, NDArray[Any]]:
 
 
 def eigenlips_from_arrays(arrays: Arrays, remedy: str = "train the model again") -> Eigenlips:
-    """Deserialise eigenlips.
-
-    remedy : what to do about damaged ones, for the message
-    Raises ModelFormatError: an array is missing, or they do not fit together.
-    """
+    """Deserialise eigenlips; ``remedy``: what to do about damaged ones. Raises ModelFormatError: they are damaged."""
     with format_errors("the eigenlips", remedy, verb="are"):
         refuse_undeclared(arrays, SIZE, SPACES)
         height, width = check_arrays(arrays, SIZE)["size"].tolist()
@@ -141,11 +127,6 @@ SPACES = {
 def _sort_by_colour(images: Images) -> NDArray[np.uint8]:
     """Return pictures as rows of each colour [shape=(3, T, H·W)]."""
     return np.moveaxis(images, -1, 0).reshape(len(COLOURS), len(images), -1)
-
-
-def _share(centred: NDArray[np.float32], basis: NDArray[np.float32]) -> float:
-    """Return the share of the variance that a basis [shape=(K, D)] explains of centred pictures [shape=(N, D)]."""
-    return float(np.square(centred @ basis.T).sum(dtype=float) / np.square(centred).sum(dtype=float))
 
 
 def _check(images: Images, size: tuple[int, int] | None = None) -> None:

@@ -14,15 +14,13 @@ from lipmotion.types import ENERGY_FEATURE, FRAME_RATE_HZ, Span, Speech, Timelin
 from lipmotion.units import PHONES, SILENCE, UNIT_SETS, UnitSet, describe_unknown_phone, is_silent
 
 Array = NDArray[np.float64]
-BEFORE_SPEECH_S = 0.05
-"""Mouths open or close for the first phone this long before it."""
+BEFORE_SPEECH_S = 0.05  # mouths open or close for the first phone this long before it
 MIN_SILENCE_S, FLOOR_MARGIN = 0.05, 1e-4
 DISTORTIONS = (0.2, 0.35)
 """Recognised phones are relied on up to the first distortion of the sound, and from the second one on not at all. The
 network finds 0.17 to 0.27 in quiet recordings of its speaker, 0.40 to 0.50 in white noise at 20 dB, 0.45 to 0.63 in
 babble at 20 dB."""
-DISTORTION_S = 1.0
-"""Seconds before and after a frame over which the distortion is averaged."""
+DISTORTION_S = 1.0  # seconds before and after a frame over which the distortion is averaged
 
 
 def is_away_from_speech(time_s: Array, speech_s: Sequence[tuple[float, float]], margin_s: float) -> NDArray[np.bool_]:
@@ -39,12 +37,8 @@ def is_away_from_speech(time_s: Array, speech_s: Sequence[tuple[float, float]], 
 
 
 def find_runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return first frame and the one after the last of each run of frames in which a mask is True [shape=(R, 2)].
-
-    mask : bool array [shape=(T,)]
-    """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
-    return edges.reshape(-1, 2)
+    """Return first frame and the one after the last of each run of True in a mask [shape=(T,)] [shape=(R, 2)]."""
+    return np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]))).reshape(-1, 2)
 
 
 def list_speech_intervals(units: Timeline[Unit]) -> list[tuple[float, float]]:
@@ -83,10 +77,7 @@ def rate_phones(speech: Speech, distortion: Array | None, frames: int) -> Array:
 
 
 def rate_clearness(distortion: Array) -> Array:
-    """Return how far a recording is free of noise and room around each frame, 0 to 1 [shape=(T,)]: ``DISTORTIONS``.
-
-    distortion : of the sound in every frame [shape=(T,)]
-    """
+    """Return how free of noise and room a recording is, 0 to 1, from the distortion of its frames [each shape=(T,)]."""
     frames = len(distortion)
     reach = int(DISTORTION_S * FRAME_RATE_HZ)
     total, numbers = np.concatenate([[0.0], np.cumsum(distortion)]), np.arange(frames)
@@ -96,8 +87,7 @@ def rate_clearness(distortion: Array) -> Array:
     return clear
 
 
-REST_STATE = -1
-"""The number of the one state of the rest pose: silence far from speech."""
+REST_STATE = -1  # the number of the one state of the rest pose: silence far from speech
 
 
 class FullContextState(NamedTuple):
@@ -166,10 +156,7 @@ def with_neighbours(units: Timeline[Unit]) -> Iterator[tuple[str, Span[Unit], st
 
 
 def with_unit_names(spans: Timeline[Unit], units: UnitSet = UNIT_SETS["phone"]) -> Timeline[Unit]:
-    """Return the timeline with the full-context name of each phone's unit (``sil-p+aa``).
-
-    Where a label has no phone, its unit keeps its name.
-    """
+    """Return the timeline with the full-context name of each phone's unit (``sil-p+aa``); others keep theirs."""
     silence = units.unit(SILENCE)
     sequence = [silence, *(units.unit_of(span.label) for span in spans), silence]
     renamed = []
@@ -198,19 +185,14 @@ def label_full_context(units: Timeline[Unit], frames: int, layout: StateLayout) 
         count = layout.states(unit)
         named = [FullContextState(left_unit, unit, right_unit, number) for number in range(count)]
         rests = is_silent(span.label.phone) & away[first:stop]
-        state = _states(time_s, span.start_s, span.end_s, count, layout.edge_s)
+        step = min((span.end_s - span.start_s) / count, layout.edge_s)
+        half = count // 2
+        from_start, from_end = (time_s - span.start_s) / step, (span.end_s - time_s) / step
+        before = np.floor(from_start + 1e-9)
+        after = count - np.ceil(from_end - 1e-9)
+        numbers = np.where(from_start < half, before, np.where(from_end <= half + 1e-9, after, half))
+        state = np.minimum(np.maximum(numbers, 0), count - 1).astype(np.intp)
         for frame, number, at_rest in zip(range(first, stop), state.tolist(), rests.tolist(), strict=True):
             if not at_rest:
                 result[frame] = named[number]
     return result
-
-
-def _states(time_s: NDArray[np.float64], start_s: float, end_s: float, states: int, edge_s: float) -> NDArray[np.intp]:
-    """Return the number of the state of a unit at each of some times [shape=(T,)]; the unit has ``states`` states."""
-    step = min((end_s - start_s) / states, edge_s)
-    half = states // 2
-    from_start, from_end = (time_s - start_s) / step, (end_s - time_s) / step
-    before = np.floor(from_start + 1e-9)
-    after = states - np.ceil(from_end - 1e-9)
-    state = np.where(from_start < half, before, np.where(from_end <= half + 1e-9, after, half))
-    return np.minimum(np.maximum(state, 0), states - 1).astype(np.intp)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.network_steps import STEP, ConvolutionalShape, interpolate_steps
-from lipmotion.stats.convolution import ConvolutionalNetwork
+from lipmotion.stats.networks import ConvolutionalNetwork
 from lipmotion.types import Speech
 
 WEIGHTS = "general-motion.npz"

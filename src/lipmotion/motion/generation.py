@@ -11,16 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.banded import solve_mlpg
-from lipmotion.motion.articulation import (
-    ArticulationPrior,
-    Predict,
-    Statistics,
-    UnseenSpeaker,
-    choose_closing_reach,
-    count_unseen,
-    fit_articulation_prior,
-    widen_range,
-)
+from lipmotion.motion import articulation
 from lipmotion.motion.closure import Closure, choose_closed_frames, find_closable_ranges, fit_closure, is_never_negative
 from lipmotion.motion.modulation_filter import ModulationFilter
 from lipmotion.motion.space import MotionLimits, MotionSpace, fit_reduced_motion, measure_limits
@@ -39,8 +30,7 @@ from lipmotion.types import (
 )
 
 Array = NDArray[np.float64]
-LARGEST_FACTOR = 2.0
-"""No factor is larger: a dimension that hardly depends on speech would be scaled too far."""
+LARGEST_FACTOR = 2.0  # no factor is larger: a dimension that hardly depends on speech would be scaled too far
 MIN_DEVIATION = 1e-6
 
 
@@ -52,8 +42,7 @@ def fit_scaling_factors(recorded: Sequence[NDArray[Any]], generated: Sequence[Ar
     ``LARGEST_FACTOR``.
     """
     wanted, made = (np.mean([clip.std(axis=0) for clip in clips], axis=0) for clips in (recorded, generated))
-    ratio = wanted / np.maximum(made, MIN_DEVIATION)
-    return np.clip(ratio, 1.0, LARGEST_FACTOR)
+    return np.clip(wanted / np.maximum(made, MIN_DEVIATION), 1.0, LARGEST_FACTOR)
 
 
 class VarianceScaling(NamedTuple):
@@ -69,10 +58,7 @@ class VarianceScaling(NamedTuple):
     rest: Array
 
     def apply(self, means: Array, precisions: Array) -> tuple[Array, Array]:
-        """Return means and precisions of the scaled movements [each shape=(T, 3, Q)].
-
-        means, precisions : of static value, Δ and Δ² [each shape=(T, 3, Q)]
-        """
+        """Return means and precisions of static value, Δ and Δ² of the scaled movements [each shape=(T, 3, Q)]."""
         scaled = means * self.factors
         scaled[:, 0] += self.rest * (1 - self.factors)
         return scaled, precisions / (self.factors * self.factors)
@@ -81,11 +67,9 @@ class VarianceScaling(NamedTuple):
 BLOCK_FRAMES, MARGIN_FRAMES = 6000, 500
 """Frames of a block, and frames before and after it that are generated with it and then dropped: frames that are
 seconds away do not change the result, and the memory does not grow with the recording."""
-DOUBLE_FRAMES = 60_000
-"""The motion of recordings beyond ten minutes is in single precision."""
+DOUBLE_FRAMES = 60_000  # the motion of recordings beyond ten minutes is in single precision
 
-Pins = dict[tuple[int, int], float]
-"""Pinned values by frame and dimension of the motion space."""
+Pins = dict[tuple[int, int], float]  # pinned values by frame and dimension of the motion space
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +88,7 @@ class LearnedMotion:
     closure: Closure | None
     limits: MotionLimits
     scaling: VarianceScaling | None = None
-    prior: ArticulationPrior | None = None
+    prior: articulation.ArticulationPrior | None = None
     modulation: ModulationFilter | None = None
 
     def for_voice(self, voice: float) -> LearnedMotion:
@@ -115,14 +99,14 @@ class LearnedMotion:
         """
         if self.modulation is None or voice == 1:
             return self
-        strength = np.full(self.space.dimensions, 1 - count_unseen(voice))
+        strength = np.full(self.space.dimensions, 1 - articulation.count_unseen(voice))
         if "width" in self.space.direct_names:
             strength[self.space.direct_names.index("width")] **= 2
         return replace(self, modulation=self.modulation.scale_to(strength))
 
     def generate(  # noqa: PLR0913
         self,
-        statistics: Predict,
+        statistics: articulation.Predict,
         frames: int,
         units: Timeline[Unit],
         constraints: Constraints | None = None,
@@ -157,23 +141,22 @@ class LearnedMotion:
         if self.prior is not None:
             statistics = self.prior.blend(statistics, units, frames, reliability, voice)
             if (voice < 1 or articulators is not None) and scaling is not None and self.closure is not None:
-                speaker = UnseenSpeaker(self.prior, units, frames, reliability, voice)
+                speaker = articulation.UnseenSpeaker(self.prior, units, frames, reliability, voice)
                 statistics = speaker.raise_contrast(statistics)
                 statistics = speaker.open_before_speech(statistics)
-                ranges = find_closable_ranges(units, frames, closing_units, choose_closing_reach(voice))
+                ranges = find_closable_ranges(units, frames, closing_units, articulation.choose_closing_reach(voice))
                 if articulators is not None:
                     statistics = speaker.follow_sound(statistics, articulators)
                     ranges = speaker.confirm_closures(ranges, articulators)
-                gain = widen_range(self.prior, self.space, voice, float(np.mean(reliability)))
+                gain = articulation.widen_range(self.prior, self.space, voice, float(np.mean(reliability)))
                 scaling = scaling._replace(factors=scaling.factors * gain)
         ranges = ranges if close else []
         space, precision = self.space, np.float32 if frames > DOUBLE_FRAMES else np.float64
         motion = np.empty((frames, len(space.channels)), precision)
         spread = np.empty((frames, space.dimensions), precision)
         for inner, outer in split_into_blocks(frames):
-            block_pins = {
-                (frame - outer.start, c): v for (frame, c), v in pins.items() if outer.start <= frame < outer.stop
-            }
+            inner_pins = (((f, c), v) for (f, c), v in pins.items() if outer.start <= f < outer.stop)
+            block_pins = {(f - outer.start, c): v for (f, c), v in inner_pins}
             block_ranges = [
                 slice(closing.start - outer.start, closing.stop - outer.start)
                 for closing in ranges
@@ -187,10 +170,11 @@ class LearnedMotion:
             spread[inner] = variance[inside]
         weights = [channel.unit == WEIGHT for channel in space.channels]
         motion[:, weights] = np.maximum(motion[:, weights], 0)
-        variances = ReducedVariance(spread, space.mixing.astype(precision))
-        return Motion(motion, FRAME_RATE_HZ, space.channels), variances
+        return Motion(motion, FRAME_RATE_HZ, space.channels), ReducedVariance(spread, space.mixing.astype(precision))
 
-    def _solve_block(self, statistics: Statistics, pins: Pins, ranges: Sequence[slice]) -> Statistics:
+    def _solve_block(
+        self, statistics: articulation.Statistics, pins: Pins, ranges: Sequence[slice]
+    ) -> articulation.Statistics:
         """Return values and variances of a block [each shape=(T, Q)], with the lips closed once in every range.
 
         Where lips are to close, the opening is generated again with pins at the closed frames; the change of the
@@ -283,5 +267,5 @@ def fit_motion(examples: Sequence[Example], components: int) -> tuple[LearnedMot
     space, values = fit_reduced_motion(examples, components)
     closure = fit_closure(space.direct_names, values, examples)
     valid = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
-    prior = fit_articulation_prior(space, values, examples)
+    prior = articulation.fit_articulation_prior(space, values, examples)
     return LearnedMotion(space, closure, measure_limits(valid), prior=prior), values

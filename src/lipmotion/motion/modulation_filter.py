@@ -20,28 +20,19 @@ from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays
 from lipmotion.types import FRAME_RATE_HZ, Example, Rule
 
 Array = NDArray[np.float64]
-REACH = 24
-"""Frames before and after a frame that determine it."""
+REACH = 24  # frames before and after a frame that determine it
 HIGHEST_HZ, UNCHANGED_HZ = 12.5, 20.0
 """Frequencies up to which cameras of 25 Hz show movement, and from which on it is left as it is."""
 MIN_GAIN, MAX_GAIN = 0.3, 6.0
-MIN_SHARE = 0.02
-"""At least this share of recorded power counts as movement, however strong the noise."""
-RESTING_MARGIN_S = 0.3
-"""A mouth rests so far from speech, in seconds."""
-RESTING_FRAMES = 500
-"""Without so many frames of a resting mouth the noise is not known, and not taken out."""
-HOLD_FRAMES = 5
-"""Frames on both sides of a held one over which the filter fades in."""
-STRENGTH = Rule(least=0, most=2)
-"""Strengths that the engines' option ``modulation_filter`` allows."""
+MIN_SHARE = 0.02  # at least this share of recorded power counts as movement, however strong the noise
+RESTING_MARGIN_S = 0.3  # a mouth rests so far from speech, in seconds
+RESTING_FRAMES = 500  # without so many frames of a resting mouth the noise is not known, and not taken out
+HOLD_FRAMES = 5  # frames on both sides of a held one over which the filter fades in
+STRENGTH = Rule(least=0, most=2)  # strengths that the engines' option ``modulation_filter`` allows
 
 
 class ModulationFilter(NamedTuple):
-    """Filters without delay, dimension by dimension.
-
-    taps : symmetrical, of sum 1, so that a mouth at rest stays there [shape=(2 · REACH + 1, Q)]
-    """
+    """Filters without delay, symmetrical, of sum 1, so that a mouth at rest stays there [shape=(2 · REACH + 1, Q)]."""
 
     taps: Array
 
@@ -93,10 +84,7 @@ def learn_filter(
 
 
 def select_resting_motion(examples: Sequence[Example], values: Sequence[Array]) -> list[Array]:
-    """Return recorded motion in silence, further than ``RESTING_MARGIN_S`` from speech [each shape=(N_i, Q)].
-
-    values : motion of the examples in the motion space [each shape=(T, Q)]
-    """
+    """Return recorded motion in silence, ``RESTING_MARGIN_S`` from speech, in the motion space [shape=(N_i, Q)]."""
     resting = []
     for example, x in zip(examples, values, strict=True):
         far = example.valid & mark_distant(example.speech.units, len(x), RESTING_MARGIN_S)
@@ -148,11 +136,7 @@ def filter_to_arrays(modulation: ModulationFilter | None) -> dict[str, NDArray[A
 
 
 def filter_from_arrays(arrays: Arrays, dimensions: int, *, needed: bool = False) -> ModulationFilter | None:
-    """Deserialise what ``filter_to_arrays`` returned.
-
-    needed : there must be a filter
-    Raises KeyError, ValueError: it is missing, or has a wrong shape, type or range.
-    """
+    """Deserialise a filter, which may be ``needed``. Raises KeyError, ValueError: it is missing, or damaged."""
     if "modulation" not in arrays and not needed:
         return None
     return ModulationFilter(check_arrays(arrays, MODULATION, N=2 * REACH + 1, Q=dimensions)["modulation"])

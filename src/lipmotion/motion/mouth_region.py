@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-WIDTH, HEIGHT = 72, 56
-"""Size of a mouth picture, px."""
-CORNER = (-36.0, 48.0)
-"""Upper left corner of the region, in px from the point between the eyes, y down."""
-EYE_DISTANCE_PX = 90.0
-"""Distance between the outer eye corners, px."""
+WIDTH, HEIGHT = 72, 56  # size of a mouth picture, px
+CORNER = (-36.0, 48.0)  # upper left corner of the region, in px from the point between the eyes, y down
+EYE_DISTANCE_PX = 90.0  # distance between the outer eye corners, px

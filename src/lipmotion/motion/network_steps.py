@@ -1,35 +1,48 @@
-"""What networks share: time steps of 40 ms, the frames of 10 ms between them, training and storage."""
+"""What networks share: time steps of 40 ms, frames of 10 ms between them, training, storage; and the general network.
+
+The general network hears motion in the encoding of speech alone, for every voice; it learned from hundreds of readers.
+``scripts/live_network.py`` trains it on measured motion of one speaker, and on what ``animate`` makes of the others'
+recordings, in quiet and in noise: mistakes differ from reader to reader, and the network learns what they share
+(Xie, Luong, Hovy & Le 2020, self-training). It needs no phones.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
+from importlib import resources
 from typing import Any, Generic, TypeVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.predictors import PredictorTraining
-from lipmotion.stats.convolution import TAPS, ConvolutionalNetwork, make_network
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 from lipmotion.stats.network_training import LinearMap, SequenceNetwork, TrainingPlan, TrainingSequence, fit_network
-from lipmotion.stats.recurrence import GATES, RecurrentLayer, RecurrentNetwork, make_recurrent_network
+from lipmotion.stats.networks import (
+    GATES,
+    TAPS,
+    ConvolutionalNetwork,
+    RecurrentLayer,
+    RecurrentNetwork,
+    make_network,
+    make_recurrent_network,
+)
 from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, check_arrays
-from lipmotion.types import Progress
+from lipmotion.types import Progress, Speech
 
 Array = NDArray[np.float64]
 FloatT = TypeVar("FloatT", bound=np.floating[Any])
 NetworkT = TypeVar("NetworkT", bound=SequenceNetwork)
-STEP = 4
-"""Frames of a time step, 40 ms: about a picture of a video."""
+STEP = 4  # frames of a time step, 40 ms: about a picture of a video
 DIRECT_WEIGHT = 4.0
 """Weight, in training, of the error of a channel that is modelled as it is; that of a principal component is 1."""
 MIN_DEVIATION = 1e-6
-REPORTED_STEPS = 100
-"""Progress of training is reported after so many optimiser steps."""
-LONGEST_STEPS = 250
-"""Longer recordings are cut into pieces of so many time steps, 10 s, for training."""
+REPORTED_STEPS = 100  # progress of training is reported after so many optimiser steps
+LONGEST_STEPS = 250  # longer recordings are cut into pieces of so many time steps, 10 s, for training
 
 
 def interpolate_steps(steps: Array, frames: int, first: int = 0) -> Array:
@@ -61,11 +74,7 @@ def measure_poses(training: PredictorTraining) -> tuple[Array, Array]:
 
 
 def measure_error_variances(training: PredictorTraining, predicted: Iterable[Array], scale: Array) -> Array:
-    """Return the variances of the error of static value, Δ and Δ² in the examples [shape=(3, Q)].
-
-    predicted : motion of each example [each shape=(T, Q)]
-    scale     : standard deviation of the motion [shape=(Q,)]; the variances are not much smaller
-    """
+    """Return the variances of the error of static value, Δ and Δ² [shape=(3, Q)], not much smaller than ``scale``."""
     squares, count = np.zeros((3, len(scale))), 0
     for example, x, motion in zip(training.examples, training.values, predicted, strict=True):
         frames = mark_known_dynamics(example.valid)
@@ -128,10 +137,7 @@ class NetworkShape(ABC, Generic[NetworkT]):
         return dict(zip(self.specs, (*self.stack(network), output), strict=True))
 
     def from_arrays(self, arrays: Arrays, outputs: int) -> NetworkT:
-        """Return the network of arrays.
-
-        Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
-        """
+        """Return the network of arrays. Raises KeyError, ValueError: one is missing or damaged."""
         stored = check_arrays(arrays, self.specs, O=outputs)
         *stacked, output = (stored[name] for name in self.specs)
         return self.network(stacked, LinearMap(output[:-1], output[-1]))
@@ -143,10 +149,7 @@ class NetworkShape(ABC, Generic[NetworkT]):
         draw: Callable[[np.random.Generator, int], TrainingSequence],
         plan: TrainingPlan,
     ) -> NetworkT:
-        """Return a network that is trained on the examples of ``training``; from its checkpoint, if that is there.
-
-        draw : returns the inputs and targets of the example of a number, or a piece of them
-        """
+        """Return a network, trained on sequences that ``draw`` makes of numbered examples, or from its checkpoint."""
         stored = training.checkpoint.load(self.name)
         if stored is not None:
             return self.from_arrays(stored, outputs)
@@ -155,12 +158,10 @@ class NetworkShape(ABC, Generic[NetworkT]):
 
         def report(step: int, error: float) -> None:
             if step % REPORTED_STEPS == 0 or step == plan.steps:
-                training.monitor(
-                    Progress(f"training the {self.name}", step, plan.steps, step / plan.steps, figure=error)
-                )
+                stage = f"training the {self.name}"
+                training.monitor(Progress(stage, step, plan.steps, step / plan.steps, figure=error))
 
-        start = self.initial(outputs, plan.seed)
-        network = fit_network(start, draw, len(training.examples), weights, plan, report)
+        network = fit_network(self.initial(outputs, plan.seed), draw, len(training.examples), weights, plan, report)
         training.checkpoint.save(self.name, self.arrays(network))
         return network
 
@@ -168,11 +169,7 @@ class NetworkShape(ABC, Generic[NetworkT]):
 @final
 @dataclass(frozen=True)
 class ConvolutionalShape(NetworkShape[ConvolutionalNetwork]):
-    """Shape of a convolutional network.
-
-    hidden_units : of every hidden layer
-    dilations    : time steps between the taps of each layer
-    """
+    """Shape of a convolutional network: units of every hidden layer, time steps between the taps of each layer."""
 
     hidden_units: int
     dilations: tuple[int, ...]
@@ -203,11 +200,7 @@ class ConvolutionalShape(NetworkShape[ConvolutionalNetwork]):
 @final
 @dataclass(frozen=True)
 class RecurrentShape(NetworkShape[RecurrentNetwork]):
-    """Shape of a recurrent network.
-
-    cells  : of every layer, in either direction of time
-    layers : their number, two or more
-    """
+    """Shape of a recurrent network: cells of every layer, two layers or more, in either direction of time."""
 
     cells: int
     layers: int
@@ -241,3 +234,25 @@ def check_scale(scale: NDArray[FloatT], name: str) -> NDArray[FloatT]:
     if not (scale > 0).all():
         raise ValueError(f"{name} with a scale that is not more than 0")
     return scale
+
+
+WEIGHTS = "general-motion.npz"
+GENERAL_SHAPE = ConvolutionalShape("general", "general network", 64, 128, (1, 2, 4, 8))
+"""From the 64 values of ``Speech.encoding``, 0.6 s before and after a frame."""
+ENCODING_SCALE = np.float32(4)  # what the encoding is multiplied by, so that its values are about 1
+
+
+def hear_articulators(speech: Speech) -> NDArray[np.float64] | None:
+    """Return articulators, deviations from the table's pose [shape=(T, 8)]; None: no encoding, or a known voice."""
+    if speech.encoding is None or (speech.voice >= 1 and speech.units_known):
+        return None
+    steps = np.asarray(speech.encoding)[::STEP].astype(np.float32) * ENCODING_SCALE
+    return interpolate_steps(load_shipped()(steps).astype(float), len(speech.features.values))
+
+
+@cache
+def load_shipped() -> ConvolutionalNetwork:
+    """Return the network of the package."""
+    path = resources.files("lipmotion") / "models" / WEIGHTS
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+        return GENERAL_SHAPE.from_arrays(dict(stored), len(ARTICULATORS))

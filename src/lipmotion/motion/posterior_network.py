@@ -31,27 +31,22 @@ from lipmotion.motion.network_steps import (
     stack_spectrum,
 )
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
-from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import SequenceNetwork, TrainingPlan, TrainingSequence
-from lipmotion.stats.recurrence import RecurrentNetwork
+from lipmotion.stats.networks import ConvolutionalNetwork, RecurrentNetwork
 from lipmotion.storage.schema import LARGEST_MEAN, POSITIVE, Arrays, ArraySpec, check_arrays
 from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS, Example, Speech, TokenPosteriors
 
 Array = NDArray[np.float64]
-ROWS = 2
-"""Rows of posteriors, of 20 ms each, in a time step of the network."""
+ROWS = 2  # rows of posteriors, of 20 ms each, in a time step of the network
 ROW_FRAMES = STEP // ROWS
 COMPONENTS = 120
 """Principal components of the logarithms of the posteriors: what the network says of phones that are not there tells
 more than the phone that is."""
-MIN_LOG_POSTERIOR = -12.0
-"""Smaller logarithms count as this: the network does not mean them."""
+MIN_LOG_POSTERIOR = -12.0  # smaller logarithms count as this: the network does not mean them
 INPUT_SCALE = 2.0
 """Standard deviation of the first principal component as input; the others keep their proportions to it."""
-SPECTRUM = STEP * SPECTRUM_BANDS
-"""The first inputs of a time step: the spectrum."""
-SPECTRUM_OFF = 0.3
-"""Share of the training in which the spectrum is switched off (0)."""
+SPECTRUM = STEP * SPECTRUM_BANDS  # the first inputs of a time step: the spectrum
+SPECTRUM_OFF = 0.3  # share of the training in which the spectrum is switched off (0)
 SHAPE = ConvolutionalShape("posterior", "posterior-network", SPECTRUM + ROWS * COMPONENTS, 128, (1, 2, 4, 8, 1, 2, 4))
 """Its input is 0.88 s before and after a frame."""
 SHIFTS = 2
@@ -64,10 +59,8 @@ RECURRENT_BATCH, RECURRENT_DROPOUT = 8, 0.5
 RECURRENT_RATE, LARGEST_RECURRENT_RATE = 0.36, 3e-2
 """Learning rate, by one over the square root of the seconds of motion, and the largest one: large steps keep a network
 of little speech from learning it by heart (docs/results/learning-curve.md)."""
-RECURRENT_SHARE = 0.6
-"""Weight of the recurrent network beside the convolutional one, for a voice that training knows."""
-LARGEST_COMPONENT = 100.0
-"""More is in no basis."""
+RECURRENT_SHARE = 0.6  # weight of the recurrent network beside the convolutional one, for a voice that training knows
+LARGEST_COMPONENT = 100.0  # more is in no basis
 
 TARGETS = {
     "posterior_mean": ArraySpec(np.float32, "K", -LARGEST_MEAN, LARGEST_MEAN),
@@ -111,16 +104,11 @@ class PosteriorNetwork(Predictor):
 
     @classmethod
     def fit(cls, training: PredictorTraining) -> PredictorFit:
-        """Return a network that is trained on examples as recorded; without spectra where one of them has none.
-
-        Raises CorpusError: an example without posteriors.
-        """
+        """Return a network trained on examples as recorded, with spectra if all have them. Raises CorpusError."""
         examples = training.examples
         posteriors = list_posteriors(examples)
         if posteriors is None:
-            raise CorpusError(
-                "examples without posteriors, which the predictor posteriors needs; train with the recogniser auto"
-            )
+            raise CorpusError("examples without posteriors, which this predictor needs; train with the recogniser auto")
         centre, scale = measure_poses(training)
         rows = [limit_logarithms(each) for each in posteriors]
         mean, basis = fit_components(rows)
@@ -157,10 +145,7 @@ class PosteriorNetwork(Predictor):
         return motion, np.zeros(frames)
 
     def hidden_units(self, posteriors: TokenPosteriors, steps: int) -> NDArray[np.float32]:
-        """Return the last hidden layer in every time step, without the spectrum [shape=(steps, H)].
-
-        Raises InputError: posteriors of another phone recogniser than in training.
-        """
+        """Return the last hidden layer, without spectrum [shape=(steps, H)]. Raises InputError: as ``predict``."""
         rows = self.network.hidden(_stack_shift(self._components(self._check(posteriors)), None, 0))
         return rows[np.minimum(np.arange(steps), len(rows) - 1)]
 
@@ -201,9 +186,7 @@ class PosteriorNetwork(Predictor):
     def from_arrays(cls, arrays: Arrays, dimensions: int) -> PosteriorNetwork:
         """Deserialise a network; as ``Predictor.from_arrays``. Raises ModelFormatError, too: one of an earlier form."""
         if "posterior_variances" not in arrays:
-            raise ModelFormatError(
-                "a posterior network without spectra, as of 2026-11-23; required one with spectra: train again"
-            )
+            raise ModelFormatError("a posterior network of 2026-11-23, required one with spectra: train again")
         stored = check_arrays(arrays, TARGETS, Q=dimensions)
         centre, scale = stored["posterior_targets"]
         return cls(

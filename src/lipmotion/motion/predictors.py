@@ -22,10 +22,8 @@ from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Speech, silent_moni
 
 Array = NDArray[np.float64]
 PredictorT = TypeVar("PredictorT", bound="Predictor")
-AUTOMATIC = "auto"
-"""Stands for the predictor that suits the examples, where no name is given."""
-MIN_OWN_S = 480.0
-"""From this much measured motion on, a model does not stand on another one."""
+AUTOMATIC = "auto"  # stands for the predictor that suits the examples, where no name is given
+MIN_OWN_S = 480.0  # from this much measured motion on, a model does not stand on another one
 FOLDS = 4
 
 
@@ -89,29 +87,19 @@ class Predictor(ABC):
 
     @classmethod
     def conditions(cls, motion_s: float, most: int) -> int:  # noqa: ARG003
-        """Return in how many acoustic conditions training takes each example (``Example.condition_spectra``).
-
-        motion_s : seconds of measured motion
-        most     : as many as the configuration allows
-        """
+        """Return in how many of ``most`` acoustic conditions each example is taken, by seconds of measured motion."""
         return most
 
     @abstractmethod
     def predict(self, speech: Speech) -> tuple[Array, Array]:
-        """Return motion in the motion space [shape=(T, Q)] and the distortion of the sound, 0 to 1 [shape=(T,)].
-
-        Raises InputError: an unknown phone, or speech without what ``can_predict`` asks for.
-        """
+        """Return motion [shape=(T, Q)] and distortion, 0 to 1 [shape=(T,)]. Raises InputError: something is missing."""
 
     def can_predict(self, speech: Speech) -> bool:
         """Return whether speech has what ``predict`` needs of it."""
         return not self.needs or getattr(speech, self.needs) is not None
 
     def hidden(self, speech: Speech) -> tuple[NDArray[np.float32], Array] | None:  # noqa: ARG002
-        """Return features on which models of other people can stand, and the distortion; None: there are none.
-
-        They have one row every 40 ms: a hidden layer [shape=(ceil(T / 4), H)], distortion [shape=(ceil(T / 4),)].
-        """
+        """Return a hidden layer every 40 ms [shape=(ceil(T / 4), H)] and the distortion, to stand on, or None."""
         return None
 
     def arrays(self) -> dict[str, NDArray[Any]]:
@@ -120,11 +108,7 @@ class Predictor(ABC):
 
     @classmethod
     def from_arrays(cls: type[PredictorT], arrays: Arrays, dimensions: int) -> PredictorT:
-        """Deserialise a predictor; other arrays are ignored.
-
-        dimensions : of the motion space, Q
-        Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
-        """
+        """Deserialise a predictor in Q dimensions. Raises KeyError, ValueError: an array is missing or damaged."""
         constructor: Any = cls  # every predictor is a dataclass
         restored: PredictorT = constructor(**check_arrays(arrays, cls.ARRAYS, Q=dimensions).arrays)
         return restored
@@ -170,11 +154,7 @@ def choose_predictor(name: str, examples: Sequence[Example]) -> type[Predictor] 
 
 
 def count_conditions(name: str, motion_s: float, most: int) -> int:
-    """Return in how many acoustic conditions training takes each example, for a predictor of a name.
-
-    motion_s : seconds of measured motion
-    most     : as many as the configuration allows
-    """
+    """Return in how many acoustic conditions training takes each example, as ``Predictor.conditions``, by a name."""
     names = ("network", "posteriors") if name == AUTOMATIC else (name,)
     return max(PREDICTORS.load(each).conditions(motion_s, most) for each in names)
 

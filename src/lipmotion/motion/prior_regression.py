@@ -75,10 +75,7 @@ class EncodingRegression(Predictor):
         return PredictorFit(cls(fitted.coefficients, fitted.centre, variances))
 
     def predict(self, speech: Speech) -> tuple[Array, Array]:
-        """Return motion in the motion space [shape=(T, Q)], and no distortion: 0 [shape=(T,)].
-
-        Raises InputError: speech without an encoding.
-        """
+        """Return motion [shape=(T, Q)], and no distortion: 0 [shape=(T,)]. Raises InputError: no encoding."""
         if speech.encoding is None:
             raise InputError("the speech has no encoding; an engine that uses one says so by ``inputs``")
         frames = len(speech.features.values)
@@ -115,15 +112,13 @@ def stack_encoding(speech: Speech, reach: int = REACH, components: int | None = 
 
 
 Array = NDArray[np.float64]
-WINDOW = 4
-"""Time steps of 40 ms before and after a frame whose spectrum is used: 160 ms."""
+WINDOW = 4  # time steps of 40 ms before and after a frame whose spectrum is used: 160 ms
 ENCODING_REACH, ENCODING_COMPONENTS = 3, 32
 """Time steps before and after a frame whose encoding is used, and its principal components: a minute of speech says no
 more of other ones (docs/results/voices.md)."""
 RIDGES = tuple(10.0**power for power in range(0, 6))
 """Ridge parameters that cross-validation chooses from, one for each kind of regressors."""
-INITIAL_RIDGE = 1000.0
-"""Ridge parameter of all kinds before the choice."""
+INITIAL_RIDGE = 1000.0  # ridge parameter of all kinds before the choice
 ROUNDS = 2
 MIN_DEVIATION = 1e-3
 KINDS = ("prior", "hidden", "articulation", "spectrum", "encoding")
@@ -206,24 +201,18 @@ class PriorRegression(Predictor):
         return speech.prior is not None or not any(self.sizes[:2])
 
     def predict(self, speech: Speech) -> tuple[Array, Array]:
-        """Return motion in the motion space [shape=(T, Q)] and the distortion of the sound, 0 to 1 [shape=(T,)].
-
-        Raises InputError: an unknown phone.
-        """
-        regressors = (self._fill(_regressors(speech)) - self.mean) / self.scale
+        """Return motion [shape=(T, Q)] and distortion, 0 to 1 [shape=(T,)]. Raises InputError: an unknown phone."""
+        kinds = _regressors(speech)
+        row, starts = self.mean.astype(float), np.cumsum([0, *self.sizes])
+        result = np.tile(row, (len(kinds[0]), 1))  # what the training had and this speech has not has its mean
+        for kind, start, size in zip(kinds, starts, self.sizes, strict=False):
+            result[:, start : start + min(size, kind.shape[1])] = kind[:, :size]
+        regressors = (result - self.mean) / self.scale
         steps = (regressors @ self.coefficients).astype(float) + self.centre
         frames = len(speech.features.values)
         distortion = speech.prior.distortion if speech.prior is not None else np.zeros(len(steps))
         outputs = interpolate_steps(np.concatenate([steps, distortion[:, None]], axis=1), frames)
         return outputs[:, :-1], np.clip(outputs[:, -1], 0, 1)
-
-    def _fill(self, kinds: Sequence[Array]) -> Array:
-        """Return the regressors [shape=(N, R)]; those that the training had and this speech has not have their mean."""
-        row, starts = self.mean.astype(float), np.cumsum([0, *self.sizes])
-        result = np.tile(row, (len(kinds[0]), 1))
-        for kind, start, size in zip(kinds, starts, self.sizes, strict=False):
-            result[:, start : start + min(size, kind.shape[1])] = kind[:, :size]
-        return result
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Serialise the regression; the coefficients at half precision."""

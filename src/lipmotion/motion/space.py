@@ -15,6 +15,8 @@ from lipmotion.stats.curves import mark_known_dynamics
 from lipmotion.stats.pca import Pca, fit_pca
 from lipmotion.types import FRAME_RATE_HZ, Channel, Example, Motion, Track, check_magnitude
 
+Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True, eq=False)
 class MotionSpace:
@@ -39,20 +41,15 @@ class MotionSpace:
         """The number of dimensions, Q."""
         return len(self.direct) + (len(self.points.basis) if self.points is not None else 0)
 
-    def reduce(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def reduce(self, values: Array) -> Array:
         """Return motion of the channels [shape=(T, P)] in the motion space [shape=(T, Q)]."""
         direct = values[:, self.direct]
         if self.points is None:
             return direct
         return np.concatenate([direct, self.points.project(values[:, self._reduced])], axis=1)
 
-    def restore(
-        self, values: NDArray[np.float64], variance: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return values and variances of all channels [each shape=(T, P)].
-
-        values, variance : in the motion space [each shape=(T, Q)]
-        """
+    def restore(self, values: Array, variance: Array) -> tuple[Array, Array]:
+        """Return values and variances of channels [each shape=(T, P)], from the motion space [each shape=(T, Q)]."""
         motion, spread = (np.empty((len(values), len(self.channels))) for _ in range(2))
         count = len(self.direct)
         motion[:, self.direct], spread[:, self.direct] = values[:, :count], variance[:, :count]
@@ -62,7 +59,7 @@ class MotionSpace:
         return motion, spread
 
     @property
-    def mixing(self) -> NDArray[np.float64]:
+    def mixing(self) -> Array:
         """The matrix from variances of the dimensions to variances of the channels [shape=(Q, P)]."""
         mixing, count = np.zeros((self.dimensions, len(self.channels))), len(self.direct)
         mixing[np.arange(count), self.direct] = 1
@@ -75,17 +72,14 @@ class MotionSpace:
         return np.setdiff1d(np.arange(len(self.channels)), self.direct)
 
 
-def fit_space(channels: tuple[Channel, ...], poses: NDArray[np.float64], components: int) -> MotionSpace:
-    """Return the motion space of some poses [shape=(N, P)]; all channels but points (``x_17``, ...) stay as they are.
-
-    components : principal components that the points are reduced to
-    """
+def fit_space(channels: tuple[Channel, ...], poses: Array, components: int) -> MotionSpace:
+    """Return the motion space of poses [shape=(N, P)]; points (``x_17``, ...) are reduced to principal components."""
     is_point = np.array([channel.name[:2] in ("x_", "y_", "z_") for channel in channels])
     points = fit_pca(poses[:, is_point], components) if is_point.any() else None
     return MotionSpace(channels, np.nonzero(~is_point)[0].astype(np.intp), points)
 
 
-def fit_reduced_motion(examples: Sequence[Example], components: int) -> tuple[MotionSpace, list[NDArray[np.float64]]]:
+def fit_reduced_motion(examples: Sequence[Example], components: int) -> tuple[MotionSpace, list[Array]]:
     """Return the motion space of some examples, and the motion of each in it [each shape=(T, Q)].
 
     components : principal components that all point channels are reduced to
@@ -102,8 +96,8 @@ def fit_reduced_motion(examples: Sequence[Example], components: int) -> tuple[Mo
 
 
 def resample_to_model(
-    values: NDArray[np.float64], seen: NDArray[np.bool_], rate_hz: float, frames: int, frame_rate_hz: float
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    values: Array, seen: NDArray[np.bool_], rate_hz: float, frames: int, frame_rate_hz: float
+) -> tuple[Array, NDArray[np.bool_]]:
     """Return curves at the rate of a model by a cubic spline, and the frames that are valid.
 
     values : curves at ``rate_hz`` [shape=(T, P)]
@@ -133,30 +127,21 @@ def resample_track(track: Track, frames: int) -> tuple[Motion, NDArray[np.bool_]
     return replace(motion, values=values, rate_hz=FRAME_RATE_HZ), valid
 
 
-Array = NDArray[np.float64]
 LARGEST_EXCESS = 20.0
 """Motion leaves the limits by at most so many spans of the poses; features unlike all training data give about 3."""
-DEVIATIONS = 3.0
-"""Standard deviations by which motion may leave the range of the poses."""
+DEVIATIONS = 3.0  # standard deviations by which motion may leave the range of the poses
 LARGEST_SPREAD = 1000.0
 """Largest median, over dimensions, of the span of the poses in standard deviations; our models have about 10."""
-LARGEST_OFFSET = 1000.0
-"""Largest magnitude of the mean of the points, in units of the largest span of a dimension."""
-PLAUSIBLE_OPENING = 5.0
-"""Eye distances; a larger opening is implausible unless the range of all poses is as large."""
+LARGEST_OFFSET = 1000.0  # largest magnitude of the mean of the points, in units of the largest span of a dimension
+PLAUSIBLE_OPENING = 5.0  # eye distances; a larger opening is implausible unless the range of all poses is as large
 NEGATIVE_SHARE = 0.05
 """Share of the span of the opening that may be negative where the opening is larger than ``PLAUSIBLE_OPENING``."""
-LARGEST_REST_DISTANCE = 3.0
-"""Largest distance of the rest pose from the range of the poses, in spans of that range."""
-MIN_SPAN = 1e-3
-"""Smallest span of a dimension, as a share of its largest magnitude or of 1."""
+LARGEST_REST_DISTANCE = 3.0  # largest distance of the rest pose from the range of the poses, in spans of that range
+MIN_SPAN = 1e-3  # smallest span of a dimension, as a share of its largest magnitude or of 1
 
 
 class MotionLimits(NamedTuple):
-    """Smallest and largest values of the poses, or of the motion, of a model.
-
-    low, high : smallest and largest value of each dimension of the motion space [each shape=(Q,)]
-    """
+    """Smallest and largest value of each dimension of the motion space, of poses or motion [each shape=(Q,)]."""
 
     low: Array
     high: Array
@@ -213,9 +198,7 @@ def check_poses(limits: MotionLimits, space: MotionSpace, closure: Closure | Non
         if not plausible and (low < -NEGATIVE_SHARE * span or low > LARGEST_EXCESS * span):
             raise ValueError(f"poses whose {OPENING} is {low:g} to {high:g}")
         if closure.closed > max(high + LARGEST_EXCESS * span, PLAUSIBLE_OPENING):
-            raise ValueError(
-                f"lips that are closed at {closure.closed:g}, with poses whose {OPENING} is {low:g} to {high:g}"
-            )
+            raise ValueError(f"lips closed at {closure.closed:g}, with poses whose {OPENING} is {low:g} to {high:g}")
 
 
 def check_rest(rest: Array, limits: MotionLimits) -> None:
@@ -235,10 +218,7 @@ def _span(low: Array, high: Array) -> Array:
 
 
 def check_spread(poses: NDArray[np.floating], variances: NDArray[np.floating]) -> None:
-    """Raise ValueError if poses span many more of their standard deviations than those of trained models.
-
-    poses, variances : means and variances of densities [each shape=(N, Q)]
-    """
+    """Raise ValueError if means and variances of densities [each shape=(N, Q)] span far more deviations than usual."""
     deviation = np.sqrt(variances.mean(axis=0, dtype=float))
     spread = float(np.quantile(np.ptp(poses, axis=0) / deviation, 0.5))
     if spread > LARGEST_SPREAD:

@@ -22,23 +22,17 @@ from lipmotion.units import VISEME_OF, VISEMES
 NEAR_SPEECH_S, FAR_FROM_SPEECH_S = 0.1, 0.48
 """Within the first distance of speech the map is that of speech, beyond the second the rest pose is exactly the
 person's; the second is the one beyond which engines generate the rest pose."""
-RANGE_PERCENTILES = (5.0, 95.0)
-"""The range of a channel lies between these percentiles of the frames of speech."""
-RANGE_PRIOR_S = 2.0
-"""Seconds of speech that count as much as the assumption that a person's range is the mean person's."""
+RANGE_PERCENTILES = (5.0, 95.0)  # the range of a channel lies between these percentiles of the frames of speech
+RANGE_PRIOR_S = 2.0  # seconds of speech that count as much as the assumption that a person's range is the mean person's
 MIN_GAIN, MAX_GAIN = 0.25, 4.0
 """Ranges of people differ by no more; beyond, they are differences of trackers or of units."""
-MIN_FRAMES = 10
-"""Fewest frames of silence from which a rest pose is taken."""
+MIN_FRAMES = 10  # fewest frames of silence from which a rest pose is taken
 MIN_RANGE_SHARE = 0.05
 """A channel that somebody moves by less than this share of the widest range has a gain of 1 for everyone."""
-VISEME_NAMES = tuple(VISEMES)
-"""The order of the visemes in stored habits."""
+VISEME_NAMES = tuple(VISEMES)  # the order of the visemes in stored habits
 FADE_FRAMES = 11
-HABIT_PRIOR_FRAMES = 50.0
-"""Frames of a viseme that count as much as the assumption that a person has no habit in it."""
-FULL_HABIT_SHARE = 0.25
-"""Share of the mean range by which lips must be open for habits to show wholly."""
+HABIT_PRIOR_FRAMES = 50.0  # frames of a viseme that count as much as the assumption that a person has no habit in it
+FULL_HABIT_SHARE = 0.25  # share of the mean range by which lips must be open for habits to show wholly
 Array = NDArray[np.float64]
 
 
@@ -76,11 +70,7 @@ class SpeakerMap:
         return change
 
     def to_person(self, values: NDArray[np.floating[Any]], restful: Array) -> Array:
-        """Return the motion of this person, of the mean person's.
-
-        values  : all channels [shape=(T, P)]
-        restful : from ``measure_restfulness`` [shape=(T,)]
-        """
+        """Return this person's motion of the mean person's [shape=(T, P)]; restful : as measured [shape=(T,)]."""
         return self.offset + self.gain * values + restful[:, None] * self.rest
 
     def to_mean(self, values: NDArray[np.floating[Any]], restful: Array) -> Array:
@@ -148,11 +138,7 @@ def measure_restfulness(units: Timeline[Unit], frames: int) -> Array:
 
 
 def weigh_visemes(units: Timeline[Unit], frames: int) -> Array:
-    """Return how much of each viseme is in each frame at 100 Hz [shape=(frames, V)].
-
-    Visemes fade into each other over ``FADE_FRAMES``; in silence away from speech, and where no phone is known, all
-    weights are 0.
-    """
+    """Return the weights of visemes in frames at 100 Hz [shape=(frames, V)]; 0 far from speech and for no phone."""
     from scipy.ndimage import convolve1d
 
     weights = np.zeros((frames, len(VISEME_NAMES)))
@@ -275,10 +261,7 @@ class PersonStatistics:
 
 
 def measure_person(examples: Sequence[Example], column: int | None) -> PersonStatistics:
-    """Return the statistics of one person's motion.
-
-    column : of the opening (None: there is no such channel)
-    """
+    """Return the statistics of one person's motion; column : of the opening (None: there is no such channel)."""
     silent, silence, spoken, measured, smallest = [], [], [], [], []
     for example in examples:
         values, valid, units = np.asarray(example.motion.values, float), example.valid, example.speech.units
@@ -308,10 +291,7 @@ def measure_person(examples: Sequence[Example], column: int | None) -> PersonSta
 
 
 def estimate_rest_poses(people: Sequence[PersonStatistics]) -> Array:
-    """Return the rest poses of all people [shape=(S, P)].
-
-    Whoever is never silent rests as far from their median pose in speech as the others do.
-    """
+    """Return the rest poses of all people [shape=(S, P)]; who is never silent rests as far from speech as others."""
     rests, spoken = np.stack([person.rest for person in people]), np.stack([person.spoken for person in people])
     known: NDArray[np.bool_] = np.asarray(np.isfinite(rests).all(axis=1))
     usual = (rests - spoken)[known].mean(axis=0) if known.any() else np.zeros(rests.shape[1])
@@ -404,11 +384,7 @@ def compose_maps(first: SpeakerMap | None, second: SpeakerMap) -> SpeakerMap:
 
 
 def select_channels(motion: Motion, channels: Sequence[Channel], where: str) -> Motion:
-    """Return the motion of a person in the channels of a model, in their order.
-
-    where : name of the recording, for the message
-    Raises InputError: the motion has no such channel.
-    """
+    """Return motion in the channels of a model. Raises InputError, which names the recording: a channel is missing."""
     missing = [channel for channel in channels if channel not in motion.channels]
     if missing:
         raise InputError(

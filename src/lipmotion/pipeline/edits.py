@@ -105,33 +105,6 @@ class PhoneIs(PhoneStep):
         return Timeline(tuple(spans))
 
 
-def _move_border(step: PhoneStep, units: Timeline[Unit], before: int, time_s: float) -> Timeline[Unit]:
-    """Return phones with another time between the phone at place ``before`` and the next one."""
-    spans = list(units)
-    if not 0 <= before < len(spans) - 1:
-        end = "first phone begins" if before < 0 else "last phone ends"
-        raise InputError(f"{str(step)!r}: the {end} with the recording")
-    first_s, last_s = spans[before].start_s, spans[before + 1].end_s
-    if not first_s + MIN_PHONE_S - 1e-9 <= time_s <= last_s - MIN_PHONE_S + 1e-9:
-        required = f"{first_s + MIN_PHONE_S:.3f} to {last_s - MIN_PHONE_S:.3f} s"
-        raise InputError(f"{str(step)!r}: required {required}, between the phones beside it")
-    for place, change in ((before, {"end_s": time_s}), (before + 1, {"start_s": time_s})):
-        label = replace(spans[place].label, confidence=None)
-        spans[place] = replace(spans[place], label=label, **change)
-    return Timeline(tuple(spans))
-
-
-@dataclass(frozen=True)
-class PhoneBegins(PhoneStep):
-    """A phone begins at another time, and the one before it ends there."""
-
-    number: int
-    time_s: float
-
-    def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
-        return _move_border(self, units, self._index(units, self.number) - 1, self.time_s)
-
-
 @dataclass(frozen=True)
 class PhoneEnds(PhoneStep):
     """A phone ends at another time, and the one after it begins there."""
@@ -140,7 +113,30 @@ class PhoneEnds(PhoneStep):
     time_s: float
 
     def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
-        return _move_border(self, units, self._index(units, self.number), self.time_s)
+        return self._move_border(units, self._index(units, self.number))
+
+    def _move_border(self, units: Timeline[Unit], before: int) -> Timeline[Unit]:
+        """Return phones with another time between the phone at place ``before`` and the next one."""
+        spans = list(units)
+        if not 0 <= before < len(spans) - 1:
+            end = "first phone begins" if before < 0 else "last phone ends"
+            raise InputError(f"{str(self)!r}: the {end} with the recording")
+        first_s, last_s = spans[before].start_s, spans[before + 1].end_s
+        if not first_s + MIN_PHONE_S - 1e-9 <= self.time_s <= last_s - MIN_PHONE_S + 1e-9:
+            required = f"{first_s + MIN_PHONE_S:.3f} to {last_s - MIN_PHONE_S:.3f} s"
+            raise InputError(f"{str(self)!r}: required {required}, between the phones beside it")
+        for place, change in ((before, {"end_s": self.time_s}), (before + 1, {"start_s": self.time_s})):
+            label = replace(spans[place].label, confidence=None)
+            spans[place] = replace(spans[place], label=label, **change)
+        return Timeline(tuple(spans))
+
+
+@dataclass(frozen=True)
+class PhoneBegins(PhoneEnds):
+    """A phone begins at another time, and the one before it ends there."""
+
+    def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
+        return self._move_border(units, self._index(units, self.number) - 1)
 
 
 @dataclass(frozen=True)
@@ -374,22 +370,16 @@ class SetStep(Step):
     value: str
 
     def __post_init__(self) -> None:
+        if self.name not in _KIND_OF:
+            name, known = shorten(repr(self.name)), ", ".join(_KIND_OF)
+            raise InputError(f"{str(self)!r}: nothing is called {name}; required one of: {known}")
         value: Any = self.parsed_value
-        self._kind(**{self.name: value})  # checks it
-
-    @property
-    def _kind(self) -> type[Delivery] | type[Staging]:
-        """What has a field of that name. Raises InputError: nothing has."""
-        kind = next((kind for kind in (Delivery, Staging) if self.name in _names(kind)), None)
-        if kind is None:
-            known = ", ".join((*_names(Delivery), *_names(Staging)))
-            raise InputError(f"{str(self)!r}: nothing is called {shorten(repr(self.name))}; required one of: {known}")
-        return kind
+        _KIND_OF[self.name](**{self.name: value})  # checks it
 
     @property
     def parsed_value(self) -> bool | float | int | str:
         """The value, of the type of what is set. Raises InputError: it is of another."""
-        usual = getattr(self._kind(), self.name)
+        usual = getattr(_KIND_OF[self.name](), self.name)
         if isinstance(usual, bool):
             if self.value not in _TRUTH:
                 raise InputError(f"{str(self)!r}: required one of: {', '.join(_TRUTH)}")
@@ -418,11 +408,8 @@ class MoodStep(Step):
         return keys[0]
 
 
+_KIND_OF: dict[str, Any] = {each.name: kind for kind in (Delivery, Staging) for each in fields(kind)}
 _TRUTH = {"true": True, "false": False, "yes": True, "no": False}
-
-
-def _names(kind: type[Any]) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(kind))
 
 
 STEPS: dict[str, Any] = {

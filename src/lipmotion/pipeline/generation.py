@@ -328,8 +328,15 @@ def generate_passages(
         spread = replace(spread, reduced=np.require(spread.reduced, None, "W"))
         for frame, column, _ in held:
             spread.reduced[frame, spread.mixing[:, column] > 0] = 0
-    units, trace = _join_units(speech, parts, made, rest.units[0].label), _join_traces(parts, made, rest, frames)
-    return replace(rest, motion=motion, spread=spread, units=units, trace=trace)
+    states = tuple(dict.fromkeys(state for each in (rest, *made) for state in each.trace.states))
+    number = {state: n for n, state in enumerate(states)}
+    trace = np.full(frames, number[rest.trace.states[rest.trace.frames[REST_FRAMES // 2]]], np.intp)
+    for part, each in zip(parts, made, strict=True):
+        named = np.array([number[state] for state in each.trace.states], np.intp)[each.trace.frames]
+        start, stop = max(part.first, 0), min(part.first + part.frames, frames)
+        trace[start:stop] = named[start - part.first : stop - part.first]
+    units = _join_units(speech, parts, made, rest.units[0].label)
+    return replace(rest, motion=motion, spread=spread, units=units, trace=StateTrace(states, trace))
 
 
 def _join_rows(
@@ -355,24 +362,13 @@ def _join_rows(
     rooms = [after - before >= 2 * RAMP_FRAMES for before, after in zip(edges[::2], edges[1::2], strict=True)]
     for part, inside, *is_room in zip(parts, rows, rooms, rooms[1:], strict=False):
         lead, tail = (RAMP_FRAMES if room else 0 for room in is_room)  # outside, where nobody else speaks there
-        moved = np.pad(inside, ((lead, tail), (0, 0)), "edge") - still
-        moved[:RAMP_FRAMES] *= ramp[:, None]
-        moved[-RAMP_FRAMES:] *= ramp[::-1, None]
+        change = np.pad(inside, ((lead, tail), (0, 0)), "edge") - still
+        change[:RAMP_FRAMES] *= ramp[:, None]
+        change[-RAMP_FRAMES:] *= ramp[::-1, None]
         start = part.first - lead
-        first, end = max(start, 0), min(start + len(moved), len(like))
-        joined[first:end] += moved[first - start : end - start]
+        first, end = max(start, 0), min(start + len(change), len(like))
+        joined[first:end] += change[first - start : end - start]
     return joined
-
-
-def _join_traces(parts: Sequence[SpeechPart], made: Sequence[Generation], rest: Generation, frames: int) -> StateTrace:
-    states = tuple(dict.fromkeys(state for each in (rest, *made) for state in each.trace.states))
-    number = {state: n for n, state in enumerate(states)}
-    trace = np.full(frames, number[rest.trace.states[rest.trace.frames[REST_FRAMES // 2]]], np.intp)
-    for part, each in zip(parts, made, strict=True):
-        named = np.array([number[state] for state in each.trace.states], np.intp)[each.trace.frames]
-        start, stop = max(part.first, 0), min(part.first + part.frames, frames)
-        trace[start:stop] = named[start - part.first : stop - part.first]
-    return StateTrace(states, trace)
 
 
 def _join_units(
@@ -383,7 +379,7 @@ def _join_units(
     placed = (place_units(each.units, part.first, part.own) for part, each in zip(parts, made, strict=True))
     units = join_units(placed, silence, end_s)
     pairs = [(part.speech.units, each.units) for part, each in zip(parts, made, strict=True)]
-    if any([span.start_s for span in given] != [span.start_s for span in moved] for given, moved in pairs):
+    if any([span.start_s for span in before] != [span.start_s for span in after] for before, after in pairs):
         return units
     starts_s = [span.start_s for span in units]  # the engine moved none: a phone over two passages stays one
     spans = []
@@ -412,15 +408,12 @@ class Excerpt:
     frames: slice
     unchanged: tuple[int, int]
 
-    def units_in(self, units: Timeline[Unit]) -> Timeline[Unit]:
-        """Return the phones in these frames, cut at the ends, with times from the first of them."""
-        return units.between(self.frames.start / FRAME_RATE_HZ, (self.frames.stop - 1) / FRAME_RATE_HZ)
-
-    def pins_in(self, pins: Collection[Pin]) -> Constraints:
-        """Return the pins in these frames, with times from the first of them."""
+    def cut(self, units: Timeline[Unit], pins: Collection[Pin]) -> tuple[Timeline[Unit], Constraints]:
+        """Return the phones in these frames, cut at the ends, and the pins; with times from the first of them."""
         first_s, last_s = self.frames.start / FRAME_RATE_HZ, (self.frames.stop - 1) / FRAME_RATE_HZ
         inside = [pin for pin in pins if first_s <= pin.time_s <= last_s]
-        return Constraints(tuple(replace(pin, time_s=pin.time_s - first_s) for pin in inside))
+        shifted = Constraints(tuple(replace(pin, time_s=pin.time_s - first_s) for pin in inside))
+        return units.between(first_s, last_s), shifted
 
 
 def find_excerpt(before: Timeline[Unit], after: Timeline[Unit], pins: Collection[Pin], frames: int) -> Excerpt | None:
@@ -443,12 +436,8 @@ def find_excerpt(before: Timeline[Unit], after: Timeline[Unit], pins: Collection
     return Excerpt(slice(round(start * FRAME_RATE_HZ), min(round(end * FRAME_RATE_HZ) + 1, frames)), (first, last))
 
 
-def cut_analysis(analysis: SpeechAnalysis, frames: slice) -> SpeechAnalysis:
-    """Return analysed speech of some frames alone, without phones; its first frame is a multiple of 4."""
-    return replace(analysis, speech=_cut_speech(analysis.speech, frames), tags=(), events=())
-
-
-def _cut_speech(speech: Speech, frames: slice) -> Speech:
+def cut_speech(speech: Speech, frames: slice) -> Speech:
+    """Return the speech of some frames alone, without phones; its first frame is a multiple of 4."""
     features = Features(speech.features.values[frames], (frames.stop - 1 - frames.start) / FRAME_RATE_HZ)
     steps, halves = (slice(frames.start // each, -(-frames.stop // each)) for each in (STEP, 2))
     posteriors, prior, confidence, parts = speech.posteriors, speech.prior, speech.confidence, None
@@ -478,7 +467,7 @@ def _cut_speech(speech: Speech, frames: slice) -> Speech:
 
 def _cut_part(part: SpeechPart, frames: slice) -> SpeechPart:
     first = max(frames.start - part.first, 0) // STEP * STEP
-    inside = _cut_speech(part.speech, slice(first, min(frames.stop - part.first, part.frames)))
+    inside = cut_speech(part.speech, slice(first, min(frames.stop - part.first, part.frames)))
     own = slice(max(part.own.start - frames.start, 0), min(part.own.stop, frames.stop) - frames.start)
     return SpeechPart(part.first + first - frames.start, own, inside)
 

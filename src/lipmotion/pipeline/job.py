@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import load_provided
 from lipmotion.pipeline.request import Outputs, Request, locate_paths
-from lipmotion.storage.files import make_portable
+from lipmotion.storage.files import atomic_file, check_target, make_portable
 from lipmotion.storage.json_text import read_toml
 from lipmotion.storage.sources import check_listable
 from lipmotion.types.configuration import Configuration, option
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.outputs.output import Output, OutputSettings, ShownFace
     from lipmotion.types import Audio, Generation
 
+PICTURE = ".png"
+"""Suffix of a picture of posteriors."""
 RECOGNITION = 0.3
 """The share of the work that is recognition, where a video is drawn, too."""
 
@@ -109,17 +111,20 @@ def run(  # noqa: PLR0913
     """
     from lipmotion.pipeline.analysis.read_request import read_request
     from lipmotion.pipeline.edit_files import edit_file
-    from lipmotion.pipeline.generate.explain import chain_posteriors, check_picture, write_posteriors
+    from lipmotion.pipeline.generate.explain import chain_posteriors, draw_posteriors
     from lipmotion.pipeline.model import load_model
     from lipmotion.pipeline.outputs.curve_sets import list_curve_names
+    from lipmotion.types import Audio
 
     # What cannot be written is refused before the long work.
     edits, recording, picture = edit_file(job.request.edits), job.request.recording, job.outputs.posteriors
     job = replace(job, delivery=edits.edits.delivery(job.delivery), staging=edits.edits.staging(job.staging))
     face = face or open_face(job.outputs)
     draws = any(output.draws for output in check_outputs(job, face, recording))
+    if picture and picture.suffix.lower() != PICTURE:
+        raise ExportError(f"{picture}: unknown format {picture.suffix!r}; required: {PICTURE}")
     if picture:
-        check_picture(picture, recording)
+        check_target(picture, None if isinstance(recording, Audio) else recording)
 
     request = read_request(job.request, words_beside=words_beside, is_typed=is_typed)
     model = model or load_model(job.request.model)
@@ -136,7 +141,9 @@ def run(  # noqa: PLR0913
         curves=list_curve_names(curves) if curves else (),
     )
     if picture:
-        write_posteriors(picture, *chain_posteriors(session, edits.edits))
+        plot = draw_posteriors(*chain_posteriors(session, edits.edits))
+        with atomic_file(picture) as unfinished:
+            plot.save(unfinished, optimize=True)
     generation = session.generate(edits.edits)
     del session  # sound and features of an hour, which outputs do not need
 
@@ -219,7 +226,7 @@ def write_outputs(
     speech, model, temporary : as of ``write``
     """
     from lipmotion.pipeline.outputs.motion_files import with_articulation
-    from lipmotion.pipeline.outputs.output import Performance, create_outputs, write_planned
+    from lipmotion.pipeline.outputs.output import Performance, write_files
     from lipmotion.types import Audio
 
     if job.outputs.articulation:
@@ -227,31 +234,30 @@ def write_outputs(
     settings = replace(to_output_settings(job, face, speech), sounded=isinstance(speech, Audio))
     sound = speech if isinstance(speech, Audio) else None
     performance = Performance(generation, settings, sound, settings.recording, model, monitor)
-    write_planned(performance, create_outputs(job.outputs.files, settings), temporary=temporary)
+    write_files(performance, job.outputs.files, temporary=temporary)
 
 
 NAME = "{name}"
 """In the path of an output, the name of the recording without its suffix."""
 
 
-def list_recordings(given: Sequence[Path]) -> list[Path]:
-    """Return recordings: files as they are given, and of folders the sounds and videos in them, sorted by name.
+def list_recordings(paths: Sequence[Path]) -> list[Path]:
+    """Return recordings: files as they are, and of folders the sounds and videos in them, sorted by name.
 
     Raises InputError: a folder without recordings, or one that cannot be read.
     """
     from lipmotion.storage.sources import AUDIO_SUFFIXES, VIDEO_SUFFIXES
 
-    found: list[Path] = []
-    for path in given:
-        if not path.is_dir():
-            found.append(path)
-            continue
-        check_listable(path)
-        inside = sorted(each for each in path.iterdir() if each.suffix.lower() in AUDIO_SUFFIXES | VIDEO_SUFFIXES)
-        if not inside:
-            raise InputError(f"{path}: no sounds and no videos in it; give a folder of recordings")
-        found += inside
-    return found
+    recordings: list[Path] = []
+    for path in paths:
+        inside = [path]
+        if path.is_dir():
+            check_listable(path)
+            inside = sorted(each for each in path.iterdir() if each.suffix.lower() in AUDIO_SUFFIXES | VIDEO_SUFFIXES)
+            if not inside:
+                raise InputError(f"{path}: no sounds and no videos in it; give a folder of recordings")
+        recordings += inside
+    return recordings
 
 
 def is_for_several(output: str) -> bool:

@@ -114,23 +114,20 @@ def load_model(path: str | Path | None = None) -> Model:
     >>> lipmotion.load_model().about["licence"]
     ['CC BY 4.0']
     """
-    if path is None and not find_shipped().is_file():
+    if path is not None:
+        return _read(Path(path))
+    if not find_shipped().is_file():
         raise ModelFormatError("the package holds no model; install it again, or give one with --model")
-    if path is None:
-        return _read_shipped()
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(
-            f"{path}: no such model; train one (lipmotion train), or use the one that ships: lipmotion "
-            "info names its file"
-        )
-    return _read(path)
+    return _read_shipped()
 
 
 def read_header(path: Path) -> dict[str, Any]:
     """Return the header of a model file. Raises as ``load_model``."""
     if not path.is_file():
-        raise InputError(f"{path}: no such model")
+        raise InputError(
+            f"{path}: no such model; train one (lipmotion train), or use the one that ships: lipmotion "
+            "info names its file"
+        )
     return read_header_of(path, FORMAT, VERSION, "lipmotion model", "give a file that `lipmotion train` wrote")
 
 
@@ -151,11 +148,9 @@ def _read(path: Path) -> Model:
             f"{path}: no engine {header.get('engine')!r}; there are: {', '.join(ENGINES.names)}; install the package "
             "that adds it, or give another model"
         )
-    arrays: dict[str, dict[str, NDArray[Any]]] = {}
     try:
         stored = read_archive(path)
-        for folder in _FOLDERS:
-            arrays[folder] = select_arrays(stored, f"{folder}/")
+        arrays = {folder: select_arrays(stored, f"{folder}/") for folder in _FOLDERS}
         refuse_undeclared(stored, (f"{folder}/{key}" for folder, inner in arrays.items() for key in inner))
         engine = engine_named(header["engine"], _options(header, "configuration"), stored=True)
         config = HmmConfig.parsed(_options(header, "recogniser"))
@@ -215,14 +210,13 @@ def with_person(model: Model, name: str, person: SpeakerMap) -> Model:
         raise InputError(f"a person named {name!r}, required another name than: {', '.join(('', *known))}")
     if maps is not None:
         person = person.reorder(maps.channels)
-    rows = {
-        part: np.concatenate([*([getattr(maps, part)] if maps is not None else []), getattr(person, part)[None]])
-        for part in ("gain", "offset", "rest", "habits")
-    }
-    lips = maps.lips if maps is not None else person.lips
-    names = (*known, name)
-    speakers = SpeakerMaps(person.channels, names, **rows, lips=lips)
-    return replace(model, speakers=speakers, about={**model.about, "speakers": list(names)})
+    rows = {part: getattr(person, part)[None] for part in ("gain", "offset", "rest", "habits")}
+    if maps is None:
+        speakers = SpeakerMaps(person.channels, (name,), **rows, lips=person.lips)
+    else:
+        rows = {part: np.concatenate([getattr(maps, part), row]) for part, row in rows.items()}
+        speakers = replace(maps, names=(*known, name), **rows)
+    return replace(model, speakers=speakers, about={**model.about, "speakers": list(speakers.names)})
 
 
 def with_prior(prior: Model | None, speech: Speech) -> Speech:

@@ -44,7 +44,7 @@ from lipmotion.pipeline.edits import (
     remove_pins,
     with_span,
 )
-from lipmotion.pipeline.generation import apply_excerpt, cut_analysis, find_excerpt, find_person, generate_motion
+from lipmotion.pipeline.generation import apply_excerpt, cut_speech, find_excerpt, find_person, generate_motion
 from lipmotion.pipeline.model import Model, load_model, with_prior
 from lipmotion.pipeline.request import Request, SpeechInput, as_request
 from lipmotion.pipeline.workers import map_in_processes
@@ -309,8 +309,8 @@ class Session:
         from lipmotion.articulation.curve_edits import apply_stretch
         from lipmotion.articulation.phone_targets import SAID, with_gestures
 
-        said = with_gestures(generation.motion, generation.units, SAID)
-        generation = generation.with_motion(said)  # what phones beside a lock ask must not reach into it
+        asked = with_gestures(generation.motion, generation.units, SAID)
+        generation = generation.with_motion(asked)  # what phones beside a lock ask must not reach into it
         for place, lock in locks.items():
             for later in steps[place + 1 :]:
                 if lock.holds(later):
@@ -319,8 +319,8 @@ class Session:
             earlier = [edit for step in steps[:place] if isinstance(step, CurveStep) for edit in step.parts]
             before = tuple(edit for edit in generation.curve_edits if edit in earlier)
             if len(before) < len(generation.curve_edits):
-                kept = Locked(lock.start_s, lock.end_s, before)
-                generation = replace(generation, curve_edits=(*generation.curve_edits, kept))
+                locked = Locked(lock.start_s, lock.end_s, before)
+                generation = replace(generation, curve_edits=(*generation.curve_edits, locked))
         return generation
 
     def _locked(self, before: tuple[Step, ...], lock: LockStep, names: tuple[str, ...]) -> MotionStretch:
@@ -407,11 +407,12 @@ class Session:
         place = (excerpt.frames.start, excerpt.frames.stop)
 
         def generate(units: Timeline[Unit], pins: tuple[Pin, ...]) -> Generation:
-            phones, constraints = excerpt.units_in(units), excerpt.pins_in(pins)
+            phones, constraints = excerpt.cut(units, pins)
 
             def make() -> Generation:
-                segment = self._cache.cached("segment", place, lambda: cut_analysis(self._recording, excerpt.frames))
-                segment = replace(segment, speech=self._with_units(segment.speech, phones))
+                plain = self._recording
+                speech = self._cache.cached("segment", place, lambda: cut_speech(plain.speech, excerpt.frames))
+                segment = replace(plain, speech=self._with_units(speech, phones), tags=(), events=())
                 return generate_motion(self.request, self.speaker, self.model, segment, constraints)
 
             return self._cache.cached("excerpt", (place, phones, constraints), make)
@@ -427,5 +428,5 @@ class Session:
 
 def read_pronunciations(step: Step) -> dict[str, tuple[Pronunciation, ...]]:
     """Return the pronunciations that an edit brings along, by word, as a lexicon holds them."""
-    given = step.pronunciation_of if isinstance(step, WordSaid | WordsSaidSo) else {}
-    return {word: (phones,) for text, phones in given.items() for word in split_words(text)}
+    pronunciations = step.pronunciation_of if isinstance(step, WordSaid | WordsSaidSo) else {}
+    return {word: (phones,) for text, phones in pronunciations.items() for word in split_words(text)}

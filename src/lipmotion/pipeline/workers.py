@@ -43,8 +43,7 @@ def process_count(count: int | None) -> int:
 
 
 def _in_order(numbered: Iterator[tuple[int, ResultT]]) -> Iterator[ResultT]:
-    waiting: dict[int, ResultT] = {}
-    following = 0
+    waiting, following = dict[int, ResultT](), 0
     for number, result in numbered:
         waiting[number] = result
         while following in waiting:
@@ -245,8 +244,7 @@ def _begin_below() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where signals cannot be delayed
 
     def end_with_parent() -> None:
-        parent = multiprocessing.parent_process()
-        if parent is not None:
+        if (parent := multiprocessing.parent_process()) is not None:
             parent.join()
         os._exit(1)
 

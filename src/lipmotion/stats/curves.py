@@ -37,11 +37,6 @@ def mark_known_dynamics(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return inner
 
 
-def count_window(rate_hz: float) -> int:
-    """Return the number of frames of a window, an even number, at least 4."""
-    return max(2 * round(WINDOW_S * rate_hz / 2), 4)
-
-
 def measure_modulation_spectrum(clips: Sequence[Array], rate_hz: float) -> tuple[Array, Array]:
     """Return frequencies in Hz [shape=(F,)] and the mean power of curves at each of them [shape=(F, P)].
 
@@ -51,7 +46,7 @@ def measure_modulation_spectrum(clips: Sequence[Array], rate_hz: float) -> tuple
     Source: Takamichi, Toda, Black, Neubig, Sakti & Nakamura 2016, who compute it over whole utterances.  Deviation: the
     mean over windows, so that clips of different lengths have one spectrum.
     """
-    size = count_window(rate_hz)
+    size = max(2 * round(WINDOW_S * rate_hz / 2), 4)
     powers: list[Array] = []
     for clip in clips:
         length = min(size, len(clip))

@@ -204,16 +204,6 @@ def with_squares(x: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.concatenate([x, x * x, np.ones((len(x), 1), np.float32)], axis=1)
 
 
-def make_equal_gaussians(x: NDArray[np.float32], count: int) -> Mixtures:
-    """Return ``count`` equal Gaussians with the mean and variance of ``x`` [shape=(T, D)] (the flat start)."""
-    mean, variance = x.mean(axis=0), np.maximum(x.var(axis=0), 1e-4)
-    return Mixtures(
-        np.zeros((count, 1), np.float32),
-        np.tile(mean, (count, 1, 1)).astype(np.float32),
-        np.tile(variance, (count, 1, 1)).astype(np.float32),
-    )
-
-
 def mixtures_from_arrays(stored: CheckedArrays) -> Mixtures:
     """Deserialise mixtures, stored as ``MIXTURES``. Raises ValueError: the weights of a density do not sum to 1."""
     total = np.exp(stored["log_weights"]).sum(axis=1)

@@ -286,17 +286,12 @@ def ridge(moments: RegressionStatistics, prior: Array, strength: float) -> Array
     return prior + np.linalg.solve(system, moments.targets - moments.products @ prior).astype(float)
 
 
-def fit_regression_node(tree: Tree, path: list[int], least: float) -> int:
-    """Return the last node of a path that has at least ``least`` frames, enough for its own regression; or the root."""
-    return next((node for node in reversed(path) if tree.frames[node] >= least), 0)
-
-
 def fit_tree_regressions(
     tree: Tree, moments: Mapping[int, RegressionStatistics], shared: Array, strength: float
 ) -> dict[int, Array]:
     """Return the coefficients of every node in ``moments`` [shape=(F, P)]; each has those of the node above as prior.
 
-    moments : by node, the statistics of the leaves whose regression is that of the node (``fit_regression_node``)
+    moments : by node, the statistics of the leaves whose regression is that of the node
     shared  : the prior of the root
     """
     regressions: dict[int, Array] = {}

@@ -23,17 +23,14 @@ from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import ParallelMap
 
 HEADER, ARRAY = "header.json", ".npy"
-OLDEST_DATE = (1980, 1, 1, 0, 0, 0)
-"""The date of all members of an archive."""
-ZIP64_BYTES = 1 << 30
-"""Arrays from so many bytes on are written with the zip64 extension."""
+OLDEST_DATE = (1980, 1, 1, 0, 0, 0)  # the date of all members of an archive
+ZIP64_BYTES = 1 << 30  # arrays from so many bytes on are written with the zip64 extension
 UNREADABLE = (
     *(OSError, EOFError, KeyError, ValueError, TypeError, RuntimeError),
     *(zlib.error, struct.error, zipfile.BadZipFile),
 )
 """The errors that reading a damaged zip, or one of other content, may raise."""
-LAST_LETTER = 0x10FFFF
-"""The last code point of Unicode."""
+LAST_LETTER = 0x10FFFF  # the last code point of Unicode
 SMALL_ARCHIVE_BYTES, LARGEST_RATIO = 1 << 26, 20
 """An archive may have so many bytes uncompressed, or so many times its own size: our arrays are compressed to half
 their size, zip bombs to a thousandth."""
@@ -127,7 +124,7 @@ def _member(name: str, method: int) -> zipfile.ZipInfo:
 
 
 LOG = logging.getLogger("lipmotion")
-CHECKPOINT_FORMAT = "lipmotion.checkpoint"
+CHECKPOINT, CHECKPOINT_FORMAT = ".checkpoint", "lipmotion.checkpoint"
 
 
 @dataclass(frozen=True)
@@ -145,9 +142,8 @@ class Checkpoint:
 
     def load(self, stage: str) -> dict[str, NDArray[Any]] | None:
         """Return the arrays stored for a stage; None: there are none, or they are damaged or of another job."""
-        if self.folder is None or not self._path(self.folder, stage).is_file():
+        if self.folder is None or not (path := self.folder / f"{stage}{CHECKPOINT}").is_file():
             return None
-        path = self._path(self.folder, stage)
         try:
             if read_archive_header(path) != self._header():
                 LOG.info("%s: of another corpus, configuration or version; not used", path)
@@ -160,14 +156,10 @@ class Checkpoint:
     def save(self, stage: str, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Store the state of a stage, replacing an earlier one. Raises ExportError: it cannot be written."""
         if self.folder is not None:
-            write_archive(self._path(self.folder, stage), self._header(), arrays, compressed=False)
+            write_archive(self.folder / f"{stage}{CHECKPOINT}", self._header(), arrays, compressed=False)
 
     def _header(self) -> dict[str, str]:
         return {"format": CHECKPOINT_FORMAT, "fingerprint": self.fingerprint}
 
-    def _path(self, folder: Path, stage: str) -> Path:
-        return folder / f"{stage}.checkpoint"
 
-
-NO_CHECKPOINT = Checkpoint()
-"""Checkpointing disabled: nothing is stored and nothing found."""
+NO_CHECKPOINT = Checkpoint()  # checkpointing disabled: nothing is stored and nothing found

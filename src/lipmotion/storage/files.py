@@ -148,10 +148,7 @@ def _reached(folder: Path, *, create: bool = False) -> Iterator[int | None]:
 
 
 def make_folder(folder: Path) -> None:
-    """Create a folder, with those that hold it, unless it is there.
-
-    Raises ExportError: it cannot be created, or a link is on the way in a confined folder.
-    """
+    """Create a folder and its parents. Raises ExportError: it cannot be, or a link is on the way in a confined one."""
     try:
         with _reached(folder, create=True):
             pass
@@ -287,10 +284,7 @@ def atomic_file(target: Path) -> Iterator[Path]:
 
 @contextmanager
 def replace_folder(target: Path) -> Iterator[Path]:
-    """Give a temporary folder to fill; rename it to ``target``, which must not exist, on success.
-
-    Raises ExportError: the parent does not exist, or something cannot be written.
-    """
+    """Give a temporary folder, which becomes ``target`` on success. Raises ExportError: it cannot be written."""
     temporary = _temporary(target, target.suffix)
     try:
         with _reached(target.parent):
@@ -305,10 +299,7 @@ def replace_folder(target: Path) -> Iterator[Path]:
 
 @contextmanager
 def create_folders(folders: Iterable[Path]) -> Iterator[None]:
-    """Create folders, with those that hold them; if the block fails, remove those that were not there before.
-
-    Raises ExportError: a folder cannot be created.
-    """
+    """Create folders; if the block fails, remove those that are new. Raises ExportError: one cannot be created."""
     made: list[Path] = []
     try:
         for folder in sorted(folders):

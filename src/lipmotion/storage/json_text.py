@@ -16,8 +16,7 @@ from typing import Any, NoReturn
 from lipmotion.errors import ExportError, InputError
 from lipmotion.storage.sources import read_text_file
 
-LONGEST_WHOLE = 300
-"""Most digits of a whole number: one of 309 may be larger than any fraction."""
+LONGEST_WHOLE = 300  # most digits of a whole number: one of 309 may be larger than any fraction
 SURROGATE = re.compile("[\ud800-\udfff]")
 DEEP_KEY = re.compile(r"(?:\.[ \t]*[\w\"'-]+[ \t]*){100}")
 """A name with so many dots; the time to read it grows with the square of their number."""
@@ -91,10 +90,7 @@ def replace_nan(content: Any) -> Any:
 
 
 def from_json(text: str | bytes) -> Any:
-    """Return the content of JSON text.
-
-    Raises ValueError: it is none, has a key twice, is nested too deeply, or holds a number that is not finite.
-    """
+    """Return the content of JSON text. Raises ValueError: it is none, a key is twice, or a number is not finite."""
     try:
         numbers: Any = {"parse_constant": _refuse, "parse_float": finite, "parse_int": _whole}
         return json.loads(text, object_pairs_hook=_check_keys, **numbers)
@@ -142,11 +138,7 @@ def finite(text: str) -> float:
 
 
 def read_toml(path: Path, kind: str, instead: str) -> dict[str, Any]:
-    """Return the content of a TOML file.
-
-    instead : what to use with Python 3.10, which cannot read TOML
-    Raises InputError: no such file, no TOML, or Python 3.10.
-    """
+    """Return the content of a TOML file. Raises InputError: no TOML, or Python 3.10: what to use ``instead``."""
     if sys.version_info < (3, 11):
         raise InputError(f"{path}: TOML is read by Python 3.11 or newer; {instead}")
     import tomllib

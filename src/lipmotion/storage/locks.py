@@ -12,30 +12,16 @@ from pathlib import Path
 from typing import IO
 
 from lipmotion.errors import ExportError
-from lipmotion.storage.files import (
-    TEMPORARY,
-    check_target,
-    confine,
-    find_place,
-    is_link,
-    make_folder,
-    open_own,
-    remove,
-    remove_left_files,
-    write_error,
-)
+from lipmotion.storage import files
 
 if sys.platform == "win32":
     import msvcrt
 else:
     import fcntl
 
-LOCK = f"{TEMPORARY}lock"
-"""The file that a process locks while it works on a folder."""
-FOLDER_PREFIX = "lipmotion-"
-"""Prefix of folders in the system's place for temporary files."""
-UNFINISHED = ".unfinished"
-"""Suffix of a folder of unfinished work, after the name of the file that the work is for."""
+LOCK = f"{files.TEMPORARY}lock"  # the file that a process locks while it works on a folder
+FOLDER_PREFIX = "lipmotion-"  # prefix of folders in the system's place for temporary files
+UNFINISHED = ".unfinished"  # suffix of a folder of unfinished work, after the name of the file that the work is for
 
 
 @contextmanager
@@ -49,12 +35,12 @@ def lock_folder(folder: Path) -> Iterator[None]:
     file = None
     try:
         try:
-            with confine(folder):
-                make_folder(folder)
+            with files.confine(folder):
+                files.make_folder(folder)
                 try:
                     file = _open_lock(folder / LOCK)
                 except OSError as error:
-                    raise write_error(folder, error) from error
+                    raise files.write_error(folder, error) from error
                 yield
         finally:
             _release(path, file)
@@ -67,7 +53,7 @@ def _release(path: Path, file: IO[bytes] | None) -> None:
     """Delete a lock: that of ``file``, or one that no process holds (after an interrupt while it was created)."""
     with suppress(OSError, ExportError):  # there is none, it is no lock, or another process has it
         is_held = file is not None and not file.closed
-        with file if file is not None and is_held else open_own(path, buffering=0) as lock:
+        with file if file is not None and is_held else files.open_own(path, buffering=0) as lock:
             if not is_held:
                 _lock(lock)
             if sys.platform == "win32":
@@ -80,7 +66,7 @@ def _open_lock(path: Path) -> IO[bytes]:
     while True:
         file = None
         try:
-            file = open_own(path, buffering=0)
+            file = files.open_own(path, buffering=0)
             _lock(file)
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(file.fileno()), path.stat()):  # it is still the one of that name
@@ -127,17 +113,14 @@ else:
 
 @contextmanager
 def open_temporary() -> Iterator[Path]:
-    """Give a folder in the system's place for temporary files, which is removed at the end.
-
-    Those that killed runs have left there are removed first: nobody holds their locks.
-    """
+    """Give a temporary folder, removed at the end; those that killed runs left, whose locks nobody holds, go first."""
     place = Path(tempfile.gettempdir())
     for left in place.glob(f"{FOLDER_PREFIX}*/{LOCK}"):
-        with suppress(ExportError, OSError), confine(place):  # it is in use, or another user's
+        with suppress(ExportError, OSError), files.confine(place):  # it is in use, or another user's
             with lock_folder(left.parent):
                 for path in left.parent.iterdir():
                     if path != left:
-                        remove(path)
+                        files.remove(path)
             left.parent.rmdir()
     with ExitStack() as kept:
         for is_last in (False, False, True):
@@ -160,22 +143,22 @@ def keep_unfinished(target: Path) -> Iterator[Path]:
     run finds the finished parts in it.
     Raises ExportError: the target could not be written, or another process is at work on it.
     """
-    check_target(target)
-    target = find_place(target)
+    files.check_target(target)
+    target = files.find_place(target)
     folder = name_work_folder(target)
-    if is_link(folder):
+    if files.is_link(folder):
         raise ExportError(f"{folder}: is a link, required a folder of unfinished work; remove it")
     try:
         with lock_folder(folder):
             remove_unfinished(folder)
-            remove_left_files(target)
+            files.remove_left_files(target)
             try:
                 yield folder
             except ExportError as error:
                 raise ExportError(f"{error}; what is finished is kept in {folder}") from error
             for path in folder.iterdir():
                 if path.name != LOCK:
-                    remove(path)
+                    files.remove(path)
     finally:
         with suppress(OSError):  # it contains finished parts
             folder.rmdir()
@@ -183,12 +166,12 @@ def keep_unfinished(target: Path) -> Iterator[Path]:
 
 def name_work_folder(target: Path) -> Path:
     """Return the path of the folder that ``keep_unfinished`` gives."""
-    target = find_place(target)
+    target = files.find_place(target)
     return target.with_name(target.name + UNFINISHED)
 
 
 def remove_unfinished(folder: Path) -> None:
     """Delete the unfinished files that a killed run left in ``folder``."""
-    for path in folder.glob(f"{TEMPORARY}*"):
+    for path in folder.glob(f"{files.TEMPORARY}*"):
         if path.name != LOCK:
-            remove(path)
+            files.remove(path)

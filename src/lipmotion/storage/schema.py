@@ -16,12 +16,10 @@ from lipmotion.errors import ModelFormatError
 Arrays = Mapping[str, NDArray[Any]]
 POSITIVE, NEGATIVE, BELOW_ONE = 5e-324, -5e-324, math.nextafter(1, 0)
 """The least number over 0, the largest under 0, the largest under 1: limits of ranges that exclude 0 or 1."""
-LARGEST_NUMBER = 1e30
-"""No number of a model is larger, whatever its unit."""
+LARGEST_NUMBER = 1e30  # no number of a model is larger, whatever its unit
 LARGEST_MEAN = 500.0
 """No mean of standardised values is larger: none of N numbers is more than √N deviations from the mean of all."""
-LARGEST_VARIANCE = 1e6
-"""No variance of standardised values is larger; a component that is switched off has 1."""
+LARGEST_VARIANCE = 1e6  # no variance of standardised values is larger; a component that is switched off has 1
 _KINDS = {"f": "fractions", "i": "whole numbers", "U": "texts", "b": "truth values", "u": "whole numbers from 0"}
 _SPELLED = {POSITIVE: "more than 0", NEGATIVE: "less than 0", BELOW_ONE: "less than 1"}
 
@@ -65,11 +63,7 @@ class CheckedArrays:
 
 @contextmanager
 def format_errors(what: str, remedy: str = "train or download it again", *, verb: str = "is") -> Iterator[None]:
-    """Turn the errors of damaged arrays that are raised inside into a ModelFormatError.
-
-    what, remedy : what is damaged, as ``the joint model``, and what its user can do
-    verb : ``are`` where ``what`` is a plural
-    """
+    """Turn errors of damaged arrays into a ModelFormatError; ``remedy``: what the user can do; ``verb``: is or are."""
     try:
         yield
     except (KeyError, ValueError, IndexError, TypeError, OverflowError) as error:

@@ -102,16 +102,14 @@ def _status(path: str | Path) -> os.stat_result | None:
         return None
 
 
-LARGEST_TEXT_BYTES = 1 << 26
-"""Most bytes of a text file: more than the words that a person speaks in a year."""
+LARGEST_TEXT_BYTES = 1 << 26  # most bytes of a text file: more than the words that a person speaks in a year
 MARKS_OF_TEXT = {
     codecs.BOM_UTF8: "utf-8-sig",
     codecs.BOM_UTF32_LE: "utf-32",
     codecs.BOM_UTF16_LE: "utf-16",
     codecs.BOM_UTF16_BE: "utf-16",
 }
-CONTROL = re.compile(r"[\x00-\x08\x0e-\x1a\x1c-\x1f\ufffd]")
-"""Characters that no text has."""
+CONTROL = re.compile(r"[\x00-\x08\x0e-\x1a\x1c-\x1f\ufffd]")  # characters that no text has
 
 
 def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES, *, western: bool = False) -> str:
@@ -255,10 +253,7 @@ _NO_MISTAKE = {
 
 
 def check_kind(path: Path, wanted: str, kind: str = "") -> None:
-    """Raise InputError for a file that is known to be something else, whatever its suffix, with the next step.
-
-    wanted : ``recording``, ``video``, ``text``, ``motion file``, or another noun;  kind : noun for the message
-    """
+    """Raise InputError for a file that is known to be no ``wanted`` (in words: ``kind``), with the next step."""
     if not is_file(path):
         return
     with suppress(OSError), path.open("rb") as file:
@@ -284,10 +279,8 @@ def is_text(path: Path) -> bool:
         text = head.decode(
             "utf-16" if head[:2] in {b"\xff\xfe", b"\xfe\xff"} else "utf-8", "strict" if len(head) < HEAD else "ignore"
         )
-        return (
-            all(letter.isprintable() or letter in "\t\n\r\f\ufeff" for letter in text)
-            and 2 * len(text) > len(head) // 2
-        )
+        printable = all(letter.isprintable() or letter in "\t\n\r\f\ufeff" for letter in text)
+        return printable and 2 * len(text) > len(head) // 2
     return False
 
 
@@ -304,8 +297,7 @@ open anything: playlists (hls, concat, dash, imf), indexes (vobsub), numbered pi
 devices."""
 LARGEST_BLOCK_BYTES = 1 << 28
 """Most bytes that FFmpeg may allocate at a time: three pictures of ``MAX_PIXELS`` with four channels of 16 bits."""
-MAX_PIXELS = 4096 * 2304
-"""Most pixels of a picture: slightly more than 4K. A decoder may keep sixteen pictures."""
+MAX_PIXELS = 4096 * 2304  # most pixels of a picture: slightly more than 4K. A decoder may keep sixteen pictures.
 
 
 @cache

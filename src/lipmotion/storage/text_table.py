@@ -21,16 +21,14 @@ from lipmotion.printable import is_formula
 from lipmotion.storage.files import as_text
 from lipmotion.storage.sources import read_text_file
 
-LONGEST_LINE = 1 << 20
-"""Most characters of a line."""
+LONGEST_LINE = 1 << 20  # most characters of a line
 SEPARATORS = ",;\t"
 MISSING = frozenset(("", "nan", "na", "n/a", "none", "null", "-", "-nan", "nan(ind)", "-nan(ind)"))
 """Fields that hold no number, in lower case."""
 
 
 QUOTE = "'"
-Rows = list[tuple[int, list[str]]]
-"""Rows of a table: the number of the last line of each, and its fields."""
+Rows = list[tuple[int, list[str]]]  # rows of a table: the number of the last line of each, and its fields
 
 
 def as_field(text: str) -> str:
@@ -57,10 +55,7 @@ class TextTable:
 
 @contextmanager
 def open_table(path: Path) -> Iterator[TextTable]:
-    """Open a table to read its rows one by one; rows without any field are left out.
-
-    Raises OSError: it cannot be opened. Raises InputError, also for a ValueError inside: it is no table of numbers.
-    """
+    """Open a table to read its rows, without empty ones. Raises OSError, InputError: it is no table of numbers."""
     with path.open("rb") as file:
         start = file.read(2)
     encoding = "utf-16" if start in {b"\xff\xfe", b"\xfe\xff"} else "utf-16-le" if start[1:] == b"\0" else "utf-8-sig"
@@ -110,19 +105,13 @@ def parse_numbers(fields: Sequence[str], line: int) -> list[float]:
     except ValueError:
         pass
     try:
-        return [
-            float("nan") if field.strip().lower() in MISSING else float(field.replace(",", ".")) for field in fields
-        ]
+        return [float("nan") if f.strip().lower() in MISSING else float(f.replace(",", ".")) for f in fields]
     except ValueError as error:
         raise ValueError(f"line {line}: {error}") from error
 
 
 def read_whole_table(path: Path, kind: str, largest: int, required: Sequence[str]) -> tuple[list[str], Rows]:
-    """Return the names of the columns of a table that people write, and its rows.
-
-    required : the columns, for messages
-    Raises InputError: as ``read_text_file``, or it is no table.
-    """
+    """Return columns and rows of a table; ``required``: columns for messages. Raises InputError: it is no table."""
     text = read_text_file(path, kind, largest)
     try:
         table = read_table(io.StringIO(text, newline=""))

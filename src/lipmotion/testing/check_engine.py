@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -17,12 +17,14 @@ from lipmotion.formats.base import MotionFormat
 from lipmotion.formats.fap import FAP
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, CLOSED
 from lipmotion.pipeline.outputs.curve_sets import make_curves
-from lipmotion.testing.examples import CHANNELS, RATE_HZ, example, examples, motion, speech, timeline
 from lipmotion.types import (
+    Channel,
     Configuration,
     Constraints,
+    Example,
     Features,
     Generation,
+    Motion,
     Pin,
     Span,
     Speech,
@@ -32,7 +34,65 @@ from lipmotion.types import (
     silent_monitor,
 )
 from lipmotion.types.motion import RADIAN
-from lipmotion.units import PHONES
+from lipmotion.units import PHONES as INVENTORY
+
+RATE_HZ = 100.0
+CHANNELS = tuple(map(Channel, ("opening", "width", "x_17", "y_17", "z_17", "x_61", "y_61")))
+OPENINGS = {"sil": 0.02, "p": 0.0, "b": 0.0, "m": 0.0, "aa": 0.30, "iy": 0.12, "uw": 0.08, "t": 0.10, "s": 0.07}
+WIDTHS = {"sil": 0.55, "p": 0.54, "b": 0.54, "m": 0.54, "aa": 0.56, "iy": 0.62, "uw": 0.42, "t": 0.57, "s": 0.58}
+PHONES = tuple(OPENINGS)
+MARGIN_S = 0.6  # silence at both ends, long enough for the mouth to rest in it
+
+
+def timeline(phones: Sequence[str], duration_s: float = 0.1) -> Timeline[Unit]:
+    """Return phones of equal duration in seconds, between two silences of ``MARGIN_S``."""
+    edges = np.cumsum([0, MARGIN_S, *(duration_s for _ in phones), MARGIN_S]).round(6).tolist()
+    labels = ["sil", *phones, "sil"]
+    return Timeline(tuple(Span(a, b, Unit(p)) for a, b, p in zip(edges, edges[1:], labels, strict=False)))
+
+
+def speech(units: Timeline[Unit], seed: int = 0) -> Speech:
+    """Return features [shape=(T, 39)] whose mean is another one for every phone, with the phones in time."""
+    duration_s = units.spans[-1].end_s if len(units) else 0.5
+    time_s = np.arange(int(np.floor(duration_s * RATE_HZ + 1e-9)) + 1) / RATE_HZ
+    sounds = np.random.default_rng(1).normal(0, 1, (64, 39))
+    values = np.random.default_rng([2, seed]).normal(0, 0.2, (len(time_s), 39))
+    for span in units:
+        inside = (time_s >= span.start_s) & (time_s < span.end_s)
+        values[inside] += sounds[sum(map(ord, span.label.phone)) % 64]
+    return Speech(Features(values.astype(np.float32), duration_s), units)
+
+
+def motion(units: Timeline[Unit], frames: int, seed: int = 0, noise: float = 0.002) -> Motion:
+    """Return poses joined smoothly, at 100 Hz; the points move with the distances, and ``z_17`` never moves.
+
+    units : phones of ``PHONES``;  noise : its standard deviation, eye distances
+    """
+    time_s = np.arange(frames) / RATE_HZ
+    pose = np.array([[OPENINGS["sil"], WIDTHS["sil"]]] * frames)
+    for span in units:
+        inside = (time_s >= span.start_s) & (time_s < span.end_s)
+        pose[inside] = OPENINGS[span.label.phone], WIDTHS[span.label.phone]
+    window = np.hanning(9) / np.hanning(9).sum()
+    pose = np.stack([np.convolve(np.pad(curve, 4, "edge"), window, "valid") for curve in pose.T], axis=1)
+    opening, width = (pose + np.random.default_rng([3, seed]).normal(0, noise, pose.shape)).T
+    still = np.zeros(frames)
+    points = [still + 0.01, -0.6 - opening, still, width / 2, -0.5 - opening / 4]
+    return Motion(np.stack([opening, width, *points], axis=1), RATE_HZ, CHANNELS)
+
+
+def example(phones: Sequence[str], seed: int = 0, duration_s: float = 0.1) -> Example:
+    """Return the speech of some phones with its motion, all of it valid."""
+    spoken = speech(timeline(phones, duration_s), seed)
+    frames = len(spoken.features.values)
+    return Example(f"number{seed}", spoken, motion(spoken.units, frames, seed), np.ones(frames, bool))
+
+
+def examples(count: int = 12, seed: int = 0) -> list[Example]:
+    """Return sentences of twelve phones, ten of them drawn at random; no lip closure first or last."""
+    draw = np.random.default_rng(seed)
+    spoken = [["t", *(PHONES[i] for i in draw.integers(1, len(PHONES), 10)), "aa"] for _ in range(count)]
+    return [example(phones, number, 0.08 + 0.02 * (number % 3)) for number, phones in enumerate(spoken)]
 
 
 def check_exporter(exporter: MotionFormat) -> None:
@@ -95,8 +155,7 @@ def require_error(kind: type[LipMotionError], call: Callable[[], object], what: 
 
 
 SENTENCE = ("t", "aa", "p", "iy", "m", "uw", "s", "aa")
-MIN_CORRELATION = 0.5
-"""Between generated and recorded opening, in a sentence of the kind trained on."""
+MIN_CORRELATION = 0.5  # between generated and recorded opening, in a sentence of the kind trained on
 
 
 class TrainedEngine:
@@ -187,8 +246,7 @@ def pins_are_exact(trained: TrainedEngine) -> None:
     """A pinned value holds in the nearest frame, with variance 0; of two in one frame the last holds."""
     spoken = speech(timeline(("p", "aa", "m")))
     draw = np.random.default_rng(0)
-    frames = len(spoken.features.values)
-    pins = {int(frame): float(draw.uniform(0, 0.5)) for frame in draw.integers(0, frames, 8)}
+    pins = {int(frame): float(draw.uniform(0, 0.5)) for frame in draw.integers(0, len(spoken.features.values), 8)}
     result = trained.generate(spoken, *(Pin(frame / RATE_HZ, "width", value) for frame, value in pins.items()))
     for frame, value in pins.items():
         found = float(result.motion["width"][frame])
@@ -232,8 +290,7 @@ def a_model_comes_back_from_arrays(trained: TrainedEngine) -> None:
     difference = float(np.abs(stored.motion.values - result.motion.values).max())
     require(difference < 5e-3, f"motion of the stored model differs by {difference:g}")
     require(stored.motion.channels == result.motion.channels, "other channels")
-    again = engine.from_arrays(engine.to_arrays(back))
-    _require_same(engine.generate(again, spoken), stored, "storing twice")
+    _require_same(engine.generate(engine.from_arrays(engine.to_arrays(back)), spoken), stored, "storing twice")
 
 
 def damaged_arrays_are_format_errors(trained: TrainedEngine) -> None:
@@ -253,27 +310,24 @@ def damaged_arrays_are_format_errors(trained: TrainedEngine) -> None:
 
 def every_phone_can_be_said(trained: TrainedEngine) -> None:
     """All phones of the inventory, in a context that was not trained on."""
-    for phone in PHONES:
-        result = trained.generate(speech(timeline(("aa", phone, "zh", phone))))
-        opening = result.motion["opening"]
+    for phone in INVENTORY:
+        opening = trained.generate(speech(timeline(("aa", phone, "zh", phone)))).motion["opening"]
         plausible = bool(np.isfinite(opening).all() and -1 < opening.min() <= opening.max() < 2)
         require(plausible, f"the opening in {phone!r} is from {opening.min():g} to {opening.max():g}")
 
 
 def odd_timelines_are_no_problem(trained: TrainedEngine) -> None:
     """No units, silence alone, gaps, hardly any time, beyond both ends; recordings of one frame."""
-    timelines = (
+    for units in (
         Timeline[Unit](()),
         Timeline((Span(0.0, 0.5, Unit("sil")),)),
         Timeline((Span(0.0, 0.5, Unit("aa")),)),
         Timeline((Span(0.1, 0.1, Unit("p")), Span(0.2, 0.2001, Unit("aa")), Span(0.31, 0.4, Unit("m")))),
         Timeline((Span(-1.0, 0.2, Unit("aa")), Span(0.2, 9.0, Unit("p")))),
-    )
-    for units in timelines:
+    ):
         for frames in (1, 2, 3, 51):
             features = Features(np.zeros((frames, 39), np.float32), (frames - 1) / RATE_HZ)
-            result = trained.generate(Speech(features, units))
-            _require_numbers(result, (frames, len(CHANNELS)))
+            _require_numbers(trained.generate(Speech(features, units)), (frames, len(CHANNELS)))
 
 
 def nothing_to_learn_from_is_a_corpus_error(trained: TrainedEngine) -> None:
@@ -305,8 +359,7 @@ def one_short_example_is_enough(trained: TrainedEngine) -> None:
     """Training on two phones gives finite motion."""
     model = trained.engine.fit([example(("p", "aa"))], silent_monitor).model
     spoken = speech(timeline(SENTENCE))
-    result = trained.engine.generate(model, spoken)
-    _require_numbers(result, (len(spoken.features.values), len(CHANNELS)))
+    _require_numbers(trained.engine.generate(model, spoken), (len(spoken.features.values), len(CHANNELS)))
 
 
 def optional_members_are_kept(trained: TrainedEngine) -> None:

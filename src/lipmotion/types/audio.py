@@ -147,21 +147,12 @@ class JoinedRows:
 
 
 def frame_of(time_s: float, frames: int, rate_hz: float) -> int | None:
-    """Return the frame nearest to a time, or None if the time is outside the recording.
-
-    frames : length of the recording, at ``rate_hz``
-    """
+    """Return the frame nearest to a time in a recording of so many frames at ``rate_hz``; None: it is outside."""
     frame = np.floor(time_s * rate_hz + 0.5)
     return int(frame) if 0 <= frame < frames else None
 
 
 def frames_of(span: Span[Any], frames: int) -> tuple[int, int]:
-    """Return the first frame of a span at 100 Hz, and the one after its last.
-
-    frames : length of the recording; both are cut to it
-    """
-    return _find_next_frame(span.start_s, frames), _find_next_frame(span.end_s, frames)
-
-
-def _find_next_frame(time_s: float, frames: int) -> int:
-    return ceil(min(max(time_s * FRAME_RATE_HZ - 1e-6, 0), frames))
+    """Return the first frame of a span at 100 Hz and the one after its last, both cut to so many frames."""
+    first, stop = (ceil(min(max(s * FRAME_RATE_HZ - 1e-6, 0), frames)) for s in (span.start_s, span.end_s))
+    return first, stop

@@ -11,8 +11,7 @@ from lipmotion.errors import InputError
 from lipmotion.types.values import describe_value, is_path, parse_number, parse_whole
 
 ConfigurationT = TypeVar("ConfigurationT", bound="Configuration")
-LARGEST_NUMBER = 1e6
-"""Largest absolute value of a number in a configuration."""
+LARGEST_NUMBER = 1e6  # largest absolute value of a number in a configuration
 _WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "text"}
 _WORDS |= {Path: "a path", tuple: "a list of texts"}
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
@@ -114,41 +113,47 @@ class Configuration:
 
     @classmethod
     def parsed(cls: type[ConfigurationT], values: Mapping[str, Any]) -> ConfigurationT:
-        """Return a configuration with some options, by name; all others have their default values.
-
-        Raises InputError: unknown option, or a value that is not allowed.
-        """
+        """Return a configuration with some options, by name. Raises InputError: unknown, or a value not allowed."""
         known = {option_field.name: kind_of(option_field) for option_field in fields(cls)}
         options: dict[str, Any] = {}
         for name, value in values.items():
             if name in cls.removed and name not in known:
                 if value != cls.removed[name]:
-                    raise InputError(
-                        f"{name} is {value!r}; this option no longer exists, required {cls.removed[name]!r}"
-                    )
+                    stated = f"{name} is {value!r}; this option no longer exists"
+                    raise InputError(f"{stated}, required {cls.removed[name]!r}")
                 continue
             present = cls.aliases.get(name, name)
             if present not in known:
                 raise InputError(cls._unknown(name))
-            options[present] = _part(present, known[present], value)
+            if issubclass(known[present], Configuration) and isinstance(value, Mapping):
+                try:
+                    value = known[present].parsed(value)  # noqa: PLW2901
+                except InputError as error:
+                    raise InputError(f"in [{present}]: {error}") from error
+            options[present] = value
         return cls(**options)
 
     @classmethod
     def values_of(cls, settings: Sequence[str]) -> dict[str, Any]:
-        """Return the values of options, by name, that are parsed from texts ``NAME=VALUE``.
-
-        Raises InputError: a text without value, an unknown option, or a value that is not of the option's type.
-        """
-        options = {option_field.name: option_field for option_field in fields(cls)}
-        values = {}
+        """Return the values of options in texts ``NAME=VALUE``. Raises InputError: no value, or of another type."""
+        kinds = {option_field.name: kind_of(option_field) for option_field in fields(cls)}
+        values: dict[str, Any] = {}
         for setting in settings:
             name, equals, text = setting.partition("=")
             if not equals:
                 raise InputError(f"the setting {setting!r} has no value; required NAME=VALUE")
             present = cls.aliases.get(name, name)
-            if present not in options:
+            if present not in kinds:
                 raise InputError(cls._unknown(name))
-            values[present] = _from_text(options[present], text)
+            kind = kinds[present]
+            if kind is int:
+                values[present] = parse_whole(text, f"{present} is")
+            elif kind is float:
+                values[present] = parse_number(text, f"{present} is", "a number", finite=False)
+            elif kind is bool and text.lower() not in _BOOLEANS:
+                raise InputError(f"{present} is {describe_value(text)}, required {_WORDS[kind]}")
+            else:
+                values[present] = _BOOLEANS[text.lower()] if kind is bool else kind(text)
         return values
 
     @classmethod
@@ -210,25 +215,3 @@ def kind_of(option_field: Field[Any]) -> type[Any]:
     """Return the type of an option: the one that it names, or else that of its default value."""
     kind: type[Any] = option_field.metadata.get("kind") or type(option_field.default)
     return kind
-
-
-def _part(name: str, kind: type[Any], value: Any) -> Any:
-    """Return the value of an option; of a part of a configuration, the part that a table holds."""
-    if not (issubclass(kind, Configuration) and isinstance(value, Mapping)):
-        return value
-    try:
-        return kind.parsed(value)
-    except InputError as error:
-        raise InputError(f"in [{name}]: {error}") from error
-
-
-def _from_text(option_field: Field[Any], text: str) -> Any:
-    """Return the value of an option that a text holds. Raises InputError: a text of another type."""
-    kind, name = kind_of(option_field), option_field.name
-    if kind is int:
-        return parse_whole(text, f"{name} is")
-    if kind is float:
-        return parse_number(text, f"{name} is", "a number", finite=False)
-    if kind is bool and text.lower() not in _BOOLEANS:
-        raise InputError(f"{name} is {describe_value(text)}, required {_WORDS[kind]}")
-    return _BOOLEANS[text.lower()] if kind is bool else kind(text)

@@ -16,8 +16,7 @@ NEUTRAL = "neutral"
 MOODS = ("happy", "sad", "angry", "afraid", "disgusted", "surprised", "tense", "tired")
 """The moods that a face shows beside none, ``NEUTRAL``."""
 PLAIN = "plain"
-MANNERS = ("whisper", "shout", "mumble")
-"""The manners of speaking beside the usual one, ``PLAIN``."""
+MANNERS = ("whisper", "shout", "mumble")  # the manners of speaking beside the usual one, ``PLAIN``
 _NAMES = (NEUTRAL, *MOODS, PLAIN, *MANNERS)
 _NUMBER = r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?)"
 _KEY = re.compile(rf"([a-z]+)(?::{_NUMBER})?(?:\s+at\s+{_NUMBER})?", re.IGNORECASE)
@@ -200,8 +199,7 @@ class Delivery(Configuration):
 
 
 SCENE, TRANSPARENT = "scene", "transparent"
-SMALLEST_PX, LARGEST_PX = 64, 4096
-"""Range of the height of pictures, in pixels."""
+SMALLEST_PX, LARGEST_PX = 64, 4096  # range of the height of pictures, in pixels
 _MOVING: dict[str, Any] = {
     "still": "--still",
     "metavar": "NAME,NAME",
@@ -234,9 +232,7 @@ class Staging(Configuration):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.size and not (SMALLEST_PX <= self.size <= LARGEST_PX and self.size % 2 == 0):
-            raise InputError(
-                f"the size is {self.size} pixels, required an even number from {SMALLEST_PX} to {LARGEST_PX}"
-            )
+            raise InputError(f"the size is {self.size} pixels, required an even number, {SMALLEST_PX} to {LARGEST_PX}")
         if self.background not in (SCENE, TRANSPARENT) and not re.fullmatch("#[0-9a-fA-F]{6}", self.background):
             raise InputError(
                 f"the background is {shorten(self.background)!r}, required scene, transparent, or a colour as "

@@ -43,10 +43,7 @@ class Pin:
 
 @dataclass(frozen=True)
 class SlopedPin(Pin):
-    """A pin through which the curve goes at a slope.
-
-    slope : of the curve, in its unit per second
-    """
+    """A pin through which the curve goes at a slope, in its unit per second."""
 
     slope: float
 
@@ -80,7 +77,7 @@ class Gain:
             raise InputError(f"the gain is {self.factor:g}, required 0 to {LARGEST_GAIN:g}")
         if not self.start_s <= self.end_s:
             raise InputError(
-                f"the gain lasts from {self.start_s:g} to {self.end_s:g} s, required an end after the start"
+                f"the gain lasts from {self.start_s:g} to {self.end_s:g} s, an end after the start is required"
             )
 
 

@@ -42,12 +42,9 @@ class ReducedVariance:
     mixing: NDArray[np.floating[Any]]
 
 
-BLOCK_FRAMES = 60_000
-"""Frames whose variances are in memory at once."""
-FULL_FIT_SHARE = 0.995
-"""A transcript that fits as large a share of the speech fits all of it, rounded."""
-SURE_CONFIDENCE = 0.8
-"""Words that were recognised with less confidence deserve an ear, and a transcript."""
+BLOCK_FRAMES = 60_000  # frames whose variances are in memory at once
+FULL_FIT_SHARE = 0.995  # a transcript that fits as large a share of the speech fits all of it, rounded
+SURE_CONFIDENCE = 0.8  # words that were recognised with less confidence deserve an ear, and a transcript
 
 
 @dataclass(frozen=True)
@@ -132,9 +129,8 @@ class Generation:
 
     def __repr__(self) -> str:
         frames, channels = self.motion.values.shape
-        return (
-            f"Generation({frames} frames at {self.motion.rate_hz:g} Hz, {channels} channels, {len(self.units)} units)"
-        )
+        shape = f"{frames} frames at {self.motion.rate_hz:g} Hz, {channels} channels"
+        return f"Generation({shape}, {len(self.units)} units)"
 
     @property
     def variance(self) -> NDArray[np.floating[Any]]:
@@ -180,16 +176,12 @@ class Generation:
         return change(self.spread)
 
     def resampled(self, rate_hz: float) -> Generation:
-        """Return the generation at another frame rate: interpolated values, and the state of the nearest frame.
-
-        Raises InputError: the rate is not more than 0.
-        """
+        """Return the generation at another rate, with the nearest states. Raises InputError: a rate not more than 0."""
         motion = self.motion.resampled(rate_hz)
         spread = self.change_frames(lambda rows: interpolate_rows(rows, self.motion.rate_hz, motion.time_s))
         nearest = np.minimum(np.round(motion.time_s * self.motion.rate_hz).astype(int), len(self.trace.frames) - 1)
-        return replace(
-            self, motion=motion, spread=spread, trace=StateTrace(self.trace.states, self.trace.frames[nearest])
-        )
+        trace = StateTrace(self.trace.states, self.trace.frames[nearest])
+        return replace(self, motion=motion, spread=spread, trace=trace)
 
     def change_frames(self, change: RowChange) -> NDArray[np.floating[Any]] | ReducedVariance:
         """Return the variances with other rows, which a function makes of those of all frames."""
@@ -217,10 +209,7 @@ class SpokenText(NamedTuple):
 
 @dataclass(frozen=True)
 class NamedProbability:
-    """A name and a probability: of a state, or of a regression.
-
-    probability : 0 to 1
-    """
+    """A name and a probability, 0 to 1: of a state, or of a regression."""
 
     name: str
     probability: float

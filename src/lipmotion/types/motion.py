@@ -29,10 +29,7 @@ LARGEST_OTHER = 1e6
 
 @dataclass(frozen=True)
 class Channel:
-    """Name and unit of one curve.
-
-    Raises InputError: a spreadsheet would execute the name as a formula.
-    """
+    """Name and unit of one curve. Raises InputError: a spreadsheet would execute the name as a formula."""
 
     name: str
     unit: str = EYE_DISTANCE
@@ -103,17 +100,11 @@ class Motion:
         return Motion(self.values[:, columns], self.rate_hz, tuple(self.channels[column] for column in columns))
 
     def at(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the values at some times in seconds [shape=(len(time_s), P)].
-
-        Linear interpolation between frames, as for every figure in docs/measures.md; constant beyond both ends.
-        """
+        """Return the values at some times in seconds, linear between frames, constant beyond [shape=(N, P)]."""
         return interpolate_rows(self.values, self.rate_hz, time_s)
 
     def resampled(self, rate_hz: float) -> Motion:
-        """Return the motion at another frame rate, over the same duration, by linear interpolation.
-
-        Raises InputError: the rate is not positive.
-        """
+        """Return the motion at another rate, by linear interpolation. Raises InputError: the rate is not positive."""
         if not 0 < rate_hz < float("inf"):
             raise InputError(f"motion rate is {rate_hz} Hz, required more than 0 and finite")
         count = int(np.floor((len(self.values) - 1) / self.rate_hz * rate_hz + 1e-9)) + 1
@@ -123,10 +114,7 @@ class Motion:
 def interpolate_rows(
     rows: NDArray[np.floating[Any]], rate_hz: float, time_s: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return rows at some times in seconds, by linear interpolation [shape=(len(time_s), N)].
-
-    rows : one a frame, at ``rate_hz`` [shape=(T, N)]; constant beyond both ends
-    """
+    """Return rows [shape=(T, P)] at some times, linear between frames, constant beyond both ends [shape=(N, P)]."""
     position = np.clip(np.asarray(time_s) * rate_hz, 0, len(rows) - 1)
     low = np.minimum(position.astype(int), max(len(rows) - 2, 0))
     high = np.minimum(low + 1, len(rows) - 1)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, cast
 
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
 REPORT_INTERVAL = 10
-"""Every so many items are reported."""
+"""Every so many pictures are reported."""
 
 
 @dataclass(frozen=True)
@@ -71,29 +71,21 @@ def sub_monitor(monitor: Monitor, start: float, stop: float, prefix: str = "") -
     return report
 
 
-def with_reports(items: Iterable[ItemT], count: int, stage: str, monitor: Monitor) -> Iterator[ItemT]:
-    """Yield the items one by one, about ``count`` of them, and report now and then how many are done."""
+def with_progress(
+    items: Iterable[ItemT], stage: str, monitor: Monitor, count: int | None = None, interval: int = 1
+) -> Iterator[ItemT]:
+    """Yield the items one by one, and report after each ``interval`` of about ``count`` how many are done."""
+    steps = len(cast(Sized, items)) if count is None else count
     for number, item in enumerate(items):
-        if number % REPORT_INTERVAL == 0:
-            monitor(Progress(stage, number, count, min(number / max(count, 1), 1.0)))
+        if number % interval == 0:
+            monitor(Progress(stage, number, steps, min(number / max(steps, 1), 1.0)))
         yield item
-    monitor(Progress(stage, count, count, 1.0))
-
-
-def with_progress(items: Sequence[ItemT], stage: str, monitor: Monitor) -> Iterator[ItemT]:
-    """Yield the items one by one, and report after each how many of them are done."""
-    for number, item in enumerate(items):
-        monitor(Progress(stage, number, len(items), number / len(items)))
-        yield item
-    monitor(Progress(stage, len(items), len(items), 1.0))
+    monitor(Progress(stage, steps, steps, 1.0))
 
 
 @contextmanager
 def warnings_to(receive: Callable[[str], object], *, of_thread: bool = False, propagate: bool = True) -> Iterator[None]:
-    """Give the package's warnings to a function while the block lasts; ``of_thread``: those of this thread alone.
-
-    propagate : whether they go on to where they are written otherwise
-    """
+    """Give the package's warnings to a function; ``of_thread``: this thread's alone; propagate : whether they go on."""
     logger, handler, thread = logging.getLogger("lipmotion"), logging.Handler(logging.WARNING), threading.get_ident()
     handler.emit = lambda record: receive(record.getMessage())  # type: ignore[assignment,method-assign]
     handler.addFilter(lambda record: not of_thread or record.thread == thread)

@@ -67,10 +67,7 @@ class Speech:
     parts: tuple[SpeechPart, ...] | None = None
 
     def cached(self, of: Any, make: Callable[[], CachedT]) -> CachedT:
-        """Return what a function makes of the sound; speech of the same sound with other units shares it.
-
-        of : the object that the result belongs to, as a network; the result must depend on it and the sound alone
-        """
+        """Return what a function makes of the sound for an object, as a network; speech with other units shares it."""
         sound = (self.features, self.log_f0, self.spectrum, self.posteriors, self.encoding)
         entry = self.cache.get(of)
         if entry is None or any(ours is not theirs for ours, theirs in zip(sound, entry[0], strict=True)):
@@ -220,10 +217,7 @@ class TimedTranscript:
 
 
 def sort_lines(lines: list[TranscriptLine]) -> TimedTranscript:
-    """Return the transcript of lines in any order, those without words left out.
-
-    Lines are sorted by their start; one without a start stays behind the line before it.
-    """
+    """Return the transcript of lines with words, sorted by start; one without a start stays behind the one before."""
     latest_s, keys = float("-inf"), []
     for line in lines:
         start_s = line.words[0].start_s if line.start_s is None and line.words else line.start_s

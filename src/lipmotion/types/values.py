@@ -15,8 +15,7 @@ from typing import Any
 from lipmotion.errors import InputError, shorten
 
 Schema = Callable[[Any], Any]
-NAME_BYTES, PATH_BYTES = 255, 4096
-"""Maximum bytes of a name in a path, and of a path, on usual file systems."""
+NAME_BYTES, PATH_BYTES = 255, 4096  # maximum bytes of a name in a path, and of a path, on usual file systems
 _LEFT_OUT = object()
 _HALVES = re.compile("[\ud800-\udc7f\udd00-\udfff]")
 """Halves of characters, without \\udc80 to \\udcff: Python has those for bytes of file names that are not UTF-8."""
@@ -118,8 +117,7 @@ def number(least: float = -math.inf, most: float = math.inf) -> Schema:
     return checked
 
 
-truth = _fitting(lambda value: type(value) is bool, "true or false")
-"""The schema of a truth value."""
+truth = _fitting(lambda value: type(value) is bool, "true or false")  # the schema of a truth value
 
 
 def text(most: int) -> Schema:
@@ -169,10 +167,7 @@ def items(schema: Schema, least: int = 0, most: int | None = None) -> Schema:
 
 
 def members(table: Mapping[str, Schema], needed: Collection[str] = (), *, alone: bool = False) -> Schema:
-    """Return the schema of an object: a table of its members, and which of them must be there.
-
-    alone : whether others are refused; else they are dropped
-    """
+    """Return the schema of an object: its members, which are needed; ``alone``: others are refused, else dropped."""
 
     def checked(value: Any) -> dict[str, Any]:
         if type(value) is not dict:

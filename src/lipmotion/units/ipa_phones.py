@@ -3,11 +3,9 @@
 What is seen decides, in this order: for vowels rounding, then height (of the jaw), then backness, which nobody sees;
 for consonants what the lips do, then the tip of the tongue, then manner. So French y (*rue*) becomes uw, which is
 rounded and close as it is, although its tongue is that of iy; and the b of Spanish *lobo*, β, becomes v: lips that
-nearly meet. Marks of length, tone, stress and of the way of speaking have no mouth shape of their own: they are left
-out.
+nearly meet. Marks of length, tone, stress and of the way of speaking have no mouth shape of their own.
 
-Source: International Phonetic Association, the chart of 2020; J. C. Catford, "A Practical Introduction to Phonetics",
-2001.
+Source: International Phonetic Association, chart of 2020; J. C. Catford, "A Practical Introduction to Phonetics", 2001.
 """
 
 from __future__ import annotations
@@ -148,9 +146,7 @@ def _read(tokens: Sequence[str]) -> tuple[list[tuple[str, int]], str]:
     phones: list[tuple[str, int]] = []
     unknown, at = "", 0
     while at < len(text):
-        symbol = next(
-            (text[at : at + size] for size in range(_LONGEST, 0, -1) if text[at : at + size] in IPA_PHONES), ""
-        )
+        symbol = next((text[at : at + n] for n in range(_LONGEST, 0, -1) if text[at : at + n] in IPA_PHONES), "")
         if symbol:
             phones += [(phone, letters[at][1]) for phone in IPA_PHONES[symbol]]
         elif not is_mark(text[at]):

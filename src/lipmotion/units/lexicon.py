@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from importlib.util import find_spec
+from io import StringIO
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -67,16 +67,14 @@ LONGEST_LENGTHENED, MAX_LENGTHENED = 100, 5
 VARIANT_NUMBER = re.compile(r"\(\d+\)$")
 """The number by which the dictionary marks a further pronunciation."""
 MAX_VARIANTS = 32
-"""Most pronunciations of a word: alignment tries each after each of the word before. In the dictionary there are up to
-six."""
+"""Most pronunciations of a word: alignment tries each after each of the word before. The dictionary has up to six."""
 
 
 @lru_cache(maxsize=4096)
 def find_phone(label: str) -> str | None:
     """Return the phone that a label names, or None.
 
-    A label is ARPAbet in either case, stressed or not, TIMIT's, with its place in the word as in Kaldi (``hh_B``), or
-    our own name.
+    A label is ARPAbet in either case, stressed or not, TIMIT's, with its place in a word as in Kaldi (``hh_B``), ours.
     """
     name = re.sub(r"\d?(_[bies])?$", "", label.lower())
     name = REDUCED_VOWELS.get(name, name) if label[len(name) :].startswith("0") else OTHER_NAMES.get(name, name)
@@ -105,13 +103,17 @@ class Lexicon:
         Raises InputError: no such file, not UTF-8, larger than allowed (``LARGEST_LEXICON_BYTES``, ``MAX_LINES``,
         ``LONGEST_LINE``, ``MAX_VARIANTS``), no phones after a word, or an unknown phone (with its line).
         """
+        text = read_text_file(Path(path), "lexicon", LARGEST_LEXICON_BYTES)
+        count = text.count("\n") + 1
+        if count > MAX_LINES:
+            raise InputError(f"{path}: {count} lines, required at most {MAX_LINES}; keep the words that are said")
         user: dict[str, list[Pronunciation]] = {}
-        for number, line in enumerate(_lines(Path(path)), start=1):
-            where = f"{path}, line {number}"
-            if len(line) > LONGEST_LINE:
+        for number, line in enumerate(StringIO(text), start=1):
+            where, length = f"{path}, line {number}", len(line.rstrip("\n"))
+            if length > LONGEST_LINE:
                 raise InputError(
-                    f"{where}: {len(line)} characters, required at most {LONGEST_LINE}; write one pronunciation of a "
-                    "word a line"
+                    f"{where}: {length} characters, required at most {LONGEST_LINE}; write one pronunciation of a word "
+                    "a line"
                 )
             word, *labels = line.split("#", maxsplit=1)[0].split() or [""]
             if not word:
@@ -119,29 +121,27 @@ class Lexicon:
             if not labels:
                 raise InputError(f"{where}: a word without phones; write the word, then its phones")
             word = VARIANT_NUMBER.sub("", normalise_text(word)).strip("'")  # as in ``split_words``
-            phones = tuple([phone for phone in map(_find_phone, labels) if phone])
-            if len(phones) < len(labels):
-                wrong = shorten(next(label for label in labels if not _find_phone(label)))
-                raise InputError(f"{where}: unknown phone {wrong!r}; the phones are: {' '.join(PHONES)}")
+            phones = tuple([find_phone(label) or "" for label in labels])
+            for label, phone in zip(labels, phones, strict=True):
+                if not phone or is_silent(phone):
+                    raise InputError(f"{where}: unknown phone {shorten(label)!r}; the phones are: {' '.join(PHONES)}")
             variants = user.setdefault(word, [])
             if len(variants) == MAX_VARIANTS:
-                raise InputError(
-                    f"{where}: more than {MAX_VARIANTS} pronunciations of {shorten(word)!r}; keep those that are said"
-                )
+                what = f"more than {MAX_VARIANTS} pronunciations of {shorten(word)!r}"
+                raise InputError(f"{where}: {what}; keep those that are said")
             variants.append(phones)
         return cls({word: tuple(variants) for word, variants in user.items()})
 
     def known(self, word: str) -> bool:
         """Return whether a word, or the usual reading of a written form, is in the user's file or the dictionary."""
-        said = (each in self.user or is_in_dictionary(each) for each in list_readings(word.removesuffix("'s"))[0])
+        said = (each in self.user or list_entries(each) for each in list_readings(word.removesuffix("'s"))[0])
         return word in self.user or all(said) or bool(expand_lengthened(word) or SOUNDED.fullmatch(word))
 
     def pronunciations(self, word: str) -> tuple[Pronunciation, ...]:
         """Return every pronunciation of a lower-case word, or of a written form (``1995``) in all its readings.
 
         Of an unknown one: those of the same word without accents or lengthened letters, if the dictionary has it
-        (``cafe`` for ``café``, ``boom`` for ``boooom``), else that of ``hama``'s network, where it is installed, else
-        that of the letter-to-sound rules.
+        (``cafe`` for ``café``, ``boom`` for ``boooom``), else that of ``hama``'s network, where installed, or of rules.
         Raises InputError: as ``guess_pronunciation``.
         """
         forms = (tuple(phone for phone, _ in form if phone != PAUSE) for form in self.spoken_forms(word))
@@ -168,10 +168,8 @@ class Lexicon:
     def _pronounce(self, word: str) -> tuple[Pronunciation, ...]:
         if word in self.user:
             return self.user[word]
-        entries = _list_entries(word) or _list_entries(remove_accents(word))
-        variants = [reduce_vowels(word, entry) for entry in entries]
-        if variants:
-            return tuple(dict.fromkeys(variants))
+        if entries := list_entries(word):
+            return tuple(dict.fromkeys(reduce_vowels(word, entry) for entry in entries))
         if word[1:].endswith("'s"):
             return tuple((*each, *OWNED.get(each[-1], ("z",))) for each in self._pronounce(word[:-2]))
         by_rules = guess_pronunciation(word)
@@ -180,20 +178,14 @@ class Lexicon:
         return (reduce_vowels(word, pronounce_by_network(remove_accents(word)) or by_rules),)
 
 
-def is_in_dictionary(word: str) -> bool:
-    """Return whether the dictionary has a word, perhaps without accents."""
-    return bool(_list_entries(word) or _list_entries(remove_accents(word)))
-
-
 @cache
 def expand_lengthened(word: str) -> tuple[tuple[str, ...], ...]:
     """Return the words of the dictionary that a lengthened word stands for, the likeliest first; none of any other.
 
-    Letters that stand there three times and more are meant once or twice: ``nooo``, ``boooom``. Else the word may be a
-    part that is repeated: ``hahaha``.
+    Letters that stand there three times and more are meant once or twice: ``nooo``, ``boooom``; or a part is repeated.
     """
     plain = remove_accents(word)
-    if not LENGTHENED.search(plain) or len(plain) > LONGEST_LENGTHENED or is_in_dictionary(word):
+    if not LENGTHENED.search(plain) or len(plain) > LONGEST_LENGTHENED or list_entries(word):
         return ()
     runs = [found[0] for found in re.finditer(r"(.)\1*", plain)]
     choices = [
@@ -202,29 +194,10 @@ def expand_lengthened(word: str) -> tuple[tuple[str, ...], ...]:
     ]
     if max(map(len, runs)) > 2 and sum(len(each) > 1 for each in choices) <= MAX_LENGTHENED:
         shortest = 3 if SOUNDED.fullmatch(plain) else 1  # "sss" is no name of a letter
-        known = [each for each in map("".join, product(*choices)) if len(each) >= shortest and is_in_dictionary(each)]
+        known = [each for each in map("".join, product(*choices)) if len(each) >= shortest and list_entries(each)]
         return tuple((each,) for each in sorted(known, key=lambda each: each not in OFTEN_LENGTHENED))
     found = REPEATED.fullmatch(plain)
-    return ((found[1],) * found[0].count(found[1]),) if found and is_in_dictionary(found[1]) else ()
-
-
-def _lines(path: Path) -> Iterator[str]:
-    """Yield the lines of a lexicon file. Raises InputError: not a text, or more than a lexicon holds."""
-    text = read_text_file(path, "lexicon", LARGEST_LEXICON_BYTES)
-    count = text.count("\n") + 1
-    if count > MAX_LINES:
-        raise InputError(f"{path}: {count} lines, required at most {MAX_LINES}; keep the words that are said")
-    start = 0
-    for number in range(1, count + 1):
-        end = text.find("\n", start) if number < count else len(text)
-        yield text[start:end]
-        start = end + 1
-
-
-@lru_cache(maxsize=4096)
-def _find_phone(label: str) -> str | None:
-    name = find_phone(label)
-    return None if name is None or is_silent(name) else name
+    return ((found[1],) * found[0].count(found[1]),) if found and list_entries(found[1]) else ()
 
 
 def find_english_data() -> Path:
@@ -244,8 +217,11 @@ def _dictionary() -> bytes:
 
 
 @cache
-def _list_entries(word: str) -> tuple[Pronunciation, ...]:
-    """Return the pronunciations of a word in the dictionary, by binary search in its text; none if it is not in it."""
+def list_entries(word: str) -> tuple[Pronunciation, ...]:
+    """Return the pronunciations of a word in the dictionary, by binary search in its text.
+
+    Of a word that is not in it: those of the same word without accents, or none.
+    """
     text, wanted, entries = _dictionary(), word.encode(), []
     low, high = 0, len(text) - 1  # each at the line break before a line
     while low < high:
@@ -258,7 +234,8 @@ def _list_entries(word: str) -> tuple[Pronunciation, ...]:
         end = text.index(b"\n", low + 1)
         entries.append(tuple(text[low:end].decode().lower().split()[1:]))
         low = end
-    return tuple(entries)
+    plain = remove_accents(word)
+    return tuple(entries) if entries or plain == word else list_entries(plain)
 
 
 def _head(text: bytes, line_break: int) -> bytes:

@@ -72,15 +72,12 @@ def list_recognised_phones(units: Timeline[Unit]) -> list[RecognisedPhone]:
 def restore_confidences(units: Timeline[Unit], recognised: Iterable[RecognisedPhone]) -> Timeline[Unit]:
     """Return phones in time; those still as recognised (``list_recognised_phones``) have their confidence."""
     confidence_of = {phone[:3]: phone.confidence for phone in recognised}
-    return Timeline(
-        tuple(
-            replace(
-                span,
-                label=replace(span.label, confidence=confidence_of.get((span.start_s, span.end_s, _name(span.label)))),
-            )
-            for span in units
-        )
-    )
+
+    def restore(span: Span[Unit]) -> Span[Unit]:
+        confidence = confidence_of.get((span.start_s, span.end_s, _name(span.label)))
+        return replace(span, label=replace(span.label, confidence=confidence))
+
+    return Timeline(tuple(map(restore, units)))
 
 
 def _name(label: Unit) -> str:

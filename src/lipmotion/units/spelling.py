@@ -68,9 +68,7 @@ def remove_accents(word: str) -> str:
 
 
 def guess_pronunciation(word: str) -> tuple[str, ...]:
-    """Return a guessed pronunciation in ARPAbet of a word, without its accents. Raises InputError: other letters than
-    Latin.
-    """
+    """Return a guessed pronunciation of a word in ARPAbet, without its accents. Raises InputError: not in Latin."""
     plain = remove_accents(word)
     foreign = sorted(letter for letter in set(word) if re.search(r"[^a-z']", remove_accents(letter)))
     if foreign or not plain.strip("'"):

@@ -110,8 +110,7 @@ def remove_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[str
 
     Names are those in capitals and with a remark (``ANNA:``, ``Anna (V.O.):``, ``[Anna]:``), ``Speaker 1:``, those in
     ``names``, two lines or more in capitals above what is said, as in screenplays, and what stands before the quotes of
-    a game's script, if all lines are such; also times before lines, if they rise from the first minute on, and numbers
-    before lines, if they count on.
+    a game's script, if all lines are such; also times before lines that rise from the first minute on, and numbers.
     """
     left_out: list[str] = []
 

@@ -36,8 +36,7 @@ ENDINGS: dict[str, int] = {
 }
 """Spellings at the end of a word, and its stressed vowel, counted from the end."""
 UNSTRESSED_PREFIXES = ("be", "de", "dis")
-"""Beginnings of words of two syllables that leave the stress to the second one, where their vowel is one of
-``PREFIX_VOWELS``."""
+"""Beginnings of words of two syllables that leave the stress to the second one, with one of ``PREFIX_VOWELS``."""
 PREFIX_VOWELS = frozenset("ih iy eh".split())
 LEADS = frozenset("p b t d k g f v th s sh".split())
 GLIDES = frozenset("l r w y".split())

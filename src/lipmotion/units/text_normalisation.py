@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 
 from lipmotion.errors import AlignmentError, InputError, shorten
-from lipmotion.units.lexicon import SOUNDED, expand_lengthened, is_in_dictionary
+from lipmotion.units.lexicon import SOUNDED, expand_lengthened, list_entries
 from lipmotion.units.spelling import convert_to_plain, normalise_text
 from lipmotion.units.written_forms import FORMS, NUMERIC, WORD, list_readings
 
@@ -73,7 +73,7 @@ def tokenise(text: str) -> tuple[str, ...]:
     tokens = []
     for token in (found[0] for found in _scanner().finditer(plain)):
         is_word = token.isalpha() or ("'" in token and token.replace("'", "").isalpha())
-        is_short = not shouted and INITIALS.fullmatch(token) and not is_in_dictionary(token.lower())
+        is_short = not shouted and INITIALS.fullmatch(token) and not list_entries(token.lower())
         is_short = is_short and not (expand_lengthened(token.lower()) or SOUNDED.fullmatch(token.lower()))
         tokens.append(token.lower() if is_word and not is_short else token)
     return tuple(tokens)
@@ -139,8 +139,7 @@ MAX_CHARACTERS = 50_000
 LONGEST_SENTENCE = 400
 """A longer sentence is divided at a comma, else between words; in characters."""
 LONGEST_WORD = 200
-"""Most characters without a blank in scripts that have blanks; a longer one is no word, but would be spoken for
-minutes."""
+"""Most characters without a blank in scripts that have blanks; a longer one is no word, but would take minutes."""
 ABBREVIATIONS = (
     "mr mrs ms dr prof st jr sr vs etc no vol fig inc ltd co gen col capt lt sgt rev hon e.g i.e a.m p.m approx"
 )
@@ -153,9 +152,8 @@ _BREAK = re.compile(r"[,;:–—、，；：]\s*|\s-+\s")
 def clean_text(text: str) -> str:
     """Return a text without control characters and surrogates; an empty line ends a sentence."""
     ended = re.sub(r"(\w)[ \t]*\r?\n[ \t]*\r?\n", r"\1.\n", text)
-    return " ".join(
-        "".join(" " if unicodedata.category(c) in ("Cc", "Cs", "Co", "Cn", "Zl", "Zp") else c for c in ended).split()
-    )
+    spoken = (" " if unicodedata.category(c) in ("Cc", "Cs", "Co", "Cn", "Zl", "Zp") else c for c in ended)
+    return " ".join("".join(spoken).split())
 
 
 def split_sentences(text: str) -> list[str]:

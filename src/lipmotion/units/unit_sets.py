@@ -60,12 +60,9 @@ class UnitSet:
         if unknown or missing:
             wrong = [f"unknown {' '.join(unknown)}"] * bool(unknown) + [f"missing {' '.join(missing)}"] * bool(missing)
             raise InputError(f"unit set {self.name}: phones {'; '.join(wrong)}; required: {' '.join(PHONES)}")
-        nameless = [
-            phone for phone, unit in self.unit_of_phone.items() if len(unit.split()) != 1 or unit != unit.strip()
-        ]
-        if nameless:
-            unit = shorten(self.unit_of_phone[nameless[0]])
-            raise InputError(f"unit set {self.name}: the unit of {nameless[0]} is {unit!r}, not a word")
+        for phone, unit in self.unit_of_phone.items():
+            if unit.split() != [unit]:
+                raise InputError(f"unit set {self.name}: the unit of {phone} is {shorten(unit)!r}, not a word")
         for unit in _mix(self.unit_of_phone):
             raise InputError(f"unit set {self.name}: {_ADVICE.format(shorten(unit))}")
 
@@ -84,13 +81,9 @@ class UnitSet:
         """The units of the silent phones (sil, sp), whether or not they hold others, too."""
         return tuple(dict.fromkeys(unit for phone, unit in self.unit_of_phone.items() if is_silent(phone)))
 
-    @cached_property
-    def _silent_only(self) -> frozenset[str]:
-        return frozenset(unit for unit in self.silence if all(map(is_silent, self.phones(unit))))
-
     def silent(self, unit: str) -> bool:
         """Return whether all phones of a unit are silent."""
-        return unit in self._silent_only
+        return unit in self.silence and all(map(is_silent, self.phones(unit)))
 
     def unit(self, phone: str) -> str:
         """Return the unit of a phone. Raises InputError: it is not in the inventory."""
@@ -144,9 +137,7 @@ def read_unit_table(path: Path) -> UnitSet:
     Raises InputError (with the line): no such file, not UTF-8, a unit twice or without phones, a phone that is unknown,
     twice or missing, or silence in one unit with speech that is not called ``closed``.
     """
-    unit_line: dict[str, int] = {}
-    phone_line: dict[str, int] = {}
-    unit_of_phone: dict[str, str] = {}
+    unit_line, phone_line, unit_of_phone = dict[str, int](), dict[str, int](), dict[str, str]()
     for number, line in enumerate(read_text_file(path, "unit table", LARGEST_TABLE_BYTES).splitlines(), start=1):
         unit, *phones = line.split("#")[0].split() or [""]
         if not unit:
@@ -155,9 +146,8 @@ def read_unit_table(path: Path) -> UnitSet:
         if not phones:
             raise InputError(f"{where}: unit {shorten(unit)!r} without phones; write the unit, then its phones")
         if unit in unit_line:
-            raise InputError(
-                f"{where}: unit {shorten(unit)!r} stands in line {unit_line[unit]} already; write it in one line"
-            )
+            first = unit_line[unit]
+            raise InputError(f"{where}: unit {shorten(unit)!r} stands in line {first} already; write it in one line")
         unit_line[unit] = number
         for phone in phones:
             if phone not in PHONES:

@@ -385,8 +385,7 @@ FORMS: Forms = (
 """Patterns of forms, without regard of case, and how they are read: the first that matches counts.
 Those that begin with a letter come last.
 
-Readings are divided by ``|``; ``{1}`` is the usual reading of the first group, ``{1:*}`` each of its readings, and what
-else may stand there is in ``SAID``.
+Readings are divided by ``|``; ``{1}`` is the usual one of the first group, ``{1:*}`` each of them; or as of ``SAID``.
 """
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.motion.eigenlips import COLOURS, Eigenlips
+from lipmotion_faces.appearance.poisson import round_levels
 
 Values = NDArray[np.float32]
 Pictures = NDArray[np.uint8]
@@ -56,11 +57,6 @@ class Candidates:
     def size(self) -> tuple[int, int]:
         """Height and width of a picture, px."""
         return self.details.shape[1], self.details.shape[2]
-
-    @cached_property
-    def by_colour(self) -> Values:
-        """The coefficients of each colour [shape=(3, N, K)]."""
-        return np.moveaxis(self.coefficients.reshape(len(self), len(COLOURS), -1), 1, 0)
 
     @cached_property
     def detail_distances(self) -> Values:
@@ -257,9 +253,7 @@ def sharpen(pictures: Pictures, share: float, scale: int) -> Pictures:
     lightness = pictures.mean(axis=3, dtype=np.float32)
     detail = lightness - gaussian_filter(lightness, (0, RADIUS_PX * scale, RADIUS_PX * scale))
     detail *= np.float32(share) * _weigh_lips(lightness.shape[1], lightness.shape[2], scale)
-    levels = pictures + detail[..., None]
-    np.rint(levels, out=levels)
-    return np.clip(levels, 0, 255, out=levels).astype(np.uint8)
+    return round_levels(pictures + detail[..., None])
 
 
 @cache
@@ -336,18 +330,18 @@ class Refiner:
         else:
             for colour in range(len(COLOURS)):
                 levels[..., colour] += self.candidates.details[chosen[:, colour], :, :, colour]
-        np.rint(levels, out=levels)
-        return np.clip(levels, 0, 255, out=levels).astype(np.uint8)
+        return round_levels(levels)
 
     def _find_nearest(self, wanted: Costs) -> tuple[Index, Costs]:
         """Return the nearest candidates of each frame, in order, and their costs [shape=(1 or 3, T, n), both]."""
         count = min(self.options.neighbours, len(self.candidates))
         frames = wanted.shape[1]
         rows = 1 if self.options.together else len(COLOURS)
+        by_colour = np.moveaxis(self.candidates.coefficients.reshape(len(self.candidates), len(COLOURS), -1), 1, 0)
         numbers, costs = np.empty((rows, frames, count), np.intp), np.empty((rows, frames, count), np.float32)
         for start in range(0, frames, BLOCK):
             part = slice(start, start + BLOCK)
-            pairs = zip(wanted[:, part], self.candidates.by_colour, strict=True)
+            pairs = zip(wanted[:, part], by_colour, strict=True)
             distances = np.stack([square_distances(frame, candidate) for frame, candidate in pairs])
             if self.options.together:
                 distances = distances.sum(axis=0, keepdims=True)

@@ -258,12 +258,12 @@ class _Plan:
     def __init__(
         self, descriptors: FrameDescriptors, rate_hz: float, allowed: NDArray[np.bool_], cuts: Sequence[int]
     ) -> None:
+        from scipy.ndimage import binary_dilation, gaussian_filter1d
+
         self.scenes = list_scenes(allowed, cuts)
         self._scene_of = np.full(len(allowed), -1)
         for index, (start, stop) in enumerate(self.scenes):
             self._scene_of[start:stop] = index
-        from scipy.ndimage import binary_dilation
-
         change = np.zeros(len(descriptors.eyes))
         for first, last in self.scenes:
             steps = np.sqrt(np.square(np.diff(descriptors.eyes[first:last], axis=0)).mean(axis=1))
@@ -271,17 +271,14 @@ class _Plan:
             change[first + 1 : last] = np.maximum(change[first + 1 : last], steps)
         ordinary = np.median(change[change > 0]) if (change > 0).any() else np.inf
         self.busy = binary_dilation(change > BUSY_CHANGE_RATIO * ordinary, iterations=max(1, round(BUSY_S * rate_hz)))
-        from scipy.ndimage import gaussian_filter1d
-
         rows = descriptors.standardise(self.scenes)
         speed = np.zeros(len(rows))
         for start, stop in self.scenes:
             if stop - start > 1:
                 smooth = gaussian_filter1d(rows[start:stop], 1.0, axis=0, mode="nearest")
                 speed[start:stop] = np.linalg.norm(np.gradient(smooth, axis=0), axis=1)
-        self.restless = (
-            speed / (float(np.median(speed[speed > 0])) if (speed > 0).any() else 1.0)
-        ) + BUSY_COST * self.busy
+        ordinary = float(np.median(speed[speed > 0])) if (speed > 0).any() else 1.0
+        self.restless = speed / ordinary + BUSY_COST * self.busy
         self._least = max(1, round(MIN_RUN_S * rate_hz))
         self._usual = USUAL_RUN_S * rate_hz
         self._repeat = REPEAT_S * rate_hz
@@ -302,7 +299,15 @@ class _Plan:
         runs: list[tuple[int, int, int]] = []
         joins: list[Join] = []
         while shown < count:
-            ends, join_costs, nexts = self._list_joins(at, way)
+            # possible joins: the last frame before each, its cost, and the frame after it, -1 for a turn
+            room = self._count_room(at, way)
+            min_run = min(self._least, max(room, 1))
+            last_frames = at + way * (np.arange(min_run, room + 1) if room >= min_run else np.array([room]))
+            targets, jump_costs = (table[last_frames] for table in self._jumps[way])
+            row, scene = np.nonzero(targets >= 0)
+            ends = np.concatenate([last_frames, last_frames[row]])
+            join_costs = np.concatenate([self.restless[last_frames], jump_costs[row, scene]])
+            nexts = np.concatenate([np.full(len(last_frames), -1), targets[row, scene]])
             lengths = np.abs(ends - at) + 1
             following = nexts[:, None] + way * np.arange(self._least)
             seen = last_shown[np.clip(following, 0, len(last_shown) - 1)].max(axis=1)  # -inf: never
@@ -328,17 +333,6 @@ class _Plan:
         shown = np.lexsort((np.arange(len(order)), order.first))
         again = (np.diff(order.first[shown]) == 0) & (np.diff(shown) < self._repeat)
         return worst + REPEATS_COST * float(again.sum()) / len(order)
-
-    def _list_joins(self, at: int, way: int) -> tuple[Numbers, Array, Numbers]:
-        """Return possible joins: the last frame before each, its cost, and the frame after it, -1 for a turn."""
-        room = self._count_room(at, way)
-        least = min(self._least, max(room, 1))
-        lengths = np.arange(least, room + 1) if room >= least else np.array([room])
-        ends = at + way * lengths
-        targets, costs = (table[ends] for table in self._jumps[way])
-        row, scene = np.nonzero(targets >= 0)
-        nexts = np.concatenate([np.full(len(ends), -1), targets[row, scene]])
-        return np.concatenate([ends, ends[row]]), np.concatenate([self.restless[ends], costs[row, scene]]), nexts
 
     def _count_room(self, at: int, way: int) -> int:
         """Return how many frames there are behind a frame, in its scene."""

@@ -58,16 +58,17 @@ def measure_shape(jaw_half_width: float, chin_px: Array) -> FaceShape:
     return FaceShape(half, float(np.clip(highest - MARGIN_PX, MIN_BOTTOM_PX, CORNER[1] + HEIGHT - 4.0)))
 
 
-def map_region(face_to_frame: Array, scale: float) -> Array:
-    """Return the affine maps from a pixel of a picture of the lower face to its position in the frame.
+def map_region(face_to_frame: Array, scale: float, corner: tuple[float, float] = CORNER) -> Array:
+    """Return the affine maps from a pixel of a region of the face to its position in the frame.
 
     face_to_frame : maps from px of the face to those of the frame [shape=(..., 2, 3)], of
                     ``tracking.head_pose.map_face``
-    scale         : samples a pixel
+    scale         : samples a pixel, along each side
+    corner        : the upper left one of the region, px from the point between the eyes; that of the lower face
     Pixel (0, 0) is a centre. Returns an array of the same shape.
     """
     turn = face_to_frame[..., :2]
-    first = np.array(CORNER) + 0.5 / scale
+    first = np.array(corner) + 0.5 / scale
     return np.concatenate([turn / scale, (face_to_frame[..., 2] - 0.5 + turn @ first)[..., None]], axis=-1)
 
 
@@ -196,34 +197,26 @@ def move_chin(pictures: Pictures, chin_px: Array, drops_px: Array) -> Pictures:
     across = (np.arange(WIDTH * scale) + 0.5) / scale + CORNER[0]
     share = np.maximum(1 - (across / HINGE_PX) ** 2, 0) * (1 - _ease(np.abs(across), *SIDE_PX))
     columns = np.flatnonzero(share > 0)
+    down = (np.arange(len(pictures[0])) + 0.5) / scale + CORNER[1] if len(pictures) else np.zeros(0)
     for frame in np.flatnonzero(np.abs(drops) >= MIN_PX):
-        by = float(drops[frame]) * share[columns]
-        moved = _move_columns(pictures[frame][:, columns], float(chin_px[frame]), by, scale)
-        result[frame, :, columns] = moved.swapaxes(0, 1)
-    return result
-
-
-def _move_columns(picture: Pictures, chin_px: float, drops: Array, scale: int) -> Pictures:
-    """Return one picture whose columns are moved down by ``drops`` [shape=(W,)] at the chin."""
-    down = (np.arange(len(picture)) + 0.5) / scale + CORNER[1]
-    tip = chin_px + drops  # where the tip is afterwards
-    moved = np.flatnonzero((down > STILL_PX) & (down < tip.max() + BELOW_PX + NECK_PX))
-    above = _ease(down[moved, None], STILL_PX, tip - ABOVE_PX)
-    below = 1 - _ease(down[moved, None], tip + BELOW_PX, tip + BELOW_PX + NECK_PX)
-    position = moved[:, None] - scale * drops * above * below
-    first = np.floor(position).astype(np.intp)
-    part = (position - first).astype(np.float32)
-    levels = np.zeros((*part.shape, picture.shape[2]), np.float32)
-    column, pixels = np.arange(picture.shape[1]), picture.reshape(-1, picture.shape[2])
-    for tap in range(-1, 3):
-        rows = np.clip(first + tap, 0, len(picture) - 1)
-        away = np.abs(part - tap)
-        near = ((A + 2) * away - (A + 3)) * away**2 + 1
-        far = A * (((away - 5) * away + 8) * away - 4)
-        weight = np.where(away <= 1, near, np.where(away < 2, far, 0)).astype(np.float32)
-        levels += weight[:, :, None] * pixels.take(rows * picture.shape[1] + column, axis=0)
-    result = picture.copy()
-    result[moved] = np.clip(np.rint(levels), 0, 255)
+        picture, by = pictures[frame][:, columns], float(drops[frame]) * share[columns]
+        tip = float(chin_px[frame]) + by  # where the tip is afterwards
+        rows = np.flatnonzero((down > STILL_PX) & (down < tip.max() + BELOW_PX + NECK_PX))
+        above = _ease(down[rows, None], STILL_PX, tip - ABOVE_PX)
+        below = 1 - _ease(down[rows, None], tip + BELOW_PX, tip + BELOW_PX + NECK_PX)
+        position = rows[:, None] - scale * by * above * below
+        first = np.floor(position).astype(np.intp)
+        part = (position - first).astype(np.float32)
+        levels = np.zeros((*part.shape, picture.shape[2]), np.float32)
+        column, pixels = np.arange(picture.shape[1]), picture.reshape(-1, picture.shape[2])
+        for tap in range(-1, 3):
+            sources = np.clip(first + tap, 0, len(picture) - 1)
+            away = np.abs(part - tap)
+            near = ((A + 2) * away - (A + 3)) * away**2 + 1
+            far = A * (((away - 5) * away + 8) * away - 4)
+            weight = np.where(away <= 1, near, np.where(away < 2, far, 0)).astype(np.float32)
+            levels += weight[:, :, None] * pixels.take(sources * picture.shape[1] + column, axis=0)
+        result[frame, rows[:, None], columns] = np.clip(np.rint(levels), 0, 255)
     return result
 
 

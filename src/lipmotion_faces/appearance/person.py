@@ -354,8 +354,10 @@ def appearance_from_arrays(arrays: Arrays) -> Appearance:
     with format_errors("the appearance of the person", REMEDY):
         refuse_undeclared(named, APPEARANCE)
         mouth, jaw = (eigenlips_from_arrays(inner[part], REMEDY) for part in ("mouth", "jaw"))
-        _check_size("mouth", mouth, (MOUTH_HEIGHT, MOUTH_WIDTH))
-        _check_size("jaw", jaw, (lower_face.HEIGHT, lower_face.WIDTH))
+        sizes = (mouth, (MOUTH_HEIGHT, MOUTH_WIDTH)), (jaw, (lower_face.HEIGHT, lower_face.WIDTH))
+        for part, (space, size) in zip(("mouth", "jaw"), sizes, strict=True):
+            if space.size != size:
+                raise ValueError(f"pictures of the {part} of {space.size} px, required {size}")
         codes, jaw_codes = len(mouth.channels), len(jaw.channels)
         stored = check_arrays(named, APPEARANCE, C=codes, K=jaw_codes, F=codes + 1, J=jaw_codes + 1)
         scale = int(stored["scale"])
@@ -395,11 +397,6 @@ APPEARANCE = {
     "from_mouth": ArraySpec(np.float32, "F J", -candidates.LARGEST_COEFFICIENT, candidates.LARGEST_COEFFICIENT),
     "from_sound": ArraySpec(np.float32, "2 J", -candidates.LARGEST_COEFFICIENT, candidates.LARGEST_COEFFICIENT),
 }
-
-
-def _check_size(name: str, space: Eigenlips, size: tuple[int, int]) -> None:
-    if space.size != size:
-        raise ValueError(f"pictures of the {name} of {space.size} px, required {size}")
 
 
 def _decode(data: Pictures, count: int, height: int, width: int) -> Pictures:

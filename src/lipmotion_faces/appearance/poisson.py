@@ -202,11 +202,11 @@ class CloningSystem:
         """
         self._check(source, background)
         whole = background.dtype == np.uint8
-        result = background.astype(np.uint8) if whole else _round_levels(background.astype(np.float32))
+        result = background.astype(np.uint8) if whole else round_levels(background.astype(np.float32))
         new, old = (pictures[(slice(None), *self.box)] for pictures in (source, result))
         for frames, membrane in self._solve_membranes(source, background, largest_difference):
             np.add(membrane, new[frames], out=membrane, casting="same_kind")
-            cloned = _round_levels(membrane)
+            cloned = round_levels(membrane)
             flat = cloned.reshape(len(cloned), -1, COLOURS)
             flat[:, self.outside] = old[frames].reshape(flat.shape)[:, self.outside]
             old[frames] = cloned
@@ -299,7 +299,7 @@ def build_cloning_system(mask: Mask) -> CloningSystem:
     return CloningSystem(inner, box, edge, np.flatnonzero(~region), grids, response)
 
 
-def _round_levels(pictures: NDArray[np.float32]) -> NDArray[np.uint8]:
+def round_levels(pictures: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Return pictures as grey levels, rounded and cut to 0 to 255 [same shape]; the pictures are changed."""
     np.rint(pictures, out=pictures)
     return np.clip(pictures, 0, 255, out=pictures).astype(np.uint8)

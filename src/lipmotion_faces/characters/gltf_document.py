@@ -332,10 +332,6 @@ class GltfArrays:
             raise InputError("it counts vertices in fractions; export it again")
         return raw.astype(np.int64)
 
-    def read_view(self, number: int) -> memoryview:
-        """Return the bytes of a buffer view. Raises InputError: it leads out of its buffer."""
-        return self._read_view(number)[0]
-
     def _read_raw(self, number: int, width: int, wanted: int | None) -> NDArray[Any]:
         accessor = self._document.get("accessors")[number]
         count, kind = accessor["count"], accessor["type"]
@@ -362,7 +358,7 @@ class GltfArrays:
         """Return what an accessor, or a part of a sparse one, places in a view; zeros if it names none."""
         if "bufferView" not in place:
             return np.zeros((count, width), dtype)
-        data, stride = self._read_view(place["bufferView"])
+        data, stride = self.read_view(place["bufferView"])
         offset, size = place.get("byteOffset", 0), dtype.itemsize * width
         stride = stride or size
         if stride < size or (count and offset + (count - 1) * stride + size > len(data)):
@@ -373,8 +369,11 @@ class GltfArrays:
             return np.zeros((0, width), dtype)
         return np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
 
-    def _read_view(self, number: int) -> tuple[memoryview, int]:
-        """Return the bytes of a buffer view, and the distance of its elements (0: none apart)."""
+    def read_view(self, number: int) -> tuple[memoryview, int]:
+        """Return the bytes of a buffer view, and the distance of its elements (0: none apart).
+
+        Raises InputError: it leads out of its buffer.
+        """
         view = self._document.get("bufferViews")[number]
         packed = next((view["extensions"][name] for name in COMPRESSION if name in view.get("extensions", {})), None)
         if packed is None:

@@ -104,8 +104,11 @@ class _Materials:
         if place not in self._textures:
             self._textures[place] = None
             try:
-                linked = isinstance(place, str)
-                content = self._document.read_link(place, "picture") if linked else self._arrays.read_view(place)
+                content: bytes | memoryview
+                if isinstance(place, str):
+                    content = self._document.read_link(place, "picture")
+                else:
+                    content, _ = self._arrays.read_view(place)
                 self._document.budget.spend("bytes of pictures", len(content))
                 self._textures[place] = read_texture(content, self._document.budget)
                 if self._textures[place] is None:
@@ -218,7 +221,7 @@ class _SceneSurface:
         self._triangles: list[Rows] = []
         self._uv: list[Array] = []
         self._parts: list[tuple[str, Material]] = []
-        self._names = PartNames()
+        self._names: dict[str, int] = {}
         self._moved: dict[str, list[tuple[Rows, Array]]] = {}
         self._targets: dict[tuple[int, int], str] = {}
         self._bones: list[Bone] = []
@@ -294,8 +297,18 @@ class _SceneSurface:
             self._tinted = True
         block.colours[used] = colours
         self._triangles.append(corners.reshape(-1, 3) + block.first)
-        self._parts.append((self._names.unused(name, material.name), material))
+        self._parts.append((self._name_part(name, material.name), material))
         self._uv.append(mapped)
+
+    def _name_part(self, owner: str, material: str) -> str:
+        """Return the name of the owner, with that of the material where it is taken, and a number where both are."""
+        both = f"{owner} {material}".strip()
+        name = owner if owner not in self._names else both
+        while name in self._names:
+            self._names[both] += 1
+            name = f"{both} {self._names[both]}"
+        self._names[name] = 1
+        return name
 
     def _share_vertices(self, number: int, mesh: dict[str, Any], primitive: dict[str, Any]) -> _SharedVertices:
         """Return the vertices of a primitive at their places in the scene; keep its bones and morph targets."""
@@ -441,20 +454,3 @@ def merge_bones(bones: Iterable[Bone]) -> tuple[Bone, ...]:
         np.maximum.at(shares, inverse.reshape(-1), np.concatenate([bone.shares for bone in same]))
         merged.append(Bone(kind, same[0].place, rows, shares))
     return tuple(merged)
-
-
-class PartNames:
-    """Gives parts names that no other part has."""
-
-    def __init__(self) -> None:
-        self._numbers: dict[str, int] = {}
-
-    def unused(self, owner: str, material: str) -> str:
-        """Return the name of the owner, with that of the material where it is taken, and a number where both are."""
-        both = f"{owner} {material}".strip()
-        name = owner if owner not in self._numbers else both
-        while name in self._numbers:
-            self._numbers[both] += 1
-            name = f"{both} {self._numbers[both]}"
-        self._numbers[name] = 1
-        return name

@@ -111,7 +111,14 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
     count = int(np.floor(end_s * hertz + ROUNDING_FRAMES)) + 1
     document.budget.spend("numbers", count * sum(len(track.names) for track in tracks))
     time_s = np.arange(count) / hertz
-    curves = _sample_weights(tracks, time_s)
+    every = [
+        (known, curve)
+        for track in tracks
+        for name, curve in zip(track.names, track.sample(time_s).T, strict=True)
+        for known in KNOWN_AS.get(name, (name,))
+    ]
+    columns = choose_columns([to_arkit(name) or name for name, _ in every], np.stack([row for _, row in every], 1))
+    curves = dict(every[column] for column in columns)
     channels = [Channel(name, WEIGHT) for name in curves]
     if turns:
         angles = np.unwrap(find_head_angles(_turn_head(document, turns, time_s)), axis=0)
@@ -139,18 +146,6 @@ def _choose_animation(document: GltfDocument, arrays: GltfArrays, path: Path) ->
         listed = ", ".join(named)
         LOG.warning("%s: %d animations move the face: %s; read: %s", path, len(named), listed, named[which])
     return animations[which]
-
-
-def _sample_weights(tracks: list[_Track], time_s: Array) -> dict[str, Array]:
-    """Return the weights at some times by the names of their targets; of one name those that move most."""
-    every = [
-        (known, curve)
-        for track in tracks
-        for name, curve in zip(track.names, track.sample(time_s).T, strict=True)
-        for known in KNOWN_AS.get(name, (name,))
-    ]
-    columns = choose_columns([to_arkit(name) or name for name, _ in every], np.stack([row for _, row in every], 1))
-    return dict(every[column] for column in columns)
 
 
 def _read_turns(document: GltfDocument, arrays: GltfArrays, animation: dict[str, Any]) -> dict[int, _Track]:

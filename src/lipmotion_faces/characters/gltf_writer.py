@@ -11,7 +11,7 @@ from urllib.parse import quote, unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.formats.keys import EVERY_KEY, Thinning, place_keys
+from lipmotion.formats.base import EVERY_KEY, Thinning, place_keys
 from lipmotion.meshes.model.mesh import Blendshape, MeshPart
 from lipmotion.storage.files import as_text
 from lipmotion.types import Motion

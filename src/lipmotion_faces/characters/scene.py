@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.keys import EVERY_KEY, Thinning, place_keys
+from lipmotion.formats.base import EVERY_KEY, Thinning, place_keys
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.types import Motion
 from lipmotion_faces.characters.surface import build_surface, compute_normals, drop_back_sides

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.meshes.model.mesh import Mesh
-from lipmotion_faces.kernels.normals import sum_normals
+from lipmotion_faces.kernels.shading import sum_normals
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

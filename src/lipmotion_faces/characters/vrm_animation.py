@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
-from lipmotion.formats.base import MotionFormat
-from lipmotion.formats.keys import with_jumps
+from lipmotion.formats.base import MotionFormat, with_jumps
 from lipmotion.meshes.model.mesh import ANGLES, turn_head
 from lipmotion.meshes.model.shape_names import VRM_EMOTIONS, VRM_VOWELS
 from lipmotion.types import Generation, Motion

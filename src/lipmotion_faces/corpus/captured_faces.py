@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,21 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
+from lipmotion.formats.c3d import measure_markers, to_head_frame
 from lipmotion.formats.label_files import find_labels
-from lipmotion.formats.markers import measure_markers, to_head_frame
 from lipmotion.storage.archive import take_array
 from lipmotion.storage.sources import AUDIO_SUFFIXES, check_regular
 from lipmotion.types import WEIGHT, Channel, Motion
-from lipmotion_faces.corpus.folder import gather_recordings
-from lipmotion_faces.corpus.source_recordings import LISTS, MotionFile, RecordingFolder, SourceRecording, assign_splits
+from lipmotion_faces.corpus.folder import RESEARCH, gather_recordings
+from lipmotion_faces.corpus.source_recordings import LISTS, MotionFile, RecordingFolder, SourceRecording
 
 KIND = "VOCASET meshes"
 MESHES, SOUNDS = "unposedcleaneddata", "audio"
 RATE_HZ = 60.0
-RIGHTS = {
-    "licence": "research, as agreed with its owners",
-    "attribution": "VOCASET (Cudeiro, Bolkart, Laidlaw, Ranjan, Black 2019)",
-}
+RIGHTS = RESEARCH | {"attribution": "VOCASET (Cudeiro, Bolkart, Laidlaw, Ranjan, Black 2019)"}
 MESH = ".ply"
 FLAME_VERTICES = 5023
 FLAME_MARKERS = {
@@ -181,19 +177,18 @@ def read_facegood(directory: Path) -> RecordingFolder | None:
             lines = [line.strip() for line in file.read(MAX_LICENCE_CHARACTERS).splitlines() if line.strip()]
         owners = [line for line in lines if line.lower().startswith("copyright")]
         rights = dict(zip(("licence", "attribution"), (*lines[:1], *owners[:1]), strict=False))
-    recordings, problems = [], {}
-    for path in arrays:
-        name = path.stem.removeprefix(VALUES_PREFIX)
+
+    def read_recording(name: str, path: Path) -> SourceRecording:
         same_name = sounds.get(name, [])
-        try:
-            if len(same_name) != 1:
-                raise InputError(f"{path}: {len(same_name)} sounds named {name}, required one: {name}.wav")
-            labels = find_labels(same_name[0], ignored=ignored)
-            recording = SourceRecording(name, same_name[0], labels.words, rights=rights, phones=labels.phones)
-            recordings.append(replace(recording, motion_file=MotionFile(path, FACEGOOD_HZ, channels)))
-        except InputError as error:
-            problems[name] = str(error)
-    return assign_splits(RecordingFolder(FACEGOOD, tuple(recordings), problems), directory)
+        if len(same_name) != 1:
+            raise InputError(f"{path}: {len(same_name)} sounds named {name}, required one: {name}.wav")
+        labels, motion_file = find_labels(same_name[0], ignored=ignored), MotionFile(path, FACEGOOD_HZ, channels)
+        return SourceRecording(
+            name, same_name[0], labels.words, rights=rights, phones=labels.phones, motion_file=motion_file
+        )
+
+    by_name = {path.stem.removeprefix(VALUES_PREFIX): [path] for path in arrays}
+    return gather_recordings(FACEGOOD, by_name, read_recording, directory)
 
 
 def read_channels(path: Path) -> tuple[Channel, ...]:

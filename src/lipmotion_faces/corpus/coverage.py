@@ -90,11 +90,18 @@ def measure_coverage(corpus: Corpus, text: str | Path | None = None, *, lexicon:
             f"{corpus.path}: none of {len(utterances)} utterances has labelled phones or words that are known; put "
             "transcripts beside the recordings and prepare them again, or give the unknown words (--lexicon)"
         )
-    kinds = tuple(
-        _cover_kind(kind, _count_sequences(usable.values(), length), _count_sequences(runs, length))
-        for length, kind in enumerate(KINDS, start=1)
-    )
-    return Coverage(kinds, len(usable), left_out, len(utterances), sum(not each for each in utterances))
+    kinds = []
+    for length, kind in enumerate(KINDS, start=1):
+        needed, recorded = _count_sequences(usable.values(), length), _count_sequences(runs, length)
+        total = sum(needed.values())
+        missing = sorted((unit for unit in needed if unit not in recorded), key=lambda unit: (-needed[unit], unit))
+        units = tuple(
+            MissingUnit("-".join(unit), needed[unit], needed[unit] / total, "-".join(other), recorded[other])
+            for unit, other in zip(missing, _find_nearest(missing, recorded), strict=True)
+        )
+        share = 1 - sum(needed[unit] for unit in missing) / total
+        kinds.append(KindCoverage(kind, len(needed), len(needed) - len(missing), share, units))
+    return Coverage(tuple(kinds), len(usable), left_out, len(utterances), sum(not each for each in utterances))
 
 
 def measure_phone_distances() -> NDArray[np.float64]:
@@ -142,18 +149,6 @@ def _count_sequences(runs: Iterable[Sequence[str]], length: int) -> Counter[Phon
         sequence = tuple(run) if length == 1 else (SILENCE, *run, SILENCE)
         counts.update(sequence[first : first + length] for first in range(len(sequence) - length + 1))
     return counts
-
-
-def _cover_kind(kind: str, needed: Counter[Phones], recorded: Counter[Phones]) -> KindCoverage:
-    total = sum(needed.values())
-    missing = sorted((unit for unit in needed if unit not in recorded), key=lambda unit: (-needed[unit], unit))
-    nearest = _find_nearest(missing, recorded)
-    units = tuple(
-        MissingUnit("-".join(unit), needed[unit], needed[unit] / total, "-".join(other), recorded[other])
-        for unit, other in zip(missing, nearest, strict=True)
-    )
-    covered = 1 - sum(needed[unit] for unit in missing) / total
-    return KindCoverage(kind, len(needed), len(needed) - len(missing), covered, units)
 
 
 def _find_nearest(missing: Sequence[Phones], recorded: Counter[Phones]) -> list[Phones]:

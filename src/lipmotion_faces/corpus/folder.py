@@ -19,12 +19,12 @@ from lipmotion.storage.sources import AUDIO_SUFFIXES, VIDEO_SUFFIXES, check_list
 from lipmotion.units import split_words
 from lipmotion_faces.corpus.source_recordings import (
     LISTS,
+    RECORDER,
     MotionFile,
     RecordingFolder,
     SourceRecording,
     assign_splits,
     filter_videos,
-    is_of_recorder,
 )
 
 VIDEOS, SOUNDS, BOTH = "folder of videos", "folder of sounds with motion", "folder of videos, and of sounds with motion"
@@ -45,7 +45,8 @@ def read_folder(directory: Path) -> RecordingFolder:
     by_name: dict[str, list[Path]] = {}
     kinds = set()
     for path in list_files(directory):
-        has_motion = _is_sound(path) and not is_of_recorder(path) and path.is_file() and find_motion_files(path)
+        is_sound = path.suffix.lower() in AUDIO_SUFFIXES and not path.stem.lower().endswith(RECORDER)
+        has_motion = is_sound and path.is_file() and find_motion_files(path)
         if has_motion or filter_videos([path]):
             by_name.setdefault("-".join(path.relative_to(directory).with_suffix("").parts), []).append(path)
             kinds.add(SOUNDS if has_motion else VIDEOS)
@@ -53,7 +54,11 @@ def read_folder(directory: Path) -> RecordingFolder:
 
     def read_recording(name: str, path: Path) -> SourceRecording:
         labels = find_labels(path, ignored=lists)
-        siblings = find_motion_files(path) if _is_sound(path) else find_captures(path)
+        if path.suffix.lower() in AUDIO_SUFFIXES:
+            siblings = find_motion_files(path)
+        else:
+            captures = [path.with_suffix(suffix) for suffix in CAPTURE_SUFFIXES]
+            siblings = [capture for capture in captures if capture.is_file() and is_live_link_file(capture)]
         if len(siblings) > 1:
             files = ", ".join(map(str, siblings))
             raise InputError(f"{path}: {len(siblings)} motion files beside it: {files}; keep one")
@@ -98,16 +103,6 @@ def gather_recordings(
 def find_motion_files(sound: Path) -> list[Path]:
     """Return the motion files with the name of a sound, beside it."""
     return [path for suffix in MOTION_SUFFIXES if (path := sound.with_suffix(suffix)).is_file()]
-
-
-def find_captures(video: Path) -> list[Path]:
-    """Return the tables of Live Link Face with the name of a video, beside it: its motion need not be tracked."""
-    tables = (video.with_suffix(suffix) for suffix in CAPTURE_SUFFIXES)
-    return [path for path in tables if path.is_file() and is_live_link_file(path)]
-
-
-def _is_sound(path: Path) -> bool:
-    return path.suffix.lower() in AUDIO_SUFFIXES
 
 
 CorpusReader = Callable[[Path], RecordingFolder | None]
@@ -175,14 +170,15 @@ def read_grid(directory: Path) -> RecordingFolder | None:
     if 2 * sum(spell_name(path.stem) is not None for path in files) <= len(files):
         return None
     named = re.search(r"(?:^|[^a-z0-9])(s[1-9]\d?)$", directory.resolve().name.lower())  # ``s1``, ``grid-s1``
-    recordings, problems, speaker = [], {}, named[1] if named else ""
+    speaker, by_name = named[1] if named else "", dict[str, list[Path]]()
     for path in files:
-        try:
-            words = _find_words(path, (directory / "align", path.parent))
-            recordings.append(SourceRecording(path.stem, path, words, rights=RIGHTS, speaker=speaker))
-        except InputError as error:
-            problems[path.stem] = str(error)
-    return assign_splits(RecordingFolder(KIND, tuple(recordings), problems), directory)
+        by_name.setdefault(path.stem, []).append(path)
+
+    def read_recording(name: str, path: Path) -> SourceRecording:
+        words = _find_words(path, (directory / "align", path.parent))
+        return SourceRecording(name, path, words, rights=RIGHTS, speaker=speaker)
+
+    return gather_recordings(KIND, by_name, read_recording, directory)
 
 
 def spell_name(name: str) -> tuple[str, ...] | None:
@@ -310,9 +306,7 @@ def _read_tcd_words(_directory: Path, video: Path, _said: Mapping[str, str]) -> 
     return next((read_labels(path).words for path in scripts if path.is_file()), None)
 
 
-def _research(attribution: str) -> dict[str, str]:
-    return {"licence": "research, as agreed with its owners", "attribution": attribution}
-
+RESEARCH = {"licence": "research, as agreed with its owners"}
 
 LAYOUTS = (
     Layout(
@@ -337,7 +331,7 @@ LAYOUTS = (
         "{speaker}-{stem}",
         _read_tcd_words,
         {"camera": "straight"},
-        _research("TCD-TIMIT (Harte, Gillen 2015)"),
+        RESEARCH | {"attribution": "TCD-TIMIT (Harte, Gillen 2015)"},
     ),
     Layout(
         "MEAD",
@@ -346,7 +340,7 @@ LAYOUTS = (
         ),
         "{speaker}-{emotion}-{level}-{stem}",
         only={"view": "front"},
-        rights=_research("MEAD (Wang, Wu, Song, Yang, Wu, Qian, He, Qiao, Loy 2020)"),
+        rights=RESEARCH | {"attribution": "MEAD (Wang, Wu, Song, Yang, Wu, Qian, He, Qiao, Loy 2020)"},
     ),
     Layout(
         LRS,

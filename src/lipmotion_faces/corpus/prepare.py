@@ -222,13 +222,9 @@ def _warn_of_older(corpus: Corpus, collection: str, outcomes: list[_Outcome]) ->
     older = [name for name in others if (_read_source(corpus.folder(name)) or {}).get("collection") == collection]
     if older:
         shown = ", ".join(older[:NAMED_UTTERANCES]) + (", ..." if len(older) > NAMED_UTTERANCES else "")
-        LOG.warning(
-            "%s: %d utterances are from recordings that are no longer there, or cannot be used any longer: %s; to do "
-            "without them, delete their folders and prepare again",
-            corpus.path / UTTERANCES,
-            len(older),
-            shown,
-        )
+        wish = "to do without them, delete their folders and prepare again"
+        what = "utterances are from recordings that are no longer there, or cannot be used any longer"
+        LOG.warning("%s: %d %s: %s; %s", corpus.path / UTTERANCES, len(older), what, shown, wish)
 
 
 def _read_source(folder: Path) -> dict[str, Any] | None:

@@ -83,10 +83,12 @@ def _find_claps(audio: Audio) -> list[SoundMark]:
     decays = (peak - after)[1:]
     good = (rises >= MIN_RISE_DB) & (decays >= MIN_DECAY_DB) & (peak[1:] >= level.max() + MIN_LEVEL_DB)
     strength = np.minimum(rises, decays)
-    return [
-        SoundMark((frame + 1) * CLAP_STEP_S, CLAP, float(strength[frame]))
-        for frame in _select_strongest(np.flatnonzero(good), strength, APART_S / CLAP_STEP_S)
-    ]
+    frames = np.flatnonzero(good)
+    strongest: list[int] = []
+    for frame in frames[np.argsort(-strength[frames], kind="stable")].tolist():
+        if all(abs(frame - other) >= APART_S / CLAP_STEP_S for other in strongest):
+            strongest.append(frame)
+    return [SoundMark((n + 1) * CLAP_STEP_S, CLAP, float(strength[n])) for n in strongest[:MAX_MARKS]]
 
 
 def _find_beeps(audio: Audio) -> list[SoundMark]:
@@ -118,17 +120,6 @@ def _find_beeps(audio: Audio) -> list[SoundMark]:
         time_s, pitch = (first * step + size / 2) / audio.rate_hz, float(np.median(hertz[frames]))
         marks.append(SoundMark(time_s, BEEP, float(level[frames].mean()), pitch))
     return sorted(marks, key=lambda mark: -mark.strength_db)[:MAX_MARKS]
-
-
-def _select_strongest(frames: NDArray[np.intp], strength: Array, apart: float) -> list[int]:
-    """Return the strongest of some frames, none nearer to a stronger one than ``apart`` frames."""
-    kept: list[int] = []
-    for frame in frames[np.argsort(-strength[frames], kind="stable")].tolist():
-        if len(kept) == MAX_MARKS:
-            break
-        if all(abs(frame - other) >= apart for other in kept):
-            kept.append(frame)
-    return kept
 
 
 Array = NDArray[np.float64]
@@ -196,8 +187,14 @@ def measure_offset(first: Audio, second: Audio) -> SoundOffset:
         alone = len(candidates) == 1 or len(pairs) > 1
         if not (certain and best > score) and (alike >= MIN_MARK_CORRELATION or alone):
             kind = pairs[0][0].kind
-            at_mark = _compare_beeps if kind == BEEP else _compare_claps
-            fine_s = float(np.median([at_mark(first, second, *pair) for pair in pairs]))
+            lates_s = []
+            for one, other in pairs:
+                if kind == BEEP:  # its waves are all alike
+                    lates_s.append(_find_beginning(second, other) - _find_beginning(first, one))
+                else:
+                    span_s = one.time_s - MARK_WINDOW_S[0], one.time_s + MARK_WINDOW_S[1]
+                    lates_s.append(_match(first, second, span_s, other.time_s - one.time_s, FINE_MARK_S))
+            fine_s = float(np.median(lates_s))
             if kind == BEEP and alike >= WAVEFORM_CORRELATION:
                 fine_s = _refine(first, second, fine_s, FINE_BEEP_S)
             return SoundOffset(fine_s, kind, alike)
@@ -270,17 +267,6 @@ def _pair_marks(
         else:
             groups.append([pair])
     return [(float(np.median([b.time_s - a.time_s for a, b in group])), group) for group in groups]
-
-
-def _compare_claps(first: Audio, second: Audio, one: SoundMark, other: SoundMark) -> float:
-    """Return the offset of one clap in both recordings, by their waveforms around it."""
-    span_s = (one.time_s - MARK_WINDOW_S[0], one.time_s + MARK_WINDOW_S[1])
-    return _match(first, second, span_s, other.time_s - one.time_s, FINE_MARK_S)
-
-
-def _compare_beeps(first: Audio, second: Audio, one: SoundMark, other: SoundMark) -> float:
-    """Return the offset of one beep in both recordings, by its beginnings; its waves are all alike."""
-    return _find_beginning(second, other) - _find_beginning(first, one)
 
 
 def _find_beginning(audio: Audio, beep: SoundMark) -> float:

@@ -138,7 +138,8 @@ def read_names(path: Path) -> list[str]:
 
 
 RECORDER = ".recorder"
-"""``take.recorder.wav`` is the sound that a recorder of its own made of ``take.mp4``, or of ``take.wav``."""
+"""``take.recorder.wav`` is the sound that a recorder of its own made of ``take.mp4``, or of ``take.wav``: it is no
+recording of its own."""
 OFFSETS = "offsets.csv"
 COLUMNS = ["name", "offset_ms"]
 LARGEST_TABLE_BYTES = 1 << 22
@@ -172,11 +173,6 @@ def add_separate_sounds(
         name: f"in {OFFSETS}, but there is no such recording" for name in table if is_whole and name not in known
     }
     return RecordingFolder(folder.kind, tuple(recordings), problems)
-
-
-def is_of_recorder(path: Path) -> bool:
-    """Return whether a file is the sound of a recorder, which is no recording of its own."""
-    return path.suffix.lower() in AUDIO_SUFFIXES and path.stem.lower().endswith(RECORDER)
 
 
 def read_offsets(path: Path) -> dict[str, float]:

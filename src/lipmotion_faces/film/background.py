@@ -96,8 +96,13 @@ class BackgroundSequence:
         shown = np.floor(np.arange(count) * (self.rate_hz / rate_hz) + 0.5).astype(int)
         order = self.find_order(groups, int(shown[-1]) + 1)
         for first, second, weight in zip(order.first[shown], order.second[shown], order.weight[shown], strict=True):
-            one, other = (self._decode_frame(groups, int(number)) for number in (first, second))
-            yield one if weight == 0 else mix_frames(one, other, float(weight))
+            both = []
+            for number in (int(first), int(second)):
+                frame = groups.decode(number)
+                height, width = (length // 2 * 2 for length in frame.shape[:2])
+                has_face, chin_px = bool(self.usable[number]), float(self.chin_px[number])
+                both.append(Background(frame[:height, :width], self.face_to_frame[number], chin_px, has_face))
+            yield both[0] if weight == 0 else mix_frames(both[0], both[1], float(weight))
 
     def find_order(self, groups: FrameGroups, count: int) -> looping.LoopOrder:
         """Return which frames are shown, at the background's own rate.
@@ -112,12 +117,6 @@ class BackgroundSequence:
             return looping.LoopOrder(shown, shown, np.zeros(count), ())
         descriptors = looping.describe_frames((groups.decode(number) for number in range(total)), self.face_to_frame)
         return looping.find_loop_order(descriptors, count, self.rate_hz, usable=self.usable, cuts=self.cuts)
-
-    def _decode_frame(self, groups: FrameGroups, number: int) -> Background:
-        frame = groups.decode(number)
-        height, width = (length // 2 * 2 for length in frame.shape[:2])
-        place, chin_px = self.face_to_frame[number], float(self.chin_px[number])
-        return Background(frame[:height, :width], place, chin_px, bool(self.usable[number]))
 
 
 def find_best_background(footages: Sequence[Footage]) -> StoredBackground:
@@ -227,17 +226,14 @@ def open_background(path: Path, appearance: Appearance | None = None, *, in_time
     if appearance is not None:
         frame = int(np.flatnonzero(footage.track.seen)[0])
         shown = next(decode_footage(footage, frame, frame + 1))
-        picture = cut(
-            shown, lower_face.map_region(footage.face_to_image[frame], 1), (lower_face.HEIGHT, lower_face.WIDTH)
-        )
+        to_frame = lower_face.map_region(footage.face_to_image[frame], 1)
+        picture = cut(shown, to_frame, (lower_face.HEIGHT, lower_face.WIDTH))
         recorded = appearance.jaw.mean.T.reshape(lower_face.HEIGHT, lower_face.WIDTH, 3)
         likely = lower_face.compare_faces(lower_face.find_signature(picture), lower_face.find_signature(recorded))
         if likely < lower_face.SAME_PERSON_LIKENESS:
-            warning = (
-                "%s: seems to show somebody else than the face (likeness %.2f, of one person at least %.2f); give "
-            )
-            warning += "footage of the same person"
-            LOG.warning(warning, footage.path, likely, lower_face.SAME_PERSON_LIKENESS)
+            wrong = "seems to show somebody else than the face (likeness %.2f, of one person at least %.2f)"
+            required = lower_face.SAME_PERSON_LIKENESS
+            LOG.warning(f"%s: {wrong}; give footage of the same person", footage.path, likely, required)
     groups, maps = partial(open_footage, footage), steady_face(footage)
     return BackgroundSequence(
         groups, footage.rate_hz, maps, find_chin(footage), _mark_usable(footage), footage.cuts, in_time

@@ -93,8 +93,8 @@ def choose_takes(source: Path, recordings: Path | None = None, speaker: str = ""
     used = [takes[index] for index in chosen]
     if max(durations_s) <= longest_s:
         return used
-    spans = [VideoSpan(each.span.start_s, min(each.span.end_s, each.span.start_s + longest_s)) for each in used]
-    return [replace(take, span=span) for take, span in zip(used, spans, strict=True)]
+    firsts = ((take, take.span.start_s + longest_s) for take in used)
+    return [replace(take, span=replace(take.span, end_s=min(take.span.end_s, end_s))) for take, end_s in firsts]
 
 
 def _select_person(items: Sequence[SourceRecording], speaker: str, where: str) -> list[SourceRecording]:
@@ -226,12 +226,8 @@ def build_face(
             f"{GOOD_FOOTAGE_S:.0f} s of varied speech for good pictures; give a longer video, or a folder of several"
         )
     if seconds < GOOD_FOOTAGE_S:
-        LOG.warning(
-            "%s: %.1f s of footage with the face; with %.0f s of varied speech the mouth would be truer",
-            source,
-            seconds,
-            GOOD_FOOTAGE_S,
-        )
+        wish = f"with {GOOD_FOOTAGE_S:.0f} s of varied speech the mouth would be truer"
+        LOG.warning("%s: %.1f s of footage with the face; %s", source, seconds, wish)
     monitor(Progress("learning the face", 0, 1, 0.6))
     appearance = learn_appearance(_gather_pictures(filmed))
     monitor(Progress("choosing the background", 0, 1, 0.9))
@@ -243,7 +239,7 @@ def build_face(
         "footage_s": round(seconds, 1),
         "recordings": len(filmed),
     }
-    for key in ("licence", "attribution"):
+    for key in RIGHTS:
         stated = sorted({dict(take.rights)[key] for take in takes if key in dict(take.rights)})
         about |= {key: stated} if stated else {}
     monitor(Progress("choosing the background", 1, 1, 1.0))

@@ -20,7 +20,7 @@ from lipmotion.pipeline.request import Mark, Outputs
 from lipmotion.speech.sound.pauses import measure_levels_at
 from lipmotion.storage.sources import check_source, has_video
 from lipmotion.types import GREY, Audio, Monitor, Motion, Timeline, Unit, silent_monitor
-from lipmotion.types.progress import with_reports
+from lipmotion.types.progress import REPORT_INTERVAL, with_progress
 from lipmotion_faces.appearance.person import FaceCodes
 from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.film.background import open_background, open_stored_background
@@ -123,11 +123,22 @@ def make_film(  # noqa: PLR0913
     """
     check_film(options, speech)
     eigenlips = model.eigenlips if model is not None else None
-    timed = motion, Timeline(()) if units is None else units
+
+    def make_codes(rate_hz: float) -> FaceCodes:  # what the lower face is like in every frame
+        if not 0 < rate_hz < float("inf"):
+            raise InputError(f"the frame rate is {rate_hz}, required more than 0")
+        count = int(np.floor((len(motion.values) - 1) / motion.rate_hz * rate_hz + 1e-9)) + 1
+        codes = predict_codes(face, motion, units or Timeline(()), count, rate_hz, eigenlips)
+        if options.jaw != "energy":
+            return codes
+        if sound is None:
+            raise InputError("a jaw that follows the energy needs the sound; give the recording")
+        return face.appearance.with_jaw_of_sound(codes, measure_levels_at(sound, np.arange(count) / rate_hz))
+
     stitching = AS_PRINTED if options.refinement == "paper" else STITCHING
     if options.overlay == "inset" and speech is not None:
         frames, rate_hz = read_video_frames(speech)
-        codes = _make_codes(face, timed, sound, rate_hz, eigenlips, options)
+        codes = make_codes(rate_hz)
         mouths = Stitcher(face.appearance, stitching).draw_mouths(codes)
         first = next(frames, None)
         if first is None:
@@ -143,33 +154,11 @@ def make_film(  # noqa: PLR0913
     else:
         background = open_background(Path(options.background), face.appearance)
     rate_hz = background.rate_hz if fps is None or options.overlay is not None else fps
-    codes = _make_codes(face, timed, sound, rate_hz, eigenlips, options)
+    codes = make_codes(rate_hz)
     has_jaw = options.jaw != "none" and options.overlay is None
     stitcher = Stitcher(face.appearance, replace(stitching, jaw=has_jaw))
     frames = stitcher.stitch(codes, background.decode(len(codes), rate_hz))
     return Film(frames, len(codes), rate_hz, background.face_box)
-
-
-def _make_codes(
-    face: FilmedFace,
-    timed: tuple[Motion, Timeline[Unit]],
-    sound: Audio | None,
-    rate_hz: float,
-    eigenlips: Eigenlips | None,
-    options: Outputs,
-) -> FaceCodes:
-    """Return what the lower face is like in every frame of a video."""
-    if not 0 < rate_hz < float("inf"):
-        raise InputError(f"the frame rate is {rate_hz}, required more than 0")
-    motion, units = timed
-    count = int(np.floor((len(motion.values) - 1) / motion.rate_hz * rate_hz + 1e-9)) + 1
-    codes = predict_codes(face, motion, units, count, rate_hz, eigenlips)
-    if options.jaw == "energy":
-        if sound is None:
-            raise InputError("a jaw that follows the energy needs the sound; give the recording")
-        levels = measure_levels_at(sound, np.arange(count) / rate_hz)
-        codes = face.appearance.with_jaw_of_sound(codes, levels)
-    return codes
 
 
 def predict_codes(
@@ -250,11 +239,10 @@ def write_film(
     Raises InputError: the background cannot be read to its end. Raises ExportError: the file cannot be written, or the
     face leaves no corner for a visible mark.
     """
-    frames = with_reports(film.frames, film.count, RENDERING, monitor)
+    frames = with_progress(film.frames, RENDERING, monitor, film.count, REPORT_INTERVAL)
     if mark == "visible":
         frames = mark_frames(frames, film.covered)
-    metadata = mark_metadata() if mark != "none" else None
-    tags, xmp = (metadata.tags, metadata.xmp) if metadata is not None else (None, None)
+    tags, xmp = mark_metadata() if mark != "none" else (None, None)
     write_mp4(path, frames, fps=film.rate_hz, audio=sound, tags=tags, xmp=xmp)
 
 

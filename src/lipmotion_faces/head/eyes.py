@@ -145,12 +145,6 @@ def make_catchlights() -> part.Part:
     return replace(lights, colours=CATCHLIGHT * lights.colours)
 
 
-def list_lash_triangles() -> NDArray[np.int32]:
-    """Return the triangles of the lashes, two rows of ``LASHES`` vertices, seen from both sides [shape=(F, 3)]."""
-    front = part.make_grid(3, LASHES)
-    return np.concatenate([front, front[:, ::-1]])
-
-
 def place_lashes(edge: Real, shut: float) -> Real:
     """Return the left lashes [shape=(3 * LASHES, 3)], a wedge along the lid's edge [shape=(LASHES, 3)]."""
     share = np.linspace(0, 1, LASHES)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from lipmotion_faces.head import eyes, inside, palette
 from lipmotion_faces.head.part import EYE, MIDDLE, Part, find_around, join, make_grid, make_part, make_tube, to_head
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import ACROSS, AT_CORNER, REST, RINGS, VISIBLE_RINGS, Skin, find_closure, move_jaw
-from lipmotion_faces.rendering.lighting import Finish, Lighting, measure_reach, normalise
+from lipmotion_faces.rendering.lighting import Finish, Lighting, Triple, measure_reach, normalise
 
 BUN = np.array([0.0, 1.40, -0.98])
 """Middle of the bun."""
@@ -150,7 +150,7 @@ def make_earring() -> Part:
     return make_part("earring", places, make_grid(12, 20, closed=True)[:, ::-1], palette.EARRING, palette.METAL_FINISH)
 
 
-def _lathe(name: str, table: Sequence[Sequence[float]], count: int, colour: palette.Triple, finish: Finish) -> Part:
+def _lathe(name: str, table: Sequence[Sequence[float]], count: int, colour: Triple, finish: Finish) -> Part:
     """Return a part of rings about the body from rows (height, half width, half depth, middle z, squareness)."""
     at = np.linspace(0, len(table) - 1, count)
     around = 2 * np.pi * np.arange(_SIDES) / _SIDES
@@ -201,7 +201,7 @@ def paint_skin(skin: Skin) -> Real:
     x, y, z = np.abs(skin.rest[:, 0]), skin.rest[:, 1], skin.rest[:, 2]
     colour = np.broadcast_to(np.array(palette.SKIN), skin.rest.shape).copy()
 
-    def tint(strength: float, middle: tuple[float, float], radii: tuple[float, float], wanted: palette.Triple) -> None:
+    def tint(strength: float, middle: tuple[float, float], radii: tuple[float, float], wanted: Triple) -> None:
         spot = np.exp(-(((x - middle[0]) / radii[0]) ** 2) - ((y - middle[1]) / radii[1]) ** 2)
         share = strength * spot[:, None] * (z > -0.85)[:, None]
         colour[:] = (1 - share) * colour + share * np.array(wanted)
@@ -249,14 +249,6 @@ _UPPER_COLUMN, _LOWER_COLUMN = 20, 60
 """Columns of the lips in the middle of the upper and of the lower lip."""
 
 
-@dataclass(frozen=True, eq=False)
-class Drawn:
-    """The vertices of one frame: places, and their light as parts of white [shape=(V, 3), both]."""
-
-    places: Real
-    light: NDArray[np.float32]
-
-
 class Figure:
     """The character.
 
@@ -270,14 +262,15 @@ class Figure:
         self._eye, self._light = eyes.make_eyeball(), eyes.make_catchlights()
         left_brow, left_ear = eyes.make_brow(), make_ear()
         ring, tongue_at_rest = make_earring(), inside.place_tongue(REST)
-        lash = np.zeros((3 * eyes.LASHES, 3))
+        lash, lash_front = np.zeros((3 * eyes.LASHES, 3)), make_grid(3, eyes.LASHES)
+        lash_faces = np.concatenate([lash_front, lash_front[:, ::-1]])  # seen from both sides
         parts = [
             Part("skin", skin.rest, skin.triangles, paint_skin(skin), palette.SKIN_FINISH, skin.normals),
-            make_part("tongue", tongue_at_rest, inside.list_tongue_triangles(), palette.TONGUE, palette.TONGUE_FINISH),
+            make_part("tongue", tongue_at_rest, inside.TONGUE_TRIANGLES, palette.TONGUE, palette.TONGUE_FINISH),
             inside.make_lower_teeth(), inside.make_upper_teeth(),
             self._eye, self._eye.mirror("right eye"), self._light, replace(self._light, name="right catchlights"),
-            make_part("lashes", lash, eyes.list_lash_triangles(), palette.LASH, palette.BROW_FINISH),
-            make_part("right lashes", lash, eyes.list_lash_triangles(), palette.LASH, palette.BROW_FINISH),
+            make_part("lashes", lash, lash_faces, palette.LASH, palette.BROW_FINISH),
+            make_part("right lashes", lash, lash_faces, palette.LASH, palette.BROW_FINISH),
             left_brow, left_brow.mirror("right brow"),
             make_hair(), left_ear, left_ear.mirror("right ear"), ring, ring.mirror("right earring"),
             make_neck(), make_clothing(), make_collar(),
@@ -322,7 +315,7 @@ class Figure:
         places, normals = self._places.copy(), self._normals.copy()
         places[self.rows["skin"]], normals[self.rows["skin"]] = self.skin.pose(pose)
         places[self.rows["tongue"]] = inside.place_tongue(pose)
-        normals[self.rows["tongue"]] = compute_normals(places[self.rows["tongue"]], inside.list_tongue_triangles())
+        normals[self.rows["tongue"]] = compute_normals(places[self.rows["tongue"]], inside.TONGUE_TRIANGLES)
         places[self.rows["teeth"]] = move_jaw(places[self.rows["teeth"]], inside.measure_drop(pose))
         for name in ("brow", "right brow"):
             places[self.rows[name]] += eyes.shift_brow(places[self.rows[name]], pose)
@@ -339,8 +332,11 @@ class Figure:
             normals[self.rows[name + "lashes"]] = [0.0, 0.0, 1.0]
         return places, normals
 
-    def shade(self, pose: CharacterPose, viewer: Real) -> Drawn:
-        """Return places and light of all vertices in a pose, seen from a place [shape=(3,)]."""
+    def shade(self, pose: CharacterPose, viewer: Real) -> tuple[Real, NDArray[np.float32]]:
+        """Return places of all vertices in a pose and their light, as parts of white [shape=(V, 3), both].
+
+        viewer : the place from which they are seen [shape=(3,)]
+        """
         places, normals = self.place(pose)
         colours, arrives = self._shade(pose, places)
         turn, moving, neck = rotate_head(*pose.turn).T, self.head, self.rows["neck"]
@@ -352,7 +348,7 @@ class Figure:
         for turning, unturned in zip((places, normals), still, strict=True):
             turning[neck] = held * unturned + (1 - held) * turning[neck]
         light = self._lighting.shade(places, normals, colours, self._kinds, viewer, reaches=arrives, strands=strands)
-        return Drawn(places, light)
+        return places, light
 
     def weigh_turn(self) -> Real:
         """Return how far each vertex turns with the head about ``PIVOT``: 0 the body, 1 the head [shape=(V,)]."""

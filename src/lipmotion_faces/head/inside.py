@@ -24,6 +24,7 @@ PARTED_TEETH = 0.035
 TIP_ON_LIP, TIP_HEIGHTS = 0.02, (TEETH_EDGE - 0.028, TEETH_EDGE - 0.013)
 """How far above the lower lip the middle of the tongue's tip is between the teeth, and the range of its height."""
 _TONGUE_RINGS, _TONGUE_SIDES = 24, 32
+TONGUE_TRIANGLES = make_grid(_TONGUE_RINGS, _TONGUE_SIDES, closed=True)[:, ::-1]
 
 
 def make_upper_teeth() -> Part:
@@ -78,11 +79,6 @@ def _make_tooth(a: float, b: float, number: int, edge_y: float, height: float, u
 def measure_drop(pose: CharacterPose) -> float:
     """Return how far the lower teeth drop with the jaw, a length; bitten together they touch the upper ones."""
     return pose.jaw + PARTED_TEETH * (1 - pose.bite) * (1 + max(pose.roundness, 1.4 * pose.oval))
-
-
-def list_tongue_triangles() -> NDArray[np.int32]:
-    """Return the triangles of the tongue [shape=(F, 3)]."""
-    return make_grid(_TONGUE_RINGS, _TONGUE_SIDES, closed=True)[:, ::-1]
 
 
 def place_tongue(pose: CharacterPose) -> Real:

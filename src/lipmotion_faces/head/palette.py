@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from lipmotion_faces.rendering.lighting import Finish
 
-Triple = tuple[float, float, float]
-
 SKIN = (0.95, 0.765, 0.675)
 SKIN_LIGHT = (0.975, 0.80, 0.70)
 BLUSH = (0.93, 0.50, 0.45)

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from lipmotion_faces.characters.surface import compute_normals
 from lipmotion_faces.characters.textures import decode_srgb
-from lipmotion_faces.rendering.lighting import Finish
+from lipmotion_faces.rendering.lighting import Finish, Triple
 
 Real = NDArray[np.float64]
 Triangles = NDArray[np.int32]
-Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)

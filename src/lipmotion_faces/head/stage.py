@@ -126,20 +126,16 @@ class Stage:
         self.canvas = Canvas(camera, None if colour is None else fill(camera, colour))
         self._dark = Canvas(camera, fill(camera, (0, 0, 0)))
         still = self.figure.shade(CharacterPose(), camera.place)
-        first = self.figure.first_still_triangle
-        self._still = self.canvas.draw(still.places, still.light, self.figure.triangles[first:])
+        self._still = self.canvas.draw(*still, self.figure.triangles[self.figure.first_still_triangle :])
 
     def draw(self, pose: CharacterPose) -> NDArray[np.uint8]:
         """Return the picture of a pose [shape=(H, W, 3)]; only the box around head and neck is drawn anew."""
         drawn = self.figure.shade(pose, self.canvas.camera.place)
-        return self.canvas.draw(
-            drawn.places, drawn.light, self.figure.triangles, onto=self._still, moving=self.figure.head
-        )
+        return self.canvas.draw(*drawn, self.figure.triangles, onto=self._still, moving=self.figure.head)
 
     def cut_out(self, pose: CharacterPose) -> NDArray[np.uint8]:
         """Return the picture of a pose without background, with straight alpha [shape=(H, W, 4)]."""
-        drawn = self.figure.shade(pose, self.canvas.camera.place)
-        return self._dark.cut_out(drawn.places, drawn.light, self.figure.triangles)
+        return self._dark.cut_out(*self.figure.shade(pose, self.canvas.camera.place), self.figure.triangles)
 
 
 FROM_POSE = {"tongueOut": "tongue_out", "tongueUp": "tongue_up", "mouthPressLeft": "press", "mouthPressRight": "press"}
@@ -180,7 +176,11 @@ class _MouthFit:
         """Return the weights of ``fit_mouth_weights``."""
         names = self._shapes.names
         fixed = {name: np.array([getattr(pose, field) for pose in poses], float) for name, field in FROM_POSE.items()}
-        parts = [self._build_targets(poses[first : first + AT_ONCE]) for first in range(0, len(poses), AT_ONCE)]
+        parts = []
+        for first in range(0, len(poses), AT_ONCE):
+            both = self._skin.place_both(stack_poses(poses[first : first + AT_ONCE]), self._around)
+            lips, around = (places - rest for places, rest in zip(both, self._rest, strict=True))
+            parts.append((_stack_rows(lips, around) @ self._spanned, measure_lip_gap(lips)))
         targets, gap = (np.concatenate(column) for column in zip(*parts, strict=True))
         for name, curve in fixed.items():
             targets -= np.outer(curve, self._fixed[name])
@@ -191,14 +191,6 @@ class _MouthFit:
         others = [name for name in names if not name.startswith(PARTING)]
         weights = with_gap(with_gap(weights, self._shapes, gap, others), self._shapes, gap)
         return dict(zip(names, weights.T, strict=True)) | fixed
-
-    def _build_targets(self, poses: Sequence[CharacterPose]) -> tuple[Real, Real]:
-        """Return poses as what the shapes span [shape=(T, S)], and by how much they part the lips [shape=(T,)]."""
-        lips, around = (
-            places - rest
-            for places, rest in zip(self._skin.place_both(stack_poses(poses), self._around), self._rest, strict=True)
-        )
-        return _stack_rows(lips, around) @ self._spanned, measure_lip_gap(lips)
 
 
 _cached_fit = lru_cache(maxsize=2)(_MouthFit)

@@ -16,7 +16,7 @@ from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.liveliness import CALM
 from lipmotion.articulation.mouth import find_mouth, frame_times, measure_mouth_at_rest
 from lipmotion.articulation.rest import add_rest
-from lipmotion.formats.keys import Thinning
+from lipmotion.formats.base import Thinning
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves, eye_and_brow_weights

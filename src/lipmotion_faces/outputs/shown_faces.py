@@ -19,7 +19,7 @@ from lipmotion.pipeline.outputs.output import OutputSettings, Performance, Shown
 from lipmotion.storage.sources import check_kind, is_file
 from lipmotion.types import Channel, Generation, Motion, Prosody, Timeline
 from lipmotion.types.delivery import MOODS
-from lipmotion.types.progress import with_reports
+from lipmotion.types.progress import REPORT_INTERVAL, with_progress
 from lipmotion.units.phones import OPTIONAL
 from lipmotion_faces.base import SMALLEST_PX, Face, Staging
 from lipmotion_faces.characters.scene import Scene
@@ -74,7 +74,7 @@ class ShownDrawing(_WithHead):
         fps = _find_rate(settings)
         count = drawn_video.count_frames(seen, fps)
         drawn = drawn_video.report_cost(path, staged.render(seen.motion, seen.units, fps=fps), count)
-        shown = with_reports(drawn, count, filmed_video.RENDERING, performance.monitor)
+        shown = with_progress(drawn, filmed_video.RENDERING, performance.monitor, count, REPORT_INTERVAL)
         drawn_video.write_frames(path, shown, fps, played)
 
     def load(self) -> None:  # noqa: D102
@@ -104,6 +104,7 @@ class ShownCutOut(_WithHead):
 
     def __init__(self, face: CutOut) -> None:
         self.face = face
+        self._optional = "".join(name for name in OPTIONAL if name in face.shapes)
 
     def check(self, settings: OutputSettings) -> None:  # noqa: D102
         filmed_video.refuse_film(settings.outputs)
@@ -126,12 +127,8 @@ class ShownCutOut(_WithHead):
         frames = self.face.draw([*shown, *[shown[-1]] * (count - len(shown))], settings.staging)
         sound = performance.cached(drawn_video.load_track)
         drawn_video.write_frames(
-            path, with_reports(frames, count, filmed_video.RENDERING, performance.monitor), fps, sound
+            path, with_progress(frames, filmed_video.RENDERING, performance.monitor, count, REPORT_INTERVAL), fps, sound
         )
-
-    @property
-    def _optional(self) -> str:
-        return "".join(name for name in OPTIONAL if name in self.face.shapes)
 
 
 class ShownPerson(_WithHead):

@@ -55,9 +55,9 @@ def stroke(line: Points, widths: Sequence[float]) -> Points:
     return np.vstack([line + half * normal, (line - half * normal)[::-1]])
 
 
-def make_ellipse(x: float, y: float, radius_x: float, radius_y: float) -> Points:
-    """Return an ellipse about (x, y)."""
-    angle = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+def make_ellipse(x: float, y: float, radius_x: float, radius_y: float, count: int = 64) -> Points:
+    """Return so many points of an ellipse about (x, y) [shape=(count, 2)]."""
+    angle = np.linspace(0, 2 * np.pi, count, endpoint=False)
     return np.stack([x + radius_x * np.cos(angle), y + radius_y * np.sin(angle)], axis=1)
 
 

@@ -164,8 +164,14 @@ def outline_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: Lip
     met = upper_edge + 0.004 + 0.05 * pose.jaw + 0.6 * max(pose.gap - 0.14, 0)
     met += max(0.86 - pose.teeth, 0) * (0.1 + 3 * max(pose.gap - 0.07, 0))
     lower = below_lip + reveal * (min(met, below_lip) - below_lip) + (0.2 - 0.55 * reveal) * x * x
-    top, bottom = _outline_tongue(pose, x, edge, low_lip)
-    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.009 * _bend(x / min(0.09, 0.9 * outlines.inner_half_width), 0.5)
+    # the visible tongue: low, its tip behind the upper teeth, or between the teeth
+    up, out = min(pose.tongue / 0.6, 1), max(pose.tongue - 0.6, 0) / 0.4
+    rest = max(low_lip - (0.3 * pose.gap + 0.012) * (1 - pose.protrusion) + 0.02 * pose.protrusion, edge - 0.01)
+    across = (x / (0.2 - 0.085 * up - 0.015 * out)) ** 2
+    bulge = (1 - up) * 0.05 * (across + across**2) + up * 0.05 * across**2 * (0.5 + 0.5 * across)
+    top = rest + up * (min(edge - 0.01, rest) - rest) + 0.004 * out + bulge
+    bottom = low_lip + 0.03 - 0.03 * across
+    over = out * 0.009 * _bend(x / min(0.09, 0.9 * outlines.inner_half_width), 0.5)
     cut = outlines.upper_inner, outlines.lower_inner
     return MouthInterior(
         np.clip(upper, cut[0], cut[1]),
@@ -200,17 +206,6 @@ def _thicken(lip: str, u: Heights, out: float) -> Heights:
 def _bend(u: Heights, power: float) -> Heights:
     """Return an arch over -1 <= u <= 1: 1 in the middle, 0 at the ends and beyond."""
     return np.maximum(1 - u * u, 0) ** power
-
-
-def _outline_tongue(pose: MouthPose, x: Heights, edge: float, low_lip: float) -> tuple[Heights, Heights]:
-    """Return top and bottom of the visible tongue: low, its tip behind the upper teeth, or between the teeth."""
-    up, out = min(pose.tongue / 0.6, 1), max(pose.tongue - 0.6, 0) / 0.4
-    rest = max(low_lip - (0.3 * pose.gap + 0.012) * (1 - pose.protrusion) + 0.02 * pose.protrusion, edge - 0.01)
-    top = rest + up * (min(edge - 0.01, rest) - rest) + 0.004 * out
-    half_width = 0.2 - 0.085 * up - 0.015 * out
-    across = (x / half_width) ** 2
-    bulge = (1 - up) * 0.05 * (across + across**2) + up * 0.05 * across**2 * (0.5 + 0.5 * across)
-    return top + bulge, low_lip + 0.03 - 0.03 * across
 
 
 Floats = NDArray[np.float64]
@@ -282,12 +277,6 @@ class BrowPose(NamedTuple):
     inner: int = 0
     outer: int = 0
     lowered: int = 0
-
-
-def pose_brows(raised: float, mood: UpperFace, scale: float) -> BrowPose:
-    """Return the nearest pose of brows that are raised by a length in eye distances; ``scale``: pixels in one."""
-    of_mood = (round(share * MOOD_STEPS) for share in (mood.inner, mood.outer, mood.lowered))
-    return BrowPose(round(raised * BROW_STEPS * scale), *of_mood)
 
 
 class BrowField:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
-from typing import NamedTuple, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +22,13 @@ from lipmotion_faces.portrait.svg_document import Drawing, Shape, read_drawing
 
 Pixels = NDArray[np.float32]
 """Premultiplied colour 0..255 and cover 0..1 [shape=(H, W, 4)]."""
-Placed = tuple[Shape, tuple[float, float]]
-"""A shape, and how far it is moved to the right and down, in pixels."""
 Lines = Sequence[tuple[NDArray[np.float64], bool]]
 """Points in pixels [shape=(N, 2)], and whether each line returns to its beginning."""
 SUPERSAMPLING = 3
+
+
+Placed = tuple[Shape, tuple[float, float]]
+"""A shape, and how far it is moved to the right and down, in pixels."""
 
 
 def paint_shapes(shapes: Sequence[Placed], to_pixels: NDArray[np.float64], width: int, height: int) -> Pixels:
@@ -35,8 +37,8 @@ def paint_shapes(shapes: Sequence[Placed], to_pixels: NDArray[np.float64], width
     scale = float(np.sqrt(abs(np.linalg.det(to_pixels[:, :2]))))
     for shape, moved in shapes:
         lines = [
-            (np.clip(line.points @ to_pixels[:, :2].T + to_pixels[:, 2] + moved, -1e5, 1e5), line.closed)
-            for line in shape.lines
+            (np.clip(points @ to_pixels[:, :2].T + to_pixels[:, 2] + moved, -1e5, 1e5), closed)
+            for points, closed in shape.lines
         ]
         if shape.fill is not None and shape.opacities[0] > 0:
             _lay(layer, lines, partial(_cover_inside, even_odd=shape.even_odd), shape.fill, shape.opacities[0])
@@ -122,37 +124,26 @@ EYE_DISTANCE = 0.285
 """Height of the picture that stands for an eye distance, in which heads and eyes are moved."""
 
 
-class _Key(NamedTuple):
-    """What a mouth layer stands for: gap, width, articulatory channels and ovalness of its poses."""
-
-    gap: float
-    width: float = 1.0
-    tongue: float = 0.0
-    tuck: float = 0.0
-    protrusion: float = 0.0
-    teeth: float = 0.5
-    oval: float = 0.0
-
-
 MOOD_RISE, MOOD_FALL = 0.1, 0.08
 """How far a mood raises and lowers the brows, which are one layer."""
 MOUTHS = {
-    "rest": _Key(0.0, teeth=0.0),
-    "mbp": _Key(0.0),
-    "fv": _Key(0.05, tuck=1.0),
-    "th": _Key(0.1, tongue=1.0),
-    "l": _Key(0.14, 0.98, tongue=0.6),
-    "s": _Key(0.11, 1.02, tongue=0.2, teeth=0.88),
-    "sh": _Key(0.11, 0.94, tongue=0.25, protrusion=0.5, teeth=0.9),
-    "ee": _Key(0.12, 1.08, teeth=0.72),
-    "eh": _Key(0.2, 1.05, teeth=0.57, oval=0.2),
-    "aa": _Key(0.2, 0.97, teeth=0.45, oval=0.85),
-    "r": _Key(0.1, 0.91, tongue=0.2, protrusion=0.5, teeth=0.4),
-    "oh": _Key(0.16, 0.89, protrusion=0.75, teeth=0.15),
-    "oo": _Key(0.07, 0.86, protrusion=1.0, teeth=0.0),
+    "rest": MouthPose(0.0, teeth=0.0),
+    "mbp": MouthPose(0.0),
+    "fv": MouthPose(0.05, tuck=1.0),
+    "th": MouthPose(0.1, tongue=1.0),
+    "l": MouthPose(0.14, 0.98, tongue=0.6),
+    "s": MouthPose(0.11, 1.02, tongue=0.2, teeth=0.88),
+    "sh": MouthPose(0.11, 0.94, tongue=0.25, protrusion=0.5, teeth=0.9),
+    "ee": MouthPose(0.12, 1.08, teeth=0.72),
+    "eh": MouthPose(0.2, 1.05, teeth=0.57, oval=0.2),
+    "aa": MouthPose(0.2, 0.97, teeth=0.45, oval=0.85),
+    "r": MouthPose(0.1, 0.91, tongue=0.2, protrusion=0.5, teeth=0.4),
+    "oh": MouthPose(0.16, 0.89, protrusion=0.75, teeth=0.15),
+    "oo": MouthPose(0.07, 0.86, protrusion=1.0, teeth=0.0),
 }
 """The mouths that a drawing may have, as layers ``mouth-NAME``; ``rest`` is required, what is missing is replaced."""
-_WEIGHTS = np.array([5.0, 1.5, 1.0, 0.9, 1.0, 1.8, 1.0])
+_WEIGHTS = {"gap": 5.0, "width": 1.5, "tongue": 1.0, "tuck": 0.9, "protrusion": 1.0, "teeth": 1.8, "oval": 1.0}
+"""How much each number of a pose counts in the choice of its mouth."""
 
 
 @final
@@ -202,9 +193,11 @@ def choose_mouths(poses: Sequence[MouthPose], mouths: Sequence[str], fps: float)
     The cheapest sequence is found by dynamic programming; a closed mouth is shown whenever the lips are closed, if it
     is closed for a frame alone.
     """
-    keys = np.array([MOUTHS[name] for name in mouths])
-    values = np.array([[p.gap, p.width, p.tongue, p.tuck, p.protrusion, p.teeth, p.oval] for p in poses])
-    distance = np.square((values[:, None] - keys) * _WEIGHTS).sum(axis=2)
+    keys, values = (
+        np.array([[getattr(pose, name) for name in _WEIGHTS] for pose in some])
+        for some in ([MOUTHS[name] for name in mouths], poses)
+    )
+    distance = np.square((values[:, None] - keys) * [*_WEIGHTS.values()]).sum(axis=2)
     shut = np.array([name in ("rest", "mbp") for name in mouths])
     distance[np.ix_((values[:, 0] < 1e-6) & (values[:, 3] < 0.3), ~shut)] += 100.0  # closed lips show a closed mouth
     change = CHANGE_COST * fps / 2

@@ -167,25 +167,13 @@ def _place_lid_edges(design: Design, lids: LidPose) -> tuple[Knots, Knots]:
     return tuple((x, y + shut * (low - y)) for (x, y), (_, low) in zip(upper, lower, strict=True)), lower
 
 
-class PaintedLayers(NamedTuple):
-    """What is painted once: premultiplied colour 0..255, and cover 0..1 [shape=(h, w, 4)].
+def paint_still_layers(whole: Window, design: Design, background: Colour | str | None) -> tuple[Pixels, ...]:
+    """Return the layers of a character without eyes and mouth: premultiplied colour 0..255, and cover 0..1.
 
-    skin  : of the head, with the strength of its shadow on what is behind it as one more channel [shape=(h, w, 5)]
-    below : what is behind it
-    shade : is added to that where the shadow falls
-    front : what is in front of it
-    still : all of them over one another, at rest
+    In this order: the skin of the head, with the strength of its shadow on what is behind it as one more channel
+    [shape=(h, w, 5)]; what is behind it; what is added to that where the shadow falls; what is in front of the skin;
+    and all of them over one another, at rest [each shape=(h, w, 4)].
     """
-
-    skin: Pixels
-    below: Pixels
-    shade: Pixels
-    front: Pixels
-    still: Pixels
-
-
-def paint_still_layers(whole: Window, design: Design, background: Colour | str | None) -> PaintedLayers:
-    """Return the layers of a character without eyes and mouth."""
     colours, flat, wall = design.palette, design.flat, Layer(whole)
     if background == SCENE:
         lit = () if flat else (Glow(-0.5, -0.5, 1.5, 1.6, colours.wall_light, 0.9),)
@@ -203,7 +191,7 @@ def paint_still_layers(whole: Window, design: Design, background: Colour | str |
     cover = shadow.pixels[..., 3]
     skin, front = paint_head(whole, design).pixels, paint_hair(whole, design).pixels
     still = lay_over(front, lay_over(skin, below + cover[..., None] * shade))
-    return PaintedLayers(np.dstack([skin, cover]), below, shade, front, still)
+    return np.dstack([skin, cover]), below, shade, front, still
 
 
 def paint_behind_head(window: Window, design: Design) -> Layer:
@@ -418,7 +406,10 @@ class Rasteriser:
         skin = self._move_skin(self._jaw, self._skin_field.shift(pose.mouth, pose.mood))
         self._mouth_painter.paint(skin[self._mouth.find_area(self._jaw)][..., :4], pose.mouth)
         self._lay(skin, self._jaw, canvas[self._jaw.area])
-        canvas[self._brow.area] = self._brows(geometry.pose_brows(pose.brows, pose.mood, self._brow.view.scale))
+        mood, steps = pose.mood, geometry.MOOD_STEPS
+        raised = round(pose.brows * geometry.BROW_STEPS * self._brow.view.scale)
+        of_mood = (round(share * steps) for share in (mood.inner, mood.outer, mood.lowered))
+        canvas[self._brow.area] = self._brows(geometry.BrowPose(raised, *of_mood))
         canvas[self._below_brows.area] = self._still[self._below_brows.area]
         eyes = self._eye_painter.paint(pose.lids, pose.gaze_x, pose.gaze_y, pose.mood)
         mixed = eyes * np.array([1, 1, 1, 255], np.float32)

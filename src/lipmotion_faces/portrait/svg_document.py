@@ -17,10 +17,10 @@ from typing import NamedTuple, NoReturn
 from xml.parsers import expat
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.storage.sources import check_regular
+from lipmotion_faces.portrait.design import Colour, Points, make_ellipse
 
 STEPS = 12
 """Points for each Bézier curve, and for a quarter of an ellipse."""
@@ -38,9 +38,13 @@ _COUNTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 
 _POINTS = {"C": STEPS, "S": STEPS, "Q": STEPS, "T": STEPS, "A": 4 * STEPS}
 
 
-def flatten_path(text: str, most: int = MAX_POINTS) -> list[tuple[Points, bool]]:
+Line = tuple[Points, bool]
+"""A flattened subpath: points [shape=(N, 2)], and whether it returns to its beginning."""
+
+
+def flatten_path(text: str, most: int = MAX_POINTS) -> list[Line]:
     """Return subpaths [shape=(N, 2)], and whether each is closed. Raises InputError: no path, over ``most`` points."""
-    lines: list[tuple[Points, bool]] = []
+    lines: list[Line] = []
     current: list[Points] = []
     at = start = control = np.zeros(2)
     before = ""
@@ -190,12 +194,6 @@ def read_points(text: str, most: int = MAX_POINTS) -> Points:
     return np.array(numbers).reshape(-1, 2)
 
 
-def make_circle(x: float, y: float, radius_x: float, radius_y: float) -> Points:
-    """Return an ellipse [shape=(N, 2)]."""
-    angle = np.linspace(0, 2 * np.pi, 4 * STEPS, endpoint=False)
-    return np.stack([x + radius_x * np.cos(angle), y + radius_y * np.sin(angle)], axis=1)
-
-
 def make_rectangle(x: float, y: float, width: float, height: float, radius: float) -> Points:
     """Return a rectangle with round corners [shape=(N, 2)]."""
     radius = min(max(radius, 0), width / 2, height / 2)
@@ -245,7 +243,6 @@ def check_matrix(matrix: Points) -> Points:
     return matrix
 
 
-Points = NDArray[np.float64]
 LARGEST_SIDE_RATIO = 4.0
 LARGEST_FILE_BYTES, MAX_ELEMENTS, DEEPEST_NESTING = 8 << 20, 20_000, 60
 """Most bytes of a drawing, elements in it, and elements in one another."""
@@ -257,14 +254,6 @@ _SHAPES = {"path", "rect", "circle", "ellipse", "polygon", "polyline", "line"}
 _PASSED_OVER = {"title", "desc", "metadata", "namedview", "defs", "guide", "grid", "page", "RDF"}
 _INHERITED = ("fill", "fill-opacity", "fill-rule", "stroke", "stroke-width", "stroke-opacity")
 _UNIT = re.compile(r"(.*?)(?:px|pt|mm|cm|in)", re.DOTALL)
-Colour = tuple[int, int, int]
-
-
-class Line(NamedTuple):
-    """A flattened subpath: points [shape=(N, 2)], and whether it returns to its beginning."""
-
-    points: Points
-    closed: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -404,8 +393,8 @@ class _DrawingReader:
         check_points(MAX_POINTS - self.points)
         style, matrix = group.style, group.matrix
         opacities = [_read_number(style.get(f"{kind}-opacity", "1"), "opacity") for kind in ("fill", "stroke")]
-        placed = tuple(Line(points @ matrix[:2, :2].T + matrix[:2, 2], closed) for points, closed in lines)
-        if not all(np.abs(line.points).max(initial=0) <= 1e3 * LARGEST_NUMBER for line in placed):
+        placed = tuple((points @ matrix[:2, :2].T + matrix[:2, 2], closed) for points, closed in lines)
+        if not all(np.abs(points).max(initial=0) <= 1e3 * LARGEST_NUMBER for points, _ in placed):
             raise InputError(f"a shape is {1e3 * LARGEST_NUMBER:g} units away; check the transforms")
         fill = _read_colour(style.get("fill", "black"), "fill")
         scale = float(np.sqrt(abs(np.linalg.det(matrix[:2, :2]))))
@@ -502,7 +491,7 @@ def _measure_cover(shape: Shape, box: tuple[float, float, float, float]) -> floa
     return covered
 
 
-def _read_lines(attributes: Mapping[str, str], tag: str, most: int) -> list[tuple[Points, bool]]:
+def _read_lines(attributes: Mapping[str, str], tag: str, most: int) -> list[Line]:
     def read(name: str, default: str = "0") -> float:
         return _read_number(attributes.get(name, default), name)
 
@@ -516,7 +505,7 @@ def _read_lines(attributes: Mapping[str, str], tag: str, most: int) -> list[tupl
         radius = read("rx", attributes.get("ry", "0"))
         return [(make_rectangle(read("x"), read("y"), read("width"), read("height"), radius), True)]
     radii = (read("r"),) * 2 if tag == "circle" else (read("rx"), read("ry"))
-    return [(make_circle(read("cx"), read("cy"), *radii), True)]
+    return [(make_ellipse(read("cx"), read("cy"), *radii, 4 * STEPS), True)]
 
 
 def _read_colour(text: str, name: str) -> Colour | None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.model.mesh import BLEND, MASK, Material, Mesh, Texture
+from lipmotion.meshes.model.mesh import BLEND, MASK, Mesh, Texture
 from lipmotion_faces.characters.textures import TextureTable, decode_srgb, reduce_textures
 from lipmotion_faces.kernels.raster import draw
 from lipmotion_faces.kernels.textured import (
@@ -24,6 +24,7 @@ from lipmotion_faces.rendering.lighting import LEVELS, WHITE, Finish, Lighting, 
 
 Real = NDArray[np.float64]
 Colours = NDArray[np.float32]
+Picture = NDArray[np.uint8]
 LARGEST_GREY = 255
 
 
@@ -111,19 +112,11 @@ class Canvas:
     def cut_out(self, places: Real, colours: Colours, triangles: NDArray[np.int32]) -> NDArray[np.uint8]:
         """Return triangles without background: red, green, blue and straight alpha [shape=(H, W, 4)]."""
         picture = self.draw(places, colours, triangles)
-        alpha = self._cover(places, np.ones(len(places), bool), triangles)
+        alpha = self.cover(places, np.ones(len(places), bool), triangles)
         return add_alpha(picture, alpha, self._tone)
 
-    def mark_shown(self, places: Real, marked: NDArray[np.bool_], triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
-        """Return the pixels of which at least half shows marked vertices [shape=(H, W)].
-
-        places : of the vertices in space [shape=(V, 3)];  marked : which of them [shape=(V,)]
-        triangles : those that are not marked hide what is behind them [shape=(F, 3)]
-        """
-        return self._cover(places, marked, triangles) > LARGEST_GREY // 2
-
-    def _cover(self, places: Real, marked: NDArray[np.bool_], triangles: NDArray[np.int32]) -> NDArray[np.uint8]:
-        """Return which part of every pixel shows marked vertices, 0 to 255 [shape=(H, W)]."""
+    def cover(self, places: Real, marked: NDArray[np.bool_], triangles: NDArray[np.int32]) -> NDArray[np.uint8]:
+        """Return which part of every pixel shows marked vertices, 0 to 255 [shape=(H, W)]; others hide them."""
         size = self.camera.height, self.camera.width, 3
         light = np.repeat(marked[:, None], 3, axis=1).astype(np.float32)
         picture, area = np.zeros(size, np.uint8), (0, 0, size[1], size[0])
@@ -157,9 +150,6 @@ def fill_gradient(
     near = np.exp(-(columns[None] ** 2) - rows[:, None] ** 2)[..., None]
     light = near * decode_srgb(middle) + (1 - near) * decode_srgb(edge)
     return np.asarray(light / WHITE, dtype=np.float32)
-
-
-Picture = NDArray[np.uint8]
 
 
 class TexturedCanvas:
@@ -207,7 +197,6 @@ class TexturedCanvas:
         return opacity
 
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 MIN_OPACITY = 0.5
@@ -231,10 +220,10 @@ class DrawnSurface:
     """
 
     rows: Rows
-    sides: Array
+    sides: Real
     kinds: Rows
     lighting: Lighting
-    colours: Array
+    colours: Real
     triangles: TexturedTriangles
 
 
@@ -265,12 +254,18 @@ def prepare_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float
     unique, inverse = np.unique(keys, return_inverse=True)
     kinds, rows = unique // 2 % len(materials), unique // 2 // len(materials)
     finishes = [Finish(SCATTER, gloss=0.5 * m.gloss, focus=4 + round(2 * m.gloss)) for m in materials]
+    colours = np.array([decode_srgb(m.colour) for m in materials])[kinds]
+    if mesh.tints is not None:
+        colours = colours * mesh.tints[rows, :3]
+    if mesh.colours is not None:  # those of textures have the colour of the material alone
+        textured = np.array([m.texture is not None for m in materials])[kinds]
+        colours = np.where(textured[:, None], colours, decode_srgb(mesh.colours[rows]))
     return DrawnSurface(
         rows,
         np.where(unique % 2 == 1, -1.0, 1.0),
         kinds,
         Lighting(finishes),
-        _list_colours(mesh, materials, rows, kinds),
+        colours,
         looks._replace(triangles=inverse.reshape(corners.shape).astype(np.int32)),
     )
 
@@ -279,7 +274,7 @@ def _texture(
     mesh: Mesh,
     numbers: Rows,
     parts: Rows,
-    uv: Array,
+    uv: Real,
     table: TextureTable,
     textures: dict[Texture, int],
     pixels_per_unit: float,
@@ -320,14 +315,3 @@ def _texture(
             looks[mine, 1] = np.where(kinds == EMPTY, EMPTY, lowered)
             alphas[mine] = np.stack([np.full(len(cover), material.cutoff), cover], axis=1)
     return TexturedTriangles(np.zeros((0, 3), np.int32), downwards, looks, alphas, table.texels, table.levels)
-
-
-def _list_colours(mesh: Mesh, materials: list[Material], rows: Rows, kinds: Rows) -> Array:
-    """Return the reflection of drawn vertices; those of textures have the colour of the material alone."""
-    of_material = np.array([decode_srgb(material.colour) for material in materials])[kinds]
-    textured = np.array([material.texture is not None for material in materials])[kinds]
-    if mesh.tints is not None:
-        of_material = of_material * mesh.tints[rows, :3]
-    if mesh.colours is None:
-        return of_material
-    return np.where(textured[:, None], of_material, decode_srgb(mesh.colours[rows]))

@@ -20,17 +20,9 @@ WHITE = 1.5
 """The light that becomes white; the rasteriser takes light as parts of it."""
 
 
-@dataclass(frozen=True)
-class Lamp:
-    """A far light: the direction towards it, and its light, red, green and blue."""
-
-    towards: Triple
-    light: Triple
-
-
-KEY = Lamp((-0.5, 0.55, 0.8), (1.06, 0.97, 0.87))
-FILL = Lamp((0.85, 0.15, 0.6), (0.16, 0.19, 0.25))
-RIMS = (Lamp((-0.8, 0.45, -0.55), (0.55, 0.5, 0.45)), Lamp((0.85, 0.4, -0.5), (0.62, 0.7, 0.85)))
+KEY, FILL = ((-0.5, 0.55, 0.8), (1.06, 0.97, 0.87)), ((0.85, 0.15, 0.6), (0.16, 0.19, 0.25))
+RIMS = ((-0.8, 0.45, -0.55), (0.55, 0.5, 0.45)), ((0.85, 0.4, -0.5), (0.62, 0.7, 0.85))
+"""Far lights: the direction towards each, and its light, red, green and blue."""
 SKY: Triple = (0.40, 0.42, 0.46)
 GROUND: Triple = (0.27, 0.21, 0.19)
 
@@ -60,9 +52,9 @@ class Lighting:
         rows = [[*f.wrap, f.gloss, f.focus, f.edge, f.strands] for f in finishes]
         self._finishes = np.array(rows, dtype=float)
         lamps = np.zeros((6, 6))
-        for row, lamp in zip(lamps, (KEY, FILL, *RIMS), strict=False):
-            row[:3] = normalise(np.array(lamp.towards))
-            row[3:] = np.array(lamp.light) / WHITE
+        for row, (towards, light) in zip(lamps, (KEY, FILL, *RIMS), strict=False):
+            row[:3] = normalise(np.array(towards))
+            row[3:] = np.array(light) / WHITE
         lamps[4:, :3] = np.array([SKY, GROUND]) / WHITE
         self._lamps = lamps
 
@@ -111,8 +103,8 @@ BIAS_DISTANCE, FADE_DISTANCE = 0.05, 0.10
 """A vertex this far behind another one begins to be hidden, and is hidden this much further behind."""
 
 
-DIRECTIONS, LAMPS = 72, 20
-"""Directions of the sky from which light comes, and places on the key light, which is large and soft."""
+DIRECTIONS, LAMPS, SMOOTHINGS = 72, 20, 4
+"""Directions of the sky from which light comes, places on the key light, which is large and soft, and means taken."""
 
 
 def measure_reach(places: Real, normals: Real, triangles: NDArray[np.int32], hiding: NDArray[np.bool_]) -> Real:
@@ -132,7 +124,7 @@ def measure_reach(places: Real, normals: Real, triangles: NDArray[np.int32], hid
         total += weight
         seen += weight * _find_visible(places, hiding, way)
     sky = seen / np.maximum(total, 1e-9)
-    key = normalise(np.array(KEY.towards))
+    key = normalise(np.array(KEY[0]))
     around = np.cross(key, [0.0, 1.0, 0.0])
     above = np.cross(around, key)
     direct = np.zeros(len(places))
@@ -141,13 +133,9 @@ def measure_reach(places: Real, normals: Real, triangles: NDArray[np.int32], hid
         direct += _find_visible(
             places, hiding, normalise(key + radius * (np.cos(turn) * around + np.sin(turn) * above))
         )
-    return _smooth(np.stack([sky, direct / LAMPS], axis=1), triangles)
-
-
-def _smooth(values: Real, triangles: NDArray[np.int32], times: int = 4) -> Real:
-    """Return values of vertices as means over the triangles around them [shape=(V, 2)]."""
+    values = np.stack([sky, direct / LAMPS], axis=1)
     count = np.maximum(np.bincount(triangles.ravel(), minlength=len(values)), 1)[:, None]
-    for _ in range(times):
+    for _ in range(SMOOTHINGS):
         mean = values[triangles].mean(axis=1)
         totals = [
             sum(np.bincount(triangles[:, corner], mean[:, k], minlength=len(values)) for corner in range(3))

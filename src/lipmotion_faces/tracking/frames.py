@@ -123,7 +123,16 @@ def _decode_frames(
         if last_s >= span.end_s - ROUNDING_S:
             break
         _check_size(path, picture.width, picture.height, pixel_shape)
-        yield VideoFrame(last_s - span.start_s, _turn_upright(picture, pixel_shape, longest_px))
+        width, height = round(picture.width * pixel_shape), picture.height
+        if longest_px is not None and max(width, height) > longest_px:
+            scale = longest_px / max(width, height)
+            width, height = max(1, round(width * scale)), max(1, round(height * scale))
+        image: NDArray[np.uint8] = picture.to_ndarray(format="rgb24", width=width, height=height)
+        if quarter_turns := round(picture.rotation / 90) % 4:
+            cv2 = import_opencv()
+            turns = cv2.ROTATE_90_COUNTERCLOCKWISE, cv2.ROTATE_180, cv2.ROTATE_90_CLOCKWISE
+            image = cv2.rotate(image, turns[quarter_turns - 1])
+        yield VideoFrame(last_s - span.start_s, image)
     if last_s == float("-inf") and span == WHOLE:
         raise InputError(f"{path}: holds no picture that can be decoded; export the video again")
 
@@ -177,21 +186,6 @@ def _check_size(path: Path, width: int, height: int, pixel_shape: float) -> None
     if shown * height > MAX_PIXELS:
         most = f"at most {MAX_PIXELS} in all"
         raise InputError(f"{path}: pictures of {shown} × {height} pixels, required {most}; scale the video")
-
-
-def _turn_upright(picture: Any, pixel_shape: float, longest_px: int | None = None) -> NDArray[np.uint8]:
-    """Return a picture as RGB [shape=(H, W, 3)], upright, with square pixels, at most ``longest_px``."""
-    width, height = round(picture.width * pixel_shape), picture.height
-    if longest_px is not None and max(width, height) > longest_px:
-        scale = longest_px / max(width, height)
-        width, height = max(1, round(width * scale)), max(1, round(height * scale))
-    image: NDArray[np.uint8] = picture.to_ndarray(format="rgb24", width=width, height=height)
-    quarter_turns = round(picture.rotation / 90) % 4
-    if not quarter_turns:
-        return image
-    cv2 = import_opencv()
-    turn = (cv2.ROTATE_90_COUNTERCLOCKWISE, cv2.ROTATE_180, cv2.ROTATE_90_CLOCKWISE)[quarter_turns - 1]
-    return cv2.rotate(image, turn)
 
 
 Array = NDArray[np.float64]

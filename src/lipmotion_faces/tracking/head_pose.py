@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT, WIDTH
+from lipmotion_faces.appearance.lower_face import map_region
 from lipmotion_faces.tracking import trackers
 from lipmotion_faces.tracking.packages import import_opencv
 
@@ -112,7 +113,7 @@ def crop_mouth(image: NDArray[np.uint8], to_image: Array) -> NDArray[np.uint8]:
     shrink = max(1, int(np.sqrt(abs(np.linalg.det(to_image[:, :2]))) + 1e-9))
     crop: NDArray[np.uint8] = cv2.warpAffine(
         image,
-        map_region_to_image(to_image, shrink),
+        map_region(to_image, shrink, CORNER),
         (WIDTH * shrink, HEIGHT * shrink),
         flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
         borderMode=cv2.BORDER_REPLICATE,
@@ -120,18 +121,6 @@ def crop_mouth(image: NDArray[np.uint8], to_image: Array) -> NDArray[np.uint8]:
     if shrink > 1:  # a large face is sampled finely and averaged: no pixel of it is skipped
         crop = cv2.resize(crop, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
     return crop
-
-
-def map_region_to_image(to_image: Array, samples: int = 1) -> Array:
-    """Return the affine map from a pixel of the mouth region to its position in the image [shape=(2, 3)].
-
-    to_image : as in ``crop_mouth``
-    samples  : pixels per pixel of the region, along each side
-    Pixel (0, 0) is a centre, as OpenCV counts; its upper left corner lies at ``CORNER``.
-    """
-    turn = to_image[:, :2]
-    first = np.array(CORNER) + 0.5 / samples
-    return np.concatenate([turn / samples, (to_image[:, 2] - 0.5 + turn @ first)[:, None]], axis=1)
 
 
 def map_face(points: Array) -> Array:

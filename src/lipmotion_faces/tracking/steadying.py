@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX
+from lipmotion_faces.appearance.lower_face import map_region
 from lipmotion_faces.tracking.packages import import_opencv
 from lipmotion_faces.tracking.track import Footage, decode_footage
 
@@ -126,11 +127,9 @@ def _blur_region(frame: NDArray[np.uint8], to_image: Array, samples: float) -> l
     """Return nose and cheeks of a frame in grey, aligned, at each of ``BLURS_PX``."""
     cv2 = import_opencv()
     left, top, right, bottom = REGION
-    turn = to_image[:, :2]
-    corner = to_image[:, 2] - 0.5 + turn @ (np.array([left, top]) + 0.5 / samples)
     region = cv2.warpAffine(
         cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY),
-        np.concatenate([turn / samples, corner[:, None]], axis=1),
+        map_region(to_image, samples, (left, top)),
         (round((right - left) * samples), round((bottom - top) * samples)),
         flags=cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP,
         borderMode=cv2.BORDER_REPLICATE,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import islice, pairwise
 from pathlib import Path
 
@@ -137,72 +137,53 @@ class TrackedFrames:
         return count_frames(self.times_s, self.rate_hz)
 
 
-@dataclass(eq=False)
-class _Pictures:
-    times_s: list[float] = field(default_factory=list)
-    seen: list[bool] = field(default_factory=list)
-    points: list[Array] = field(default_factory=list)
-    mouths: list[NDArray[np.uint8]] = field(default_factory=list)
-    sizes: set[tuple[int, int]] = field(default_factory=set)
-    changes: list[float] = field(default_factory=list)
-    before: NDArray[np.int16] | None = None
-
-    def add(self, time_s: float, image: NDArray[np.uint8], points: Array | None) -> None:
-        self.times_s.append(time_s)
-        self.seen.append(points is not None)
-        self.sizes.add((image.shape[0], image.shape[1]))
-        step = 1 + max(image.shape) // COMPARED_PX
-        before, now = self.before, image[::step, ::step].astype(np.int16)
-        self.changes.append(
-            np.inf if before is None or before.shape != now.shape else float(np.abs(now - before).mean())
-        )
-        self.before = now
-        if points is not None:
-            self.points.append(points)
-            self.mouths.append(reduce_mouth(crop_mouth(image, map_eyes(points[_EYES, :2]))))
-
-    def mark_unseen(self, wrong: NDArray[np.bool_]) -> int:
-        """Mark some of the frames that show a face as if they did not [shape=(number of them,)]; return how many."""
-        for index in np.flatnonzero(self.seen)[wrong]:
-            self.seen[index] = False
-        right = np.flatnonzero(~wrong)
-        self.points = [self.points[n] for n in right]
-        self.mouths = [self.mouths[n] for n in right]
-        return int(wrong.sum())
-
-
 def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: str = MEDIAPIPE) -> TrackedFrames:
     """Return the pictures of a video, decoded once, and where one person's face is in them; no picture is kept."""
-    pictures = _Pictures()
+    time_s, has_face, changes, sizes = list[float](), list[bool](), list[float](), set[tuple[int, int]]()
+    points, mouths = list[Array](), list[NDArray[np.uint8]]()
+    before: NDArray[np.int16] | None = None
     with open_video(path, span) as video, FaceFollower(person, tracker) as follower:
         for frame in video.frames:
-            pictures.add(frame.time_s, frame.image, follower.follow(frame.image))
-    if not pictures.times_s:
+            image, face = frame.image, follower.follow(frame.image)
+            step = 1 + max(image.shape) // COMPARED_PX
+            now = image[::step, ::step].astype(np.int16)
+            like = before if before is not None and before.shape == now.shape else None
+            changes.append(np.inf if like is None else float(np.abs(now - like).mean()))
+            before = now
+            time_s.append(frame.time_s)
+            sizes.add((image.shape[0], image.shape[1]))
+            has_face.append(face is not None)
+            if face is not None:
+                points.append(face)
+                mouths.append(reduce_mouth(crop_mouth(image, map_eyes(face[_EYES, :2]))))
+    if not time_s:
         raise InputError(f"{path}: no picture from {span.start_s:.2f} to {span.end_s:.2f} s; give a whole video")
-    others = pictures.mark_unseen(~follower.mark_person()[pictures.seen])
-    covered = pictures.mark_unseen(find_occluded_mouths(np.stack(pictures.mouths))) if pictures.mouths else 0
-    times_s, cuts = np.array(pictures.times_s), tuple(follower.list_cuts())
+    times_s, cuts, with_face = np.array(time_s), tuple(follower.list_cuts()), np.flatnonzero(has_face)
+    rows = np.flatnonzero(follower.mark_person()[with_face])  # of the points: those of the person
+    others = len(with_face) - len(rows)
+    covered = find_occluded_mouths(np.stack(mouths)[rows]) if len(rows) else np.zeros(0, bool)
+    rows = rows[~covered]
     rate_hz = find_nominal_rate(times_s, video.stated_rates_hz)
-    repeated, frozen = damaged_pictures.find_repeated(pictures.changes, rate_hz)
-    has_face = np.array(pictures.seen)
-    pictures.mark_unseen(repeated[has_face])
+    repeated, frozen = damaged_pictures.find_repeated(changes, rate_hz)
+    is_clear = np.isin(np.arange(len(times_s)), with_face[rows])
+    rows = rows[~repeated[with_face[rows]]]
+    tracked = np.array(points).reshape(-1, len(TRACKED_POINTS), 3)[rows]
     notes = (
         *damage_notes(video, times_s, rate_hz),
         *(f"cut at {times_s[index]:.2f} s" for index in cuts),
         *([f"another face, or one that is not recognised, in {others} frames"] if others else []),
-        *([f"the mouth is covered, or the picture damaged, in {covered} frames"] if covered else []),
+        *([f"the mouth is covered, or the picture damaged, in {covered.sum()} frames"] if covered.any() else []),
         *damaged_pictures.describe_damage({"frozen": frozen}, times_s),
         *([f"{doubled} pictures are doubled"] if (doubled := int((repeated & ~frozen).sum())) > 1 else []),
     )
-    if pictures.points:
-        unit_px = float(np.median(measure_distance(np.stack(pictures.points), EYE_CORNERS)))
+    if len(tracked):
+        unit_px = float(np.median(measure_distance(tracked, EYE_CORNERS)))
         if unit_px < SMALL_EYES_PX:
             wanted = f"{SMALL_EYES_PX:.0f} give a good track; film closer"
             notes = (*notes, f"the face is small: {unit_px:.0f} px between the eyes, {wanted}")
-    _check(path, times_s, has_face & ~frozen, video, rate_hz, notes)
-    return TrackedFrames(
-        times_s, np.array(pictures.seen), np.stack(pictures.points), frozenset(pictures.sizes), cuts, rate_hz, notes
-    )
+    _check(path, times_s, is_clear & ~frozen, video, rate_hz, notes)
+    seen = np.isin(np.arange(len(times_s)), with_face[rows])
+    return TrackedFrames(times_s, seen, tracked, frozenset(sizes), cuts, rate_hz, notes)
 
 
 def measure_distance(points: Array, pair: tuple[int, int]) -> Array:
@@ -348,12 +329,13 @@ def track_footage(path: Path, span: VideoSpan = WHOLE, *, crops: bool = False) -
     if len(frames.sizes) > 1:
         several = " and ".join(f"{width} × {height}" for height, width in sorted(frames.sizes)[:3])
         raise InputError(f"{path}: pictures of {several} pixels in one video; export the video in one size")
-    wanted_s = np.arange(frames.count) / frames.rate_hz
     times_s, rate_hz, count = frames.seen_s, frames.rate_hz, frames.count
+    cut_frames = {int(np.ceil(frames.times_s[cut] * rate_hz - 0.5)) for cut in frames.cuts}
+    cuts = sorted(n for n in cut_frames if 0 < n < count)
+    wanted_s = np.arange(count) / rate_hz
     maps = map_face(frames.points).reshape(-1, 6)
-    result = maps[find_nearest(times_s, np.arange(count) / rate_hz)]  # in scenes in which the person is not seen
-    ends = [0, *_list_cut_frames(frames), count]
-    for start, stop in pairwise(ends):
+    result = maps[find_nearest(times_s, wanted_s)]  # in scenes in which the person is not seen
+    for start, stop in pairwise([0, *cuts, count]):
         inside = (times_s * rate_hz >= start - 0.5) & (times_s * rate_hz < stop - 0.5)
         if inside.any():
             scene_s = times_s[inside] - start / rate_hz
@@ -364,7 +346,7 @@ def track_footage(path: Path, span: VideoSpan = WHOLE, *, crops: bool = False) -
         make_track(path, span, frames, crops=crops),
         result.reshape(-1, 2, 3),
         frames.times_s[find_nearest(frames.times_s, wanted_s)],
-        tuple(_list_cut_frames(frames)),
+        tuple(cuts),
         next(iter(frames.sizes)),
         frames.rate_hz,
     )
@@ -435,12 +417,6 @@ def _decode_between(footage: Footage, start: int, stop: int) -> Iterator[NDArray
         raise InputError(f"{path}: no picture from {begin_s:.2f} s on, though it was tracked; track it again")
     for _ in range(n, stop):
         yield image
-
-
-def _list_cut_frames(frames: TrackedFrames) -> list[int]:
-    """Return the frames at the constant rate before which there is a cut, rising, without repetition."""
-    at = {int(np.ceil(frames.times_s[cut] * frames.rate_hz - 0.5)) for cut in frames.cuts}
-    return sorted(n for n in at if 0 < n < frames.count)
 
 
 def read_video_frames(path: Path) -> tuple[Iterator[NDArray[np.uint8]], float]:

@@ -94,12 +94,32 @@ def write_mp4(
     Raises ExportError: no frames, frames of odd or different sizes, no sound, fps not positive, an unknown tag, or the
     file cannot be written.
     """
+    import av
+
     rate = check_rate(path, fps, audio)
     if unknown := set(tags or ()) - TAGS:
         raise ExportError(f"{path}: unknown tags {', '.join(sorted(unknown))}; known: {', '.join(sorted(TAGS))}")
-    texts = {name: as_text(text) for name, text in (tags or {}).items()}
+    converter = av.video.reformatter.VideoReformatter()  # to make one for every frame takes as long as to use it
+
+    def convert(frame: Frame) -> Any:
+        picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")
+        return converter.reformat(picture, format="yuv420p", dst_colorspace="itu601")
+
     with atomic_file(path) as temporary:
-        _encode(temporary, path, check_frames(frames, path, (3,)), rate, audio, texts)
+        checked = check_frames(frames, path, (3,))
+        first = next(checked)
+        with open_output(temporary, path, format="mp4", options={"movflags": "+faststart"}) as container:
+            container.metadata.update({name: as_text(text) for name, text in (tags or {}).items()})
+            options = _ENCODER | {"x264-params": _ENCODER["x264-params"] + read_x264()}
+            video = container.add_stream("libx264", rate=rate, options=options)
+            video.height, video.width = first.shape[:2]
+            video.pix_fmt = "yuv420p"
+            context = video.codec_context
+            context.time_base = 1 / rate
+            context.colorspace, context.color_range = _BT601, _LIMITED_RANGE
+            context.color_primaries = context.color_trc = _BT709
+            sound = container.add_stream("aac", rate=SOUND_HZ, layout="mono", bit_rate=128_000)
+            mux_streams(container, video, map(convert, chain([first], checked)), rate, sound, cut_sound(audio))
         if xmp is not None:
             append_xmp(temporary, xmp)
 
@@ -133,32 +153,6 @@ def check_frames(frames: Iterable[Frame], path: Path, channels: tuple[int, ...] 
         yield frame
     if shape is None:
         raise ExportError(f"{path}: there are no frames to write")
-
-
-def _encode(
-    temporary: Path, path: Path, frames: Iterator[Frame], rate: Fraction, audio: Audio, tags: Mapping[str, str]
-) -> None:
-    import av
-
-    converter = av.video.reformatter.VideoReformatter()  # to make one for every frame takes as long as to use it
-    first = next(frames)
-    with open_output(temporary, path, format="mp4", options={"movflags": "+faststart"}) as container:
-        container.metadata.update(tags)
-        options = _ENCODER | {"x264-params": _ENCODER["x264-params"] + read_x264()}
-        video = container.add_stream("libx264", rate=rate, options=options)
-        video.height, video.width = first.shape[:2]
-        video.pix_fmt = "yuv420p"
-        context = video.codec_context
-        context.time_base = 1 / rate
-        context.colorspace, context.color_range = _BT601, _LIMITED_RANGE
-        context.color_primaries = context.color_trc = _BT709
-        sound = container.add_stream("aac", rate=SOUND_HZ, layout="mono", bit_rate=128_000)
-
-        def convert(frame: Frame) -> Any:
-            picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")
-            return converter.reformat(picture, format="yuv420p", dst_colorspace="itu601")
-
-        mux_streams(container, video, map(convert, chain([first], frames)), rate, sound, cut_sound(audio))
 
 
 @contextmanager
@@ -231,11 +225,33 @@ def write_with_alpha(path: Path, frames: Iterable[Frame], *, fps: float, audio: 
     After a failure there is no partial file.
     Raises ExportError: another suffix; no or unsuitable frames; no sound; fps not positive; the file cannot be written.
     """
-    if path.suffix.lower() not in _CONTAINERS:
+    from av import AudioResampler, VideoFrame
+
+    codecs = _CONTAINERS.get(path.suffix.lower())
+    if codecs is None:
         raise ExportError(f"{path}: required one of: {' '.join(_CONTAINERS)}")
-    rate = check_rate(path, fps, audio)
+    rate, checked = check_rate(path, fps, audio), check_frames(frames, path)
     with atomic_file(path) as temporary:
-        _encode_alpha(temporary, path, check_frames(frames, path), rate, audio)
+        first = next(checked)
+        has_alpha = first.shape[2] == 4
+        pixels = codecs.transparent if has_alpha else codecs.opaque
+
+        def convert(frame: Frame) -> Any:
+            picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgba" if has_alpha else "rgb24")
+            return picture.reformat(format=pixels, dst_colorspace="itu709")
+
+        with open_output(temporary, path, format=codecs.container) as container:
+            video = container.add_stream(codecs.video, rate=rate, options=codecs.video_options)
+            video.height, video.width = first.shape[:2]
+            video.pix_fmt = pixels
+            context = video.codec_context
+            context.time_base, context.thread_count = 1 / rate, os.cpu_count() or 1
+            context.colorspace = context.color_primaries = context.color_trc = _BT709
+            context.color_range = _LIMITED_RANGE
+            sound = container.add_stream(codecs.sound, rate=SOUND_HZ, layout="mono")
+            resampler = AudioResampler(format=codecs.sound_format, layout="mono", rate=SOUND_HZ)
+            parts = (part for cut in chain(cut_sound(audio), [None]) for part in resampler.resample(cut))
+            mux_streams(container, video, map(convert, chain([first], checked)), rate, sound, parts)
 
 
 def write_pictures(path: Path, frames: Iterable[Frame]) -> None:
@@ -249,28 +265,3 @@ def write_pictures(path: Path, frames: Iterable[Frame]) -> None:
     for number, frame in enumerate(check_frames(frames, path)):
         with atomic_file(path.with_name(path.name % number)) as temporary:
             Image.fromarray(frame).save(temporary, compress_level=4)
-
-
-def _encode_alpha(temporary: Path, path: Path, frames: Iterator[Frame], rate: Fraction, audio: Audio) -> None:
-    from av import AudioResampler, VideoFrame
-
-    codecs, first = _CONTAINERS[path.suffix.lower()], next(frames)
-    has_alpha = first.shape[2] == 4
-    pixels = codecs.transparent if has_alpha else codecs.opaque
-    with open_output(temporary, path, format=codecs.container) as container:
-        video = container.add_stream(codecs.video, rate=rate, options=codecs.video_options)
-        video.height, video.width = first.shape[:2]
-        video.pix_fmt = pixels
-        context = video.codec_context
-        context.time_base, context.thread_count = 1 / rate, os.cpu_count() or 1
-        context.colorspace = context.color_primaries = context.color_trc = _BT709
-        context.color_range = _LIMITED_RANGE
-        sound = container.add_stream(codecs.sound, rate=SOUND_HZ, layout="mono")
-        resampler = AudioResampler(format=codecs.sound_format, layout="mono", rate=SOUND_HZ)
-
-        def convert(frame: Frame) -> Any:
-            picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgba" if has_alpha else "rgb24")
-            return picture.reformat(format=pixels, dst_colorspace="itu709")
-
-        parts = (part for sound_part in chain(cut_sound(audio), [None]) for part in resampler.resample(sound_part))
-        mux_streams(container, video, map(convert, chain([first], frames)), rate, sound, parts)

@@ -6,9 +6,8 @@ Only for videos that look recorded: a drawn face needs none. What a mark does an
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from html import escape
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +36,7 @@ GROUND_OPACITY, LETTER_OPACITY = 0.45, 0.9
 """Opacity of the label's black ground, and of its white letters."""
 
 
-@dataclass(frozen=True)
-class MarkMetadata:
+class MarkMetadata(NamedTuple):
     """The mark as arguments of ``write_mp4``.
 
     tags : what players show; the keywords hold ``SOURCE_TYPE`` too, as programs that copy a video often drop the packet
@@ -72,28 +70,23 @@ def mark_frames(frames: Iterable[Frame], face: Box | None = None, label: str = L
     if face is not None and not (face[0] <= face[2] and face[1] <= face[3]):
         required = "left, top, right and bottom in px, left before right, top over bottom"
         raise InputError(f"face {face}, required: {required}")
-    drawn: _DrawnLabel | None = None
+    placed: tuple[int, int, NDArray[np.float32], NDArray[np.float32]] | None = None
     for frame in frames:
-        drawn = drawn or _place_label(frame.shape[0], frame.shape[1], face, label)
-        height, width = drawn.ground.shape
+        placed = placed or _place_label(frame.shape[0], frame.shape[1], face, label)
+        top, left, ground, letters = placed
         marked = frame.copy()
-        part = marked[drawn.top : drawn.top + height, drawn.left : drawn.left + width]
-        part[...] = np.rint(part * (1 - drawn.ground[..., None]) + drawn.letters[..., None])
+        part = marked[top : top + ground.shape[0], left : left + ground.shape[1]]
+        part[...] = np.rint(part * (1 - ground[..., None]) + letters[..., None])
         yield marked
 
 
-@dataclass(frozen=True, eq=False)
-class _DrawnLabel:
-    """A label and its place: the frame becomes frame · (1 − ground) + letters [shapes=(h, w)]."""
+def _place_label(
+    height: int, width: int, face: Box | None, label: str
+) -> tuple[int, int, NDArray[np.float32], NDArray[np.float32]]:
+    """Return top and left of the label in the first free corner, as large as possible, its ground and its letters.
 
-    top: int
-    left: int
-    ground: NDArray[np.float32]
-    letters: NDArray[np.float32]
-
-
-def _place_label(height: int, width: int, face: Box | None, label: str) -> _DrawnLabel:
-    """Return the label in the first free corner, as large as possible. Raises ExportError: no corner is free."""
+    The frame becomes frame · (1 − ground) + letters [shapes=(h, w)]. Raises ExportError: no corner is free.
+    """
     largest = max(SMALLEST_LETTERS_PX, round(LETTER_SHARE * min(height, width)))
     for size in range(largest, SMALLEST_LETTERS_PX - 1, -1):
         ground, letters = _draw(label, size)
@@ -105,7 +98,7 @@ def _place_label(height: int, width: int, face: Box | None, label: str) -> _Draw
                 x, y, right, bottom = face or (width, height, width, height)
                 is_free = left + columns <= x or right <= left or top + rows <= y or bottom <= top
                 if inside and is_free:
-                    return _DrawnLabel(top, left, ground, letters)
+                    return top, left, ground, letters
     raise ExportError(
         f"no corner of the {width} × {height} px frame has room for the label {label!r} beside the face {face}; "
         "use a video with more space around the face, or the mark in the metadata alone"

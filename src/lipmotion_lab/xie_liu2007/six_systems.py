@@ -12,7 +12,8 @@ import numpy as np
 
 from lipmotion.corpora import Corpus
 from lipmotion.engines import engine_named
-from lipmotion.engines.coupled.conversion.em_conversion import convert
+from lipmotion.engines.coupled.chains.model import speech_observations
+from lipmotion.engines.coupled.conversion import convert
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.errors import ExportError, InputError, MissingDependencyError
@@ -97,10 +98,11 @@ def draw_plots(chains: TrainedSystem, recordings: HeldOutRecordings, folder: Pat
     _save(picture, folder / PLOT_FILES["start"])
 
     picture = Figure(figsize=(7, 4.6), layout="constrained")
-    axes, model = picture.subplots(), chains.model
+    axes, model, config = picture.subplots(), chains.model, chains.engine.config
     for utterance in some.utterances:
-        observations = model.speech_observations(Speech(utterance.features, Timeline(())))
-        steps = convert(model.chains, observations, model.chains.full_lattice, chains.engine.config.em).log_likelihood
+        observations = speech_observations(Speech(utterance.features, Timeline(())), model.visual)
+        how = config.start, config.update, config.steps
+        _, steps = convert(model.chains, observations, model.chains.full_lattice, *how)
         axes.plot(range(len(steps)), steps, "o-", markersize=3, label=utterance.name)
     axes.set_xlabel("step of EM (0: means along the best path)")
     axes.set_ylabel("log likelihood of speech and lips (nats per frame)")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lipmotion.corpora import Corpus
 from lipmotion.engines import Animator, engine_named
 from lipmotion.engines.coupled.arrays import coupled_to_arrays
-from lipmotion.engines.coupled.chains.structures import HMM, SYSTEMS, UNSEEN_LOSS
+from lipmotion.engines.coupled.chains.product import HMM, SYSTEMS, UNSEEN_LOSS
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.coupled.training.coupled_training import grow_models

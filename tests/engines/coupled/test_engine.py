@@ -49,7 +49,7 @@ def test_states_are_named_with_their_probabilities(kind, sets, limit):
     product, of = found.transitions.product, found.structure
     for row in range(len(joint)):
         best = find_joint_state(found, posteriors, row)
-        assert best.name == product.name(int(joint[row].argmax()))
+        assert best.name == of.name(product.chain_states[:, joint[row].argmax()].tolist())
         assert best.probability == pytest.approx(joint[row].max(), abs=2e-5)
         for chain, explained in enumerate(list_chain_states(found, posteriors, row)):
             names = [of.state_name(chain, state) for state in range(of.state_counts[chain])]
@@ -98,7 +98,7 @@ def test_the_gaussian_is_the_most_responsible_one(name, row):
     model, inference = fitted(name)
     found = explanation(name, row)
     for number, group in enumerate(model.chains.groups):
-        responsibilities = inference.emissions.responsibilities[number]
+        responsibilities = inference.responsibilities[number]
         posterior = inference.posteriors.densities[number][row]
         weight = posterior[None] if responsibilities is None else responsibilities[row] * posterior
         for stream in group.streams:
@@ -130,7 +130,8 @@ def test_the_gaussian_is_the_most_responsible_one(name, row):
 def test_shares_of_regressions_are_posteriors_of_the_visual_chain_and_in_silence_the_rest_pose():
     model, inference = fitted("ph-vi-CHMM")
     posterior = inference.posteriors.chains[1]
-    mean = model.regression[1][0].means(model.regression_inputs(inference), posterior)
+    inputs, (regression,) = model.regression
+    mean = regression.means(inputs(inference.observations.streams[0], inference.posteriors.chains[0]), posterior)
     for row in (64, 75, 91):
         (found,) = explanation("ph-vi-CHMM", row).regressions
         names = [model.chains.structure.state_name(1, state) for state in range(posterior.shape[1])]
@@ -167,7 +168,7 @@ def test_without_a_path_an_explanation_has_no_chains():
     model, inference = fitted("ph-vi-CHMM")
     impossible = type(inference.posteriors)(*[*vars(inference.posteriors).values()][:4], -np.inf)
     nothing = types.Explanation(0.0, 0, None, "", {})
-    lost = type(inference)(inference.observations, inference.lattice, inference.emissions, impossible)
+    lost = type(inference)(inference.observations, inference.lattice, inference.responsibilities, impossible)
     assert explain_frames([nothing], model, lost, [0]) == [nothing]
 
 

@@ -6,8 +6,14 @@ import numpy as np
 
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, StreamGroup
 from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.product import Grammar, JointState, Product, create_transitions, find_reachable
-from lipmotion.engines.coupled.chains.structures import Structure
+from lipmotion.engines.coupled.chains.product import (
+    Grammar,
+    JointState,
+    Product,
+    Structure,
+    create_transitions,
+    find_reachable,
+)
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.units import PHONES, UnitSet
 

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target
-from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.windows import list_windows
+from lipmotion.engines.selection.inventory import RecordedUnits, list_windows
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import Lexicon
 

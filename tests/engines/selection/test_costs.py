@@ -18,12 +18,11 @@ from engines.selection.drawn_units import (
     with_stress,
 )
 from lipmotion.engines import create_engine, engine_named
-from lipmotion.engines.selection import concatenation, windows
+from lipmotion.engines.selection import concatenation
 from lipmotion.engines.selection import costs as search
 from lipmotion.engines.selection.concatenation import join_pieces, to_pieces
 from lipmotion.engines.selection.costs import ABUTTING_JOIN, FRACTIONS, JOIN_AFTER, JOIN_BEFORE, select
-from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.windows import list_windows
+from lipmotion.engines.selection.inventory import RecordedUnits, list_windows
 from lipmotion.types import Span, Timeline, Unit
 
 NAMED = {"protected": "p", "invisible": "t", "normal": "s"}
@@ -49,9 +48,7 @@ def test_each_edge_of_a_word_that_differs_costs_once() -> None:
     costs, every = costs_of(units, word=0.07), np.arange(1, 12, 3)
     assert costs.target_costs(target_of(costs, "iy | aa | iy"), 1, every) == pytest.approx([0, 0.07, 0.07, 0.14])
     assert costs.target_costs(target_of(costs, "iy aa iy"), 1, every) == pytest.approx([0.14, 0.07, 0.07, 0])
-    wordless = costs.target(
-        windows.list_windows([Timeline(tuple(Span(n, n + 1.0, Unit("iy")) for n in range(3)))]), None, None
-    )
+    wordless = costs.target(list_windows([Timeline(tuple(Span(n, n + 1.0, Unit("iy")) for n in range(3)))]), None, None)
     assert costs.target_costs(wordless, 1, every) == pytest.approx(0)
 
 
@@ -71,7 +68,7 @@ def test_motion_unlike_the_guide_costs_unless_the_sounds_are_alike() -> None:
     predicted = np.stack([np.full((len(FRACTIONS), 1), each) for each in (0.5, 0.55, 0.9)]).astype(np.float16)
     costs = costs_of(replace(units, predicted=predicted), guide=2.0, trust=0.1)
     wanted = np.full((1, len(FRACTIONS), 1), 0.5)
-    target = costs.target(windows.list_windows([timeline("aa")]), wanted, wanted)
+    target = costs.target(list_windows([timeline("aa")]), wanted, wanted)
     distance = 0.3**2 * 2 * PHONE_S * 10
     assert costs.target_costs(target, 0, array(0, 1, 2)) == pytest.approx([0, distance / 4, distance], rel=1e-2)
 
@@ -155,7 +152,7 @@ def test_abutting_pieces_are_bent_in_the_last_and_the_first_twentieth() -> None:
     """§4: "smoothed for the last 5% of the first unit, and the first 5% of the second unit"."""
     units = inventory("s iy", "uw n", levels=(0, 1), duration_s=1.0)
     costs = costs_of(units)
-    target = costs.target(windows.list_windows([timeline("s iy uw n", 1.0)]), None, None)
+    target = costs.target(list_windows([timeline("s iy uw n", 1.0)]), None, None)
     motion = concatenation.join_pieces(units, target, concatenation.to_pieces(costs, target, np.arange(4)), 401)[:, 0]
     bent = np.flatnonzero((motion > 1e-9) & (motion < 1 - 1e-9))
     assert (bent[0], bent[-1]) == pytest.approx((200 - 0.05 * 200, 200 + 0.05 * 200), abs=1)
@@ -167,7 +164,7 @@ def test_by_default_units_merge_in_a_vowel_rather_than_abut_behind_a_plosive() -
     units = inventory("s p", "uw n", "s p uw", "uw n")
     costs = costs_of(units, engine_named("selection", {}).config)
     target = target_of(costs, "s p uw n")
-    pieces = concatenation.to_pieces(costs, target, search.select(costs, target).units)
+    pieces = concatenation.to_pieces(costs, target, search.select(costs, target)[0])
     assert ABUTTING_JOIN not in [piece.join for piece in pieces[1:]]
     assert (pieces[0].unit, pieces[0].stop + (pieces[1].join == JOIN_AFTER)) == (4, 3)
 
@@ -193,7 +190,7 @@ def list_recordings(
     one, other = (costs.shown(list_windows([each])) for each in (wanted, wrong))
     differs = (getattr(one, by) != getattr(other, by)).reshape(len(one), -1).any(axis=1)
     assert one.phones.tolist() == other.phones.tolist()
-    found = select(costs, costs.target(one, None, None)).units
+    found = select(costs, costs.target(one, None, None))[0]
     recordings = costs.inventory.windows.recording[found]
     return set(recordings[differs if differs.any() else slice(None)].tolist())
 
@@ -233,9 +230,9 @@ def test_units_merge_beside_a_protected_phone_not_in_it(phone: str) -> None:
     config = replace(DEFAULT, context=0.0)
     costs = costs_of(units, config)
     target = target_of(costs, f"s iy {phone} aa n")
-    assert costs.inventory.windows.recording[select(costs, target).units[2]] == 2
+    assert costs.inventory.windows.recording[select(costs, target)[0][2]] == 2
     careless = costs_of(units, replace(config, protected=0.0))
-    assert careless.inventory.windows.recording[select(careless, target).units[2]] < 2
+    assert careless.inventory.windows.recording[select(careless, target)[0][2]] < 2
 
 
 @pytest.mark.parametrize("phone", PRESERVED)
@@ -259,7 +256,7 @@ def test_a_cut_in_a_cluster_is_worth_a_worse_merge() -> None:
 
     def recording_of_s(settings: Any) -> int:
         costs = costs_of(units, settings)
-        return int(costs.inventory.windows.recording[select(costs, target_of(costs, "s l iy")).units[0]])
+        return int(costs.inventory.windows.recording[select(costs, target_of(costs, "s l iy"))[0][0]])
 
     assert recording_of_s(config) == 0
     assert recording_of_s(replace(config, cluster=0.0)) == 1
@@ -274,5 +271,5 @@ def test_units_merge_where_stress_agrees() -> None:
         for stress, chosen in ((DEFAULT.stress, 1), (0.0, 0)):
             config = replace(DEFAULT, context=0.0, stress=stress)
             costs = costs_of(units, config)
-            found = select(costs, target_of(costs, "b iy s", (-1, 1, -1))).units
+            found = select(costs, target_of(costs, "b iy s", (-1, 1, -1)))[0]
             assert units.windows.recording[found[phone]] == chosen, (phone, stress)

@@ -1,5 +1,6 @@
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,8 +10,8 @@ from hypothesis import strategies as st
 from lipmotion import engines, errors, types
 from lipmotion.engines.selection.concatenation import TimeMap, join_pieces, list_shown_units, to_pieces
 from lipmotion.engines.selection.costs import ABUTTING_JOIN, select
+from lipmotion.engines.selection.inventory import OVERLAPS, TABLE_1, find_lip_class, parse_invisible
 from lipmotion.engines.selection.selection_training import SEGMENT_S, build_target
-from lipmotion.engines.selection.windows import OVERLAPS, TABLE_1, find_lip_class, parse_invisible
 from lipmotion.testing import PHONES, example, examples, speech, timeline
 from lipmotion.types import Generation, Span, Timeline, Unit, silent_monitor
 
@@ -86,13 +87,9 @@ def test_in_noise_the_sound_alone_chooses(model, engine) -> None:
     unsure = replace(SPOKEN, units_known=False, confidence=0.0)
     assert not build_target(model, costs, unsure).by_sound
     guide = model.guide
-    distorted = (guide.predict(unsure)[0], np.ones(len(unsure.features.values)))
-
-    class Noisy(type(guide)):
-        def predict(self, _):
-            return distorted
-
-    model = replace(model, guide=Noisy(**vars(guide)))
+    distorted = (guide.predictor.predict(unsure)[0], np.ones(len(unsure.features.values)))
+    noisy = SimpleNamespace(can_predict=lambda _: True, predict=lambda _: distorted)
+    model = replace(model, guide=replace(guide, predictor=noisy))
     target = build_target(model, costs, unsure)
     assert target.by_sound
     assert target.windows.durations_s == pytest.approx(SEGMENT_S, rel=0.1)
@@ -178,10 +175,10 @@ def test_no_sequence_of_candidates_is_cheaper(model, engine, phones: list[str], 
     for number in range(1, len(target)):
         step = costs.join_costs(target, number, *every[number - 1 : number + 1])
         sums = sums[..., None] + step + costs.target_costs(target, number, every[number])
-    chosen = select(costs, target, excluded)
+    units, cost = select(costs, target, excluded)
     assert sums.shape == tuple(map(len, every))
-    assert chosen.cost == pytest.approx(sums.min())
-    assert total(costs, target, chosen.units.tolist()) == pytest.approx(chosen.cost)
+    assert cost == pytest.approx(sums.min())
+    assert total(costs, target, units.tolist()) == pytest.approx(cost)
 
 
 @settings(max_examples=12)
@@ -189,7 +186,7 @@ def test_no_sequence_of_candidates_is_cheaper(model, engine, phones: list[str], 
 def test_pruning_does_not_change_the_cost(model, engine, phones: list[str]) -> None:
     wide = replace(engine, config=replace(engine.config, beam=10**6, most=0.4))
     costs, target = wanted(model, wide, phones)
-    assert select(costs, target).cost == pytest.approx(select(costs, target, prune=False).cost)
+    assert select(costs, target)[1] == pytest.approx(select(costs, target, prune=False)[1])
 
 
 LONGER = st.lists(st.sampled_from(PHONES), min_size=2, max_size=8)
@@ -198,7 +195,7 @@ LONGER = st.lists(st.sampled_from(PHONES), min_size=2, max_size=8)
 def laid_out(model, engine, units: types.Timeline):
     costs = model.costs(engine.config)
     target = build_target(model, costs, speech(units))
-    pieces = to_pieces(costs, target, select(costs, target).units)
+    pieces = to_pieces(costs, target, select(costs, target)[0])
     return target, pieces
 
 
@@ -250,7 +247,7 @@ def test_every_unit_is_shown(model, engine, phones: list[str], seed: int) -> Non
     costs = model.costs(engine.config)
     target = build_target(model, costs, speech(timeline(phones)))
     excluded = np.random.default_rng(seed).random(len(model.inventory.windows)) < 0.7
-    units = select(costs, target, excluded).units
+    units = select(costs, target, excluded)[0]
     pieces = to_pieces(costs, target, units)
     assert all(two.start_s - one.start_s > 0.01 for one, two in pairwise(pieces))
     shown = list_shown_units(target, pieces, int(target.windows.times_s[-1, 1] * 100))

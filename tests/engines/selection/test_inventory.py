@@ -10,16 +10,18 @@ from engines.selection.drawn_units import costs_of, inventory, recorded, timelin
 from lipmotion import engines, types
 from lipmotion.engines.selection.concatenation import join_pieces, to_pieces
 from lipmotion.engines.selection.costs import select
-from lipmotion.engines.selection.inventory import RecordedUnits, find_substitutes, index_units
-from lipmotion.engines.selection.selection_training import build_target
-from lipmotion.engines.selection.windows import (
+from lipmotion.engines.selection.inventory import (
     INVISIBLE_SYMBOL,
     PHONE_NUMBER,
     SILENT,
     TABLE_1,
+    RecordedUnits,
     cover_recording,
+    find_substitutes,
+    index_units,
     list_windows,
 )
+from lipmotion.engines.selection.selection_training import build_target
 from lipmotion.errors import InputError
 from lipmotion.testing import PHONES as SPOKEN
 from lipmotion.testing import examples, speech
@@ -151,7 +153,7 @@ def test_a_word_whose_edge_is_suppressed_keeps_it() -> None:
 def joined(units: RecordedUnits, text: str, config=PRINTED):
     costs = costs_of(units.without(config.suppressed_phones), config)
     target = costs.target(costs.shown(list_windows([timeline(text)])), None, None)
-    pieces = to_pieces(costs, target, select(costs, target).units)
+    pieces = to_pieces(costs, target, select(costs, target)[0])
     return target, join_pieces(costs.inventory, target, pieces, round(timeline(text)[-1].end_s * 100) + 1)[:, 0]
 
 
@@ -182,7 +184,7 @@ def test_a_recorded_sentence_costs_nothing_without_its_suppressed_phones(model, 
     for one in examples(4):
         target = build_target(model, costs, one.speech)
         assert not {PHONES[phone] for phone in target.windows.phones} & {*INVISIBLE}
-        assert select(replace(costs, config=PRINTED), target).cost == pytest.approx(0)
+        assert select(replace(costs, config=PRINTED), target)[1] == pytest.approx(0)
     assert {PHONES[phone] for phone in costs.inventory.windows.phones} <= {"sil", "b", "aa", "iy", "m", "uw", "s", "p"}
 
 

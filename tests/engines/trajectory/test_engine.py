@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from lipmotion import engines, errors, types
-from lipmotion.engines.trajectory.trajectory_training import MIN_VARIANCE, fit_trajectory
+from lipmotion.engines.trajectory.trajectory_training import MIN_VARIANCE, SHARE_DIVISOR, fit_trajectory
 from lipmotion.motion import closure, fit_acoustic_context, frame_labels
 from lipmotion.motion.context_window import OFFSETS, SCALE
 from lipmotion.motion.frame_labels import FullContextState, label_full_context
-from lipmotion.stats.trees import Question, Tree, create_statistics, fit_regression_node, fit_tree_regressions, ridge
+from lipmotion.stats.trees import Question, Tree, create_statistics, fit_tree_regressions, ridge
 from lipmotion.testing import CHANNELS, examples, speech, timeline
 from lipmotion.types import WEIGHT, Channel, Constraints, Pin, silent_monitor
 from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, load_unit_set
@@ -222,14 +222,6 @@ def small_tree():
     )  # fmt: skip
 
 
-def test_the_owner_is_the_last_node_with_enough_frames():
-    tree = small_tree()
-    paths = [tree.path_to(leaf) for leaf in (1, 3, 4)]
-    assert paths == [[0, 1], [0, 2, 3], [0, 2, 4]]
-    assert [fit_regression_node(tree, path, 45) for path in paths] == [0, 3, 2]
-    assert [fit_regression_node(tree, path, 1000) for path in paths] == [0, 0, 0]
-
-
 def test_each_node_is_drawn_towards_the_one_above():
     tree, truth = small_tree(), np.random.default_rng(5).normal(size=(3, 2))
     parts = {node: moments_of(*sample(frames, truth + node, node)) for node, frames in ((0, 40), (2, 10), (3, 50))}
@@ -297,9 +289,18 @@ def test_means_follow_the_sound():
     assert regressed.emission.variances[:-1, 0, 0].mean() < plain.emission.variances[:-1, 0, 0].mean()
 
 
-def test_the_rest_pose_has_no_regression():
+def test_a_leaf_has_the_regression_of_the_last_node_with_enough_frames_and_the_rest_pose_none():
+    assert [small_tree().path_to(leaf) for leaf in (1, 3, 4)] == [[0, 1], [0, 2, 3], [0, 2, 4]]
     model = fit_trajectory(list(loud_and_soft(12)), REGRESSION, silent_monitor)
-    assert model.emission.regression.rows[-1] == -1
+    forest, rows = model.emission.forest, model.emission.regression.rows.tolist()
+    enough = max(REGRESSION.ridge_frames, sum(tree.frames[0] for tree in forest.values()) / SHARE_DIVISOR)
+    owners = [
+        (name, [node for node in tree.path_to(leaf) if tree.frames[node] >= enough][-1:])
+        for name, tree in forest.items()
+        for leaf in tree.leaves
+    ]
+    assert [rows.index(row) for row in rows[:-1]] == [owners.index(owner) for owner in owners]
+    assert rows[-1] == -1
     rows = np.full(5, len(model.emission.means) - 1)
     means, _ = model.emission.statistics(rows, np.random.default_rng(0).normal(size=(5, 39)), slice(None))
     assert means == pytest.approx(np.repeat(model.emission.means[-1:], 5, axis=0))

@@ -34,10 +34,10 @@ def mouth_rows(figure: Figure) -> dict[str, np.ndarray]:
 
 def parts_seen(stage: Stage, pose: CharacterPose) -> dict[str, np.ndarray]:
     """Return which pixels show lips, wall, tongue, teeth (lower) and upper teeth [each shape=(H, W)]."""
-    drawn = stage.figure.shade(pose, stage.canvas.camera.place)
+    places, _ = stage.figure.shade(pose, stage.canvas.camera.place)
     seen = {}
     for name, rows in mouth_rows(stage.figure).items():
-        marked = np.zeros(len(drawn.places), bool)
+        marked = np.zeros(len(places), bool)
         marked[rows] = True
-        seen[name] = stage.canvas.mark_shown(drawn.places, marked, stage.figure.triangles)
+        seen[name] = stage.canvas.cover(places, marked, stage.figure.triangles) > 127
     return seen

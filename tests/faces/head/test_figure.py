@@ -74,7 +74,7 @@ def test_shut_eyes_cover_the_eyeballs():
 
 def test_turning_moves_the_head_and_not_the_body_and_keeps_lengths():
     turns = (0, 0, 0), (0.3, 0.1, 0.05)
-    straight, aside = (make_figure().shade(CharacterPose(turn=turn), VIEWER).places for turn in turns)
+    straight, aside = (make_figure().shade(CharacterPose(turn=turn), VIEWER)[0] for turn in turns)
     body = make_figure().rows["clothing"]
     assert np.array_equal(straight[body], aside[body])
     nose = int(np.argmax(straight[make_figure().rows["skin"], 2]))
@@ -88,11 +88,11 @@ def test_turning_moves_the_head_and_not_the_body_and_keeps_lengths():
 
 def test_the_mouth_is_darker_in_its_depth_and_when_it_closes_and_light_is_at_most_white():
     def brightness(pose: CharacterPose, name: str) -> float:
-        return float(make_figure().shade(pose, VIEWER).light[mouth_rows(make_figure())[name]].mean())
+        return float(make_figure().shade(pose, VIEWER)[1][mouth_rows(make_figure())[name]].mean())
 
     assert brightness(OPEN, "wall") < 0.3 * brightness(OPEN, "lips")
     assert brightness(OPEN._replace(roundness=1), "upper teeth") < brightness(OPEN, "upper teeth")
-    light = make_figure().shade(OPEN, VIEWER).light
+    light = make_figure().shade(OPEN, VIEWER)[1]
     seen = np.delete(light, np.r_[make_figure().rows["catchlights"], make_figure().rows["right catchlights"]], axis=0)
     assert light.min() >= 0
     assert np.quantile(seen, 0.999) < 1.0

@@ -239,7 +239,7 @@ def test_the_mouth_does_not_come_through_the_skin_above_protruded_lips():
 def test_a_picture_of_the_moving_part_is_the_whole_picture():
     stage, pose = Stage(make_camera(320, 240)), CharacterPose(gap=0.1, turn=(0.2, 0.05, 0.0))
     drawn = stage.figure.shade(pose, stage.canvas.camera.place)
-    whole = stage.canvas.draw(drawn.places, drawn.light, stage.figure.triangles)
+    whole = stage.canvas.draw(*drawn, stage.figure.triangles)
     assert np.array_equal(stage.draw(pose), whole)
 
 

@@ -1,14 +1,194 @@
-"""Readers of speech: models, phones, lexicons, transcripts, and the motion generated with them."""
+"""Readers of recordings and what lies beside them, of corpora, models, phones, lexicons and transcripts."""
 
 import json
+import math
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
-from fuzz.inputs import Files, Good, Reader
-from fuzz.plausible import check_generation, good_model, require, short_speech
-from lipmotion import Request, animate, load_model, read_motion, write
+import numpy as np
+
+from formats.test_labels import TIERS, long_form
+from formats.test_reported_cases import LINES, OTHERS, SERVICES, SPEAKERS
+from formats.test_transcripts import OF_LINES, OF_WORDS
+from formats.timing_samples import SAMPLES
+from fuzz.inputs import (
+    LONGEST_S,
+    Files,
+    Good,
+    Reader,
+    check_generation,
+    check_motion,
+    good_model,
+    picked_up,
+    require,
+    short_speech,
+)
+from lipmotion import Corpus, Request, animate, load_model, read_motion, write
+from lipmotion.formats.label_files import read_labels
+from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.types import Audio, Motion, Span, TimedWord, Timeline, Track, TranscriptLine, Unit, Utterance
 from lipmotion.units import PHONES, Lexicon
+from lipmotion_faces.corpus.folder import read_aligned_words
+from lipmotion_faces.corpus.source_recordings import LISTS, RecordingFolder, SourceRecording, assign_splits
+from lipmotion_faces.corpus.supplied import read_supplied_phones
+from pipeline.made import features_of
 from robustness.motion_cases import GOOD
+from speech.sounds import tone, write_sound
+
+SECONDS = 0.6
+CODECS = {
+    **{"wav": "pcm_s16le", "float.wav": "pcm_f32le", "law.wav": "pcm_alaw", "flac": "flac", "mp3": "libmp3lame"},
+    **{"ogg": "libopus", "mp4": "aac", "mkv": "aac", "aiff": "pcm_s16be", "caf": "pcm_s16be", "avi": "pcm_s16le"},
+    **{"ts": "aac", "webm": "libopus", "au": "pcm_s16be", "mka": "flac"},
+}
+AUDIO_TEXTS = {
+    "list.m3u8": "#EXTM3U\n#EXT-X-TARGETDURATION:9\n#EXTINF:9,\na.wav\n#EXT-X-ENDLIST\n",
+    "list.txt": "ffconcat version 1.0\nfile a.wav\nduration 1\n",
+    "a.idx": "# VobSub index file, v7 (do not modify this line!)\nsize: 720x576\nid: en, index: 0\n"
+    "timestamp: 00:00:01:000, filepos: 000000000\n",
+    "a.srt": "1\n00:00:01,000 --> 00:00:02,000\nhello\n",
+}
+
+
+def seed_audio(_: Good) -> list[Files]:
+    """Return a tone in many containers, with video, with a gap; and texts that FFmpeg accepts as recordings."""
+    found: list[Files] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name, codec in CODECS.items():
+            rate_hz = 48_000 if codec == "libopus" else 16_000
+            path = write_sound(Path(folder) / f"a.{name}", tone(rate_hz, SECONDS), rate_hz, codec)
+            found.append({path.name: path.read_bytes()})
+        for name in ("video.mp4", "video.mkv"):
+            path = write_sound(Path(folder) / name, tone(16_000, SECONDS, 2), 16_000, "aac", video=True, start_s=0.1)
+            found.append({path.name: path.read_bytes()})
+        path = write_sound(Path(folder) / "hole.mka", tone(16_000, 2.0), 16_000, "flac", hole_s=(0.5, 1.0))
+        found.append({path.name: path.read_bytes()})
+    return found + [{name: text.encode()} for name, text in AUDIO_TEXTS.items()]
+
+
+def check_audio(folder: Path, _: Good) -> None:
+    """Read a recording; compute its features."""
+    (path,) = folder.iterdir()
+    audio = read_audio(path)
+    require(bool(np.isfinite(audio.samples).all()), "samples that are not finite")
+    require(audio.duration_s <= LONGEST_S, "hours of sound")
+    require(bool(np.isfinite(analysed(audio).mfcc().values).all()), "features that are not finite")
+
+
+CORPUS_SAMPLES, FRAMES = 8000, 13
+PIXELS = (4, 6, 3)
+AGES_S = 1e11
+CORPUS_PHONES = Timeline((Span(0.0, 0.3, Unit("sil")), Span(0.3, 0.5, Unit("b"))))
+
+
+def seed_corpus(good: Good) -> list[Files]:
+    """Return corpora of half a second: with labelled phones and tiny mouth pictures, without, without checksums."""
+    corpus = Corpus.open(good.corpus)
+    small = _half_a_second(corpus.utterance(corpus.names()[0]))
+    track = replace(small.track, crops=np.zeros((FRAMES, *PIXELS), np.uint8))
+    labelled = replace(small, speaker="anna", phones=CORPUS_PHONES, track=track)
+    return [_corpus(labelled), _corpus(small), _without_checksums(_corpus(small))]
+
+
+def _without_checksums(files: Files) -> Files:
+    """Return a corpus without checksums, as earlier versions wrote it, so that damaged arrays are read."""
+    (name,) = (name for name in files if name.endswith("entry.json"))
+    entry = json.loads(files[name])
+    entry.pop("checksums", None)
+    return files | {name: json.dumps(entry).encode()}
+
+
+def _half_a_second(utterance: Utterance) -> Utterance:
+    audio = Audio(utterance.audio.samples[:CORPUS_SAMPLES].copy(), utterance.audio.rate_hz)
+    motion = utterance.track.motion
+    short = Motion(motion.values[:FRAMES], motion.rate_hz, motion.channels)
+    return replace(utterance, audio=audio, features=features_of(audio), track=Track(short, np.ones(FRAMES, bool)))
+
+
+def _corpus(utterance: Utterance) -> Files:
+    with tempfile.TemporaryDirectory() as folder:
+        corpus = Corpus.create(Path(folder) / "corpus")
+        corpus.add(utterance)
+        return picked_up(Path(folder))
+
+
+def check_corpus(folder: Path, _: Good) -> None:
+    """Open a corpus; check every array of every utterance."""
+    corpus = Corpus.open(folder / "corpus")
+    corpus.summary()
+    require(all(0 <= seconds < AGES_S for _, seconds in corpus.speakers.values()), "ages of speech")
+    for name in corpus.names():
+        utterance = corpus.utterance(name)
+        check_motion(utterance.track.motion)
+        require(bool(np.isfinite(utterance.features.values).all()), "features that are not finite")
+        if utterance.track.crops is not None:
+            utterance.track.crops.mean()
+
+
+LABELS_TEXTS = {
+    "long.TextGrid": long_form(TIERS),
+    "short.TextGrid": '"ooTextFile"\n"TextGrid"\n0\n2\n<exists>\n1\n"IntervalTier"\n"words"\n0\n2\n1\n0\n2\n"hi you"\n',
+    "htk.lab": "0 1000000 sil\n1000000 2000000 p\n2000000 3500000 aa\n",
+    "states.lab": "0 1000000 x^sil-p+aa=t[2]\n1000000 2000000 x^sil-p+aa=t[3]\n2000000 3500000 p-aa+t[2] -61.2 baby\n",
+    "starts.lab": "0 sil\n1000000 p\n2000000 aa\n",
+    "audacity.txt": "0.0\t0.5\tp\n0.5\t1.25\taa\n\\\t100\t200\n",
+    "lrs.txt": "Text:  HI {LG} YOU\nConf:  4\n\nWORD START END ASDSCORE\nHI 0.5 0.7 8.1\nYOU 0.7 1.2 7\n",
+    "words.txt": "Hello, you 42 people.\n",
+    "said.srt": "1\n00:00:00,500 --> 00:00:01,500\n<i>Hi</i> (laughs)\n\n2\n00:00:02,000 --> 00:00:03,000\nANNA: you\n",
+    "said.vtt": "WEBVTT\n\nNOTE a\n\n00:00.500 --> 00:01.500 line:0\nHi<00:01.000><c> you</c>\n\n"
+    "00:01.500 --> 00:01.510\nHi you\n",
+    "whisper.json": '{"text": "Hi", "segments": [{"start": 0.5, "end": 1.5, "text": " Hi 2 you", "words": '
+    '[{"word": " Hi", "start": 0.5, "end": 0.75}, {"word": "2"}, {"word": " you", "start": 1, "end": 1.5}]}]}',
+    "cpp.json": '{"transcription": [{"offsets": {"from": 500, "to": 1500}, "text": " Hi"}]}',
+    "vosk.json": '{"result": [{"conf": 1.0, "end": 1.5, "start": 0.5, "word": "hi"}], "text": "hi"}\n{"text": ""}\n',
+    "words.ctm": ";; a\na 1 0.50 0.25 hi 0.9\na 1 0.75 0.5 <eps>\na 1 1.25 0.5 you\n",
+    "table.tsv": "start\tend\ttext\n500\t1500\tHi you\n",
+    "grid.align": "0 23750 sil\n23750 29500 bin\n29500 34000 blue\n",
+}
+OTHER_FORMS = {**LINES, **OTHERS, **SERVICES, **OF_LINES, **OF_WORDS}
+SAMPLED = {f"{name}.json": sample for name, sample in SAMPLES.items()} | SPEAKERS
+SAMPLED |= {f"{n}.{'srt' if isinstance(form, str) else 'json'}": form for n, form in enumerate(OTHER_FORMS.values())}
+LABELS_TEXTS |= {
+    name: sample if isinstance(sample, str) else json.dumps(sample, ensure_ascii=False)
+    for name, sample in SAMPLED.items()
+    if not isinstance(sample, bytes)
+}
+SPLITS = {"train.txt": b"a\nb\n", "val.txt": b"c\n", "test.txt": b"d\n"}
+LENGTH_S = 4.0
+
+
+def seed_labels(_: Good) -> list[Files]:
+    """Return labels of every kind, and lists."""
+    return [SPLITS, *({name: text.encode()} for name, text in LABELS_TEXTS.items())]
+
+
+def check_labels(folder: Path, _: Good) -> None:
+    """Read each file by its name."""
+    if any((folder / name).exists() for name in LISTS):
+        recordings = tuple(SourceRecording(name, Path(f"{name}.mp4"), None) for name in "abcd")
+        assign_splits(RecordingFolder("folder", recordings), folder)
+        return
+    for path in folder.iterdir():
+        if path.suffix == ".align":
+            require(bool(read_aligned_words(path)), "no word")
+        else:
+            _read_labels(path)
+
+
+def _read_labels(path: Path) -> None:
+    labels = read_labels(path)
+    for line in labels.transcript.lines if labels.transcript else ():
+        require(bool(line.words), "a line without a word")
+        parts: list[TranscriptLine | TimedWord] = [line, *line.words]
+        for part in parts:
+            times_s = [time for time in (part.start_s, part.end_s) if time is not None]
+            require(all(0 <= time_s < math.inf for time_s in times_s), "times that are none")
+            require(times_s == sorted(times_s), "times that are not in order")
+    phones = read_supplied_phones(SourceRecording("a", path, labels.words, phones=labels.phones), LENGTH_S)
+    for span in phones or ():
+        require(0 <= span.start_s <= span.end_s <= LENGTH_S, "a phone outside of the sound")
 
 
 def seed_model(good: Good) -> list[Files]:
@@ -16,7 +196,7 @@ def seed_model(good: Good) -> list[Files]:
     return [{"a.lipmotion": path.read_bytes()} for path in good.models]
 
 
-def read_model(folder: Path, good: Good) -> None:
+def check_model(folder: Path, good: Good) -> None:
     """Load a model; animate short speech, without and with a transcript."""
     model = load_model(folder / "a.lipmotion")
     for text in (None, "baby"):
@@ -33,7 +213,7 @@ def seed_units(good: Good) -> list[Files]:
         return found + [{path.name: path.read_bytes()} for path in paths]
 
 
-def read_units(folder: Path, good: Good) -> None:
+def check_units(folder: Path, good: Good) -> None:
     """Animate a short sound with these phones."""
     (path,) = folder.iterdir()
     units = read_motion(path)[1]
@@ -52,7 +232,7 @@ def seed_lexicon(_: Good) -> list[Files]:
     return [{"words.dict": text.encode()} for text in LEXICONS]
 
 
-def read_lexicon(folder: Path, good: Good) -> None:
+def check_lexicon(folder: Path, good: Good) -> None:
     """Read a lexicon; align short speech with its first word."""
     lexicon = Lexicon.from_file(folder / "words.dict")
     for word, pronunciations in lexicon.user.items():
@@ -82,15 +262,18 @@ def seed_transcript(_: Good) -> list[Files]:
     return [{"said.txt": text.encode()} for text in TRANSCRIPTS]
 
 
-def read_transcript(folder: Path, good: Good) -> None:
+def check_transcript(folder: Path, good: Good) -> None:
     """Animate short speech with the transcript."""
     path = folder / "said.txt"
     check_generation(animate(Request(short_speech(good), transcript=path, recogniser="own"), model=good_model(good)))
 
 
 READERS = {
-    "model": Reader("model", seed_model, read_model),
-    "units": Reader("units", seed_units, read_units),
-    "lexicon": Reader("lexicon", seed_lexicon, read_lexicon),
-    "transcript": Reader("transcript", seed_transcript, read_transcript),
+    "audio": Reader("audio", seed_audio, check_audio),
+    "labels": Reader("labels", seed_labels, check_labels),
+    "corpus": Reader("corpus", seed_corpus, check_corpus),
+    "model": Reader("model", seed_model, check_model),
+    "units": Reader("units", seed_units, check_units),
+    "lexicon": Reader("lexicon", seed_lexicon, check_lexicon),
+    "transcript": Reader("transcript", seed_transcript, check_transcript),
 }

@@ -52,8 +52,8 @@ def random_joint(
         effects = {place: draw.normal(0, 3, D) for place in product(range(3), (*known.names, ""))}
         means = np.array([sum(effects[i, context[i]] for i in range(3)) for context, _ in seen])
         sums.add(np.arange(len(seen)), 9.0 * np.concatenate([np.ones((len(seen), 2)), means, means**2 + 0.1], axis=1))
-        costs = model.TreeCosts(1.0, 1.0, 0.02, changes.get("both_neighbours", False))
-        forest = model.grow_forest(name, known, questions, seen, sums, has_spaces=has_spaces, costs=costs)
+        tying = model.JointConfig(least_frames=1.0, both_neighbours=changes.get("both_neighbours", False))
+        forest = model.grow_forest(name, known, questions, seen, sums, has_spaces=has_spaces, config=tying)
         shape = (forest.size, components, D)
         mixtures = mixture.Mixtures(
             np.log(draw.dirichlet(np.full(components, 2.0), forest.size)).astype(np.float32),

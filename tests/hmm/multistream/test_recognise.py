@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from hmm.multistream.synthetic import CLASSES, config, inventory, observed, random_joint, utterances
+from hmm.synthetic import decode
 from kernels.networks import network_posteriors
 from lipmotion import errors, types
 from lipmotion.engines import engine_named
@@ -15,7 +16,6 @@ from lipmotion.hmm.multistream import phone_recogniser as module
 from lipmotion.hmm.multistream.densities import SPEECH, ObservedStream, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.recognise import JointRecogniser, build_context_loop
 from lipmotion.hmm.multistream.unit_states import expand_triphones
-from lipmotion.hmm.network import build_unit_loop, compute_log_likelihoods, decode_units
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.testing import example, examples, speech, timeline
 from oracles import joint as slow
@@ -37,7 +37,8 @@ def slow_densities(hmm, data, weights):
 def state_posteriors(recogniser, data):
     """Return the posterior of every state without context in every frame [shape=(T, R)]."""
     loop = build_context_loop(recogniser.hmm)
-    log_density = recogniser._log_likelihoods(data).log_density(0, data.frames, None)
+    streams = recogniser.hmm.standardise(data, recogniser.weights)
+    log_density = recogniser.hmm.log_density(streams, loop.leaves, recogniser.weights).astype(np.float32)
     posteriors, _, _ = network_posteriors(log_density, *loop.network.network)
     result = np.zeros((data.frames, len(recogniser.hmm.inventory.monophones)))
     np.add.at(result.T, loop.monophones, posteriors.T.astype(float))
@@ -101,7 +102,7 @@ def test_speech_alone_is_the_plain_model():
     plain = UnitHmm(config, table, model.tied.mixtures.select(leaves), hmm.log_stay, hmm.bigram)
     data = observed(np.random.default_rng(9), 60, (SPEECH,))
     values = model.tied.values(model.scale.standardise(data.streams[SPEECH]))
-    units, bounds = decode_units(build_unit_loop(plain, ["sil", "a", "b"]), compute_log_likelihoods(plain, values))
+    units, bounds = decode(plain, values, ["sil", "a", "b"])
     said = JointRecogniser(hmm).recognise(data)
     assert tuple(s.unit for s in said) == units
     assert [s.first for s in said] == bounds[:-1].tolist()
@@ -244,7 +245,7 @@ def test_short_units_have_some_of_their_states():
 def test_durations_are_those_of_the_alignment():
     data = utterances(12)
     hmm = multistream_training.train_joint(data, inventory(), CLASSES, config(mixtures=1))
-    durations = recognise.measure_durations(hmm, [(u.observed, u.units) for u in data])
+    durations = multistream_training.measure_durations(hmm, data)
     assert np.array_equal(durations, hmm.durations)
     rows = [hmm.inventory.monophones["a", state] for state in range(3)]
     assert 6 <= durations[rows, 0].sum() <= 12

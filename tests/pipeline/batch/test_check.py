@@ -40,12 +40,8 @@ def test_every_kind_is_found(tmp_path):
     sound(sounds / "made" / "output.wav", 1.0, 7)
     (sounds / "made" / "batch.jsonl").touch()
     listed = {name: f"{number} {words}" for number, name in enumerate(("good", "short", "long", "broken"))}
-    listed |= {
-        "deep/silent": "",
-        "nowhere": "",
-        "again": "",
-        "spanish": "la casa de los padres y el perro de la ni\u00f1a",
-    }
+    listed |= dict.fromkeys(("deep/silent", "nowhere", "again"), "")
+    listed["spanish"] = "la casa de los padres y el perro de la ni\u00f1a"
     script = "".join(f"sounds/{name}.wav,{text}\n" for name, text in listed.items())
     (tmp_path / "lines.csv").write_text(f"file,transcript\n{script}", encoding="utf-8")
     found = check(tmp_path / "lines.csv", jobs=1)
@@ -62,14 +58,10 @@ def test_every_kind_is_found(tmp_path):
     assert "sounds/spanish" not in {each.name for each in spanish.findings if each.kind == "language"}
 
 
-def test_tags_are_no_words(tmp_path):
-    sound(tmp_path / "a.wav", 1.0, 1)
+def test_a_folder_has_no_orphans_and_tags_are_no_words(tmp_path):
+    sound(tmp_path / "a.wav", 1.0, 0)
     line = BatchLine("a", str(tmp_path / "a.wav"), "[angry] Who is <smile> there?")
     assert check_line(line, Request()).words == ("who", "is", "there")
-
-
-def test_a_folder_has_no_orphans(tmp_path):
-    sound(tmp_path / "a.wav", 1.0, 0)
     sound(tmp_path / "deep" / "b.wav", 1.0, 1)
     assert check(tmp_path, jobs=1).text == "2 lines: nothing found"
 
@@ -83,13 +75,10 @@ def test_the_measure_of_length_is_the_usual_rate():
 
     assert [each.name for each in _find_problems(lines(0.8), [])] == ["x"]
     assert list(_find_problems(lines(1.3), [])) == []
+    assert count_letters(["hello", "\uac00"]) == pytest.approx(8.0)  # those of other scripts take longer
 
 
 def test_short_lines_may_have_the_same_words():
     long, short = ("who", "goes", "there", "now"), ("yes", "sir")
     checked = [CheckedLine(name, words=words) for name, words in zip("abcd", (long, short, long, short), strict=True)]
     assert list(_find_problems(checked, [])) == [Finding("same words", "c", "as of a")]
-
-
-def test_letters_of_other_scripts_take_longer():
-    assert count_letters(["hello", "\uac00"]) == pytest.approx(8.0)

@@ -1,7 +1,6 @@
 import csv
 import hashlib
 import json
-import logging
 import os
 import sys
 from collections.abc import Sequence
@@ -21,7 +20,7 @@ from lipmotion.pipeline.batch.ledger import (
     WORK,
     Place,
     Record,
-    check_kinds,
+    check_job,
     fingerprint_job,
     fingerprint_line,
     list_input_files,
@@ -149,9 +148,8 @@ def test_damaged_rows_are_said_once_and_their_lines_done_again(line, out, caplog
                 ledger.append(record_of(line))
                 assert ledger.kept(line, "settings", out) == record_of(line), what
             if "a line end" not in what:  # it is of a line that this batch has not: nobody looks at it
-                assert [said.getMessage().split("batch.jsonl: ")[1] for said in caplog.records] == [
-                    "1 damaged rows are passed over; what they say was done is done again"
-                ], what
+                (message,) = caplog.messages
+                assert message.endswith(": 1 damaged rows are passed over; what they say was done is done again"), what
             assert (out / "batch.jsonl").read_bytes() == others + row + b"\n" + good, what
 
 
@@ -192,19 +190,12 @@ def test_killed_after_the_receipt(line, out, in_place):
         assert not old.work("a").exists()
         assert read_receipt(old.receipt("a")) is None
     assert written(out) == ["a"] * in_place
-
-
-def test_killed_after_the_ledger(line, out):
-    """A receipt that is in the ledger already is not entered twice."""
-    place = Place(str(out), "old")
-    (out / "a.json").write_bytes(CONTENT)
-    with open_ledger(place, [line]) as ledger:
-        ledger.append(record_of(line))
-    place.receipt("a").parent.mkdir(parents=True)
-    write_receipt(place.receipt("a"), record_of(line))
-    with open_ledger(Place(str(out), "new"), [line]):
-        pass
-    assert written(out) == ["a"]
+    if in_place:  # a receipt that is in the ledger already is not entered twice
+        old.receipt("a").parent.mkdir(parents=True)
+        write_receipt(old.receipt("a"), record_of(line))
+        with open_ledger(Place(str(out), "newest"), [line]):
+            pass
+        assert written(out) == ["a"]
 
 
 def test_a_later_run_ends_the_earlier_one(out):
@@ -223,27 +214,22 @@ def test_settings_have_a_fingerprint(tmp_path):
     plain = Job()
     assert fingerprint_job(plain) == fingerprint_job(Job())
     assert fingerprint_job(plain) != fingerprint_job(Job(Request(recogniser="fast")))
-    own = Job(outputs=Outputs(character=tmp_path / "head.glb"))
-    before = fingerprint_job(own)
-    (tmp_path / "head.glb.character.csv").write_text("control,source\n")
-    assert fingerprint_job(own) != before
-    lexicon = Job(Request(lexicon=tmp_path / "words.txt"))
-    before = fingerprint_job(lexicon)
-    (tmp_path / "words.txt").write_text("a EY")
-    assert fingerprint_job(lexicon) != before
     (tmp_path / "A.png").write_text("a drawing")
-    drawn = Job(outputs=Outputs(face=str(tmp_path)))
-    before = fingerprint_job(drawn)
-    (tmp_path / "words.txt").write_text("a AY")
-    assert fingerprint_job(drawn) == before
-    (tmp_path / "A.png").write_text("another one")
-    assert fingerprint_job(drawn) != before
+    for parts, file, counts in (
+        ({"outputs": Outputs(character=tmp_path / "head.glb")}, "head.glb.character.csv", True),
+        ({"request": Request(lexicon=tmp_path / "words.txt")}, "words.txt", True),
+        ({"outputs": Outputs(face=str(tmp_path))}, "A.png", True),
+        ({"outputs": Outputs(face=str(tmp_path))}, "words.txt", False),  # no drawing
+    ):
+        before = fingerprint_job(Job(**parts))
+        (tmp_path / file).write_text("control,source\n")
+        assert (fingerprint_job(Job(**parts)) != before) == counts
 
 
 @pytest.mark.parametrize("kinds", [(), ("wav",), ("json", "json"), ("cues.json5",), ("",)])
 def test_kinds_that_cannot_be_written(kinds):
     with pytest.raises(ExportError, match=r"required some of: json, csv|given twice"):
-        check_kinds(kinds)
+        check_job(Job(outputs=Outputs(kinds=kinds)))
 
 
 GOOD = {"outcome": "done", "words": "transcript", "confidence": 1.0, "range_db": 50.0, "warnings": []}
@@ -320,9 +306,8 @@ def test_a_recording_without_an_address_is_not_played(tmp_path, recording):
 
 def test_they_are_read_as_they_were_written(tmp_path):
     names = ("a", "=1+1", 'b, "c"', "'d", "'=e ")
-    marks = dict(
-        zip(names, map(report.Mark, ("approve", "redo", "redo", "", ""), ("2026-01-01", "", "-2", "", "")), strict=True)
-    )
+    kinds, times = ("approve", "redo", "redo", "", ""), ("2026-01-01", "", "-2", "", "")
+    marks = dict(zip(names, map(report.Mark, kinds, times), strict=True))
     report.write_marks(tmp_path / "marks.csv", marks)
     assert "'=1+1," in (tmp_path / "marks.csv").read_text()
     assert report.read_marks(tmp_path / "marks.csv") == marks
@@ -341,14 +326,6 @@ def test_what_is_refused(tmp_path, text, said):
     (tmp_path / "marks.csv").write_text(text)
     with pytest.raises(InputError, match=said):
         report.read_marks(tmp_path / "marks.csv")
-
-
-def test_later_marks_are_ahead_and_may_take_back():
-    kept = {"a": report.Mark("approve"), "b": report.Mark("redo"), "c": report.Mark("approve")}
-    assert report.merge_marks(kept, {"a": report.Mark("redo", "2"), "b": report.Mark("")}) == {
-        "a": report.Mark("redo", "2"),
-        "c": report.Mark("approve"),
-    }
 
 
 def test_a_line_is_due_once_for_each_mark():
@@ -374,13 +351,10 @@ def test_a_folder_gives_its_recordings_with_their_relative_names(tmp_path):
     assert [line.recording for line in lines] == [str(tmp_path / "a/one.FLAC"), str(tmp_path / "b/two.wav")]
 
 
-def test_a_list_of_paths(tmp_path):
+def test_a_list_of_paths_some_outside_of_its_folder(tmp_path):
     lines = listed(tmp_path, "a/x, y.wav\n\n./b.wav\n")
     assert [line.name for line in lines] == ["a/x, y", "b"]
     assert lines[1].recording == str(tmp_path / "b.wav")
-
-
-def test_recordings_outside_of_the_folder_of_the_list(tmp_path):
     (tmp_path / "lists").mkdir()
     lines = listed(tmp_path / "lists", f"../sounds/s1/a.wav\n{tmp_path}/sounds/s2/a.wav\n")
     assert [line.name for line in lines] == ["s1/a", "s2/a"]
@@ -388,58 +362,36 @@ def test_recordings_outside_of_the_folder_of_the_list(tmp_path):
 
 @pytest.mark.parametrize(("name", "mark"), [("t.csv", ","), ("t.tsv", "\t"), ("t.csv", ";")])
 def test_a_table(tmp_path, name, mark, caplog):
-    rows = [
-        ["File", "transcript", "output", "speaker", "note"],
-        ["a.wav", '"Hello, you; there"', "act1/hello.json", "anna", "x"],
-    ]
-    with caplog.at_level(logging.WARNING):
-        lines = listed(tmp_path, "\n".join(mark.join(row) for row in rows), name)
+    header = mark.join(("File", "transcript", "output", "speaker", "note"))
+    row = mark.join(("a.wav", '"Hello, you; there"', "act1/hello.json", "anna", "x"))
+    lines = listed(tmp_path, f"{header}\n{row}", name)
     assert lines == [BatchLine("act1/hello", str(tmp_path / "a.wav"), "Hello, you; there", "anna")]
     assert "columns that are not used: note" in caplog.text
 
 
 def test_outputs_may_be_named_with_the_suffix_of_one_of_their_kinds(tmp_path):
-    names = ("a.json", "b.cues.json", "c.take")
-    text = "file,output\n" + "".join(f"{number}.wav,{name}\n" for number, name in enumerate(names))
+    text = "file,output\n1.wav,a.json\n2.wav,b.cues.json\n3.wav,c.take\n"
     lines = listed(tmp_path, text, "t.csv", ("json", "cues.json"))
     assert [line.name for line in lines] == ["a", "b", "c.take"]
 
 
-def test_short_rows_are_filled_and_long_ones_refused(tmp_path):
+def test_lists_that_are_refused(tmp_path):
+    for source, message in ((tmp_path, "no recordings in it"), (tmp_path / "missing", "no such file or folder")):
+        with pytest.raises(InputError, match=message):
+            read_lines(source, ("json",))
     assert listed(tmp_path, "file,transcript\na.wav\n") == [BatchLine("a", str(tmp_path / "a.wav"))]
-    with pytest.raises(InputError, match="row 2: 3 columns, required at most the 2"):
-        listed(tmp_path, "file,transcript\na.wav,hello,you\n")
-    with pytest.raises(InputError, match="row 3: no recording in the column 'file'"):
-        listed(tmp_path, "file,transcript\na.wav,x\n,hello\n")
-
-
-def test_nothing_to_do_is_an_error(tmp_path):
-    with pytest.raises(InputError, match="no recordings in it"):
-        read_lines(tmp_path, ("json",))
-    with pytest.raises(InputError, match="no such file or folder"):
-        read_lines(tmp_path / "missing", ("json",))
-    with pytest.raises(InputError, match="no recordings"):
-        listed(tmp_path, "\n")
-
-
-@pytest.mark.parametrize("text", ["a.wav\na.flac\n", "a.wav\nA.wav\n", "a.wav\na.wav\n", "é.wav\ne\u0301.flac\n"])
-def test_two_lines_with_one_name_are_refused(tmp_path, text):
-    with pytest.raises(ExportError, match="rename one of them"):
-        listed(tmp_path, text)
-
-
-@pytest.mark.parametrize("text", ["a\0b.wav\n", "file,output\na.wav,x\ty\n", "~nobody/a.wav\n"])
-def test_names_that_no_file_has(tmp_path, text):
-    if text.startswith("~"):  # only a shell knows homes
-        assert listed(tmp_path, text)[0].recording == str(tmp_path / "~nobody/a.wav")
-        return
-    with pytest.raises(InputError, match="control characters"):
-        listed(tmp_path, text)
-
-
-def test_a_list_of_too_many_lines(tmp_path):
-    with pytest.raises(InputError, match=f"{MAX_LINES + 1} lines, required at most {MAX_LINES}"):
-        listed(tmp_path, "a.wav\n" * (MAX_LINES + 1))
+    assert listed(tmp_path, "~nobody/a.wav\n")[0].recording == str(tmp_path / "~nobody/a.wav")  # a shell knows homes
+    same = "a.wav\na.flac\n", "a.wav\nA.wav\n", "a.wav\na.wav\n", "é.wav\ne\u0301.flac\n"
+    for text, message in (
+        ("\n", "no recordings"),
+        ("file,transcript\na.wav,hello,you\n", "row 2: 3 columns, required at most the 2"),
+        ("file,transcript\na.wav,x\n,hello\n", "row 3: no recording in the column 'file'"),
+        ("a.wav\n" * (MAX_LINES + 1), f"{MAX_LINES + 1} lines, required at most {MAX_LINES}"),
+        *((text, "control characters") for text in ("a\0b.wav\n", "file,output\na.wav,x\ty\n")),
+        *((text, "rename one of them") for text in same),
+    ):
+        with pytest.raises(ExportError if text in same else InputError, match=message):
+            listed(tmp_path, text)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 import json
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
@@ -147,18 +147,13 @@ def test_words_come_from_the_lines_in_time(talk, tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("scanned")
-def test_words_without_times_are_told_to_be_of_no_use(talk, tmp_path, caplog):
+def test_cuts_divide_and_the_person_is_followed_and_words_without_times_are_of_no_use(talk, tmp_path, scanned, caplog):
     talk.with_suffix(".txt").write_text("all that is said")
-    corpus = Corpus.open(prepare(talk, tmp_path / "corpus", workers=1).corpus)
-    assert {corpus.utterance(name).words for name in corpus.names()} == {None}
-    assert "its transcript has no times" in caplog.text
-
-
-@pytest.mark.long
-def test_cuts_divide_and_the_person_is_followed(talk, tmp_path, scanned):
     scanned |= {"cuts_s": (2.4,), "person": (3.0,)}
     report = prepare(talk, tmp_path / "corpus", workers=1)
+    corpus = Corpus.open(report.corpus)
+    assert {corpus.utterance(name).words for name in corpus.names()} == {None}
+    assert "its transcript has no times" in caplog.text
     assert report.prepared[:3] == ("talk-00h00m00.68s", "talk-00h00m02.40s", "talk-00h00m05.16s")
     assert scanned["followed"] == (3.0,)
 
@@ -223,10 +218,8 @@ def joined(clips: list[Path], path: Path) -> None:
     write_video(path, images, (360, 288), samples, crf="8")
 
 
-def spans(
-    stretches: list[SpokenPart], cuts_s: list[float] | None = None, duration_s: float = 100.0
-) -> list[SpokenPart]:
-    return find_utterances(stretches, cuts_s or [], duration_s, lambda low_s, high_s: (low_s + high_s) / 2)
+def spans(stretches: list[SpokenPart], cuts_s: Sequence[float] = (), duration_s: float = 100.0) -> list[SpokenPart]:
+    return find_utterances(stretches, cuts_s, duration_s, lambda low_s, high_s: (low_s + high_s) / 2)
 
 
 def edges(found: list[SpokenPart]) -> list[tuple[float, float]]:
@@ -258,10 +251,7 @@ def test_lines_keep_their_words_and_are_never_divided():
     found = spans(lines, [4.0, 10.0])
     assert [part.words for part in found] == [("one", "two"), ("three", "four")]
     assert edges(found) == [(0.7, 7.0), (7.0, 17.3)]
-
-
-def test_lines_that_overlap_end_where_the_next_begins():
-    found = spans([SpokenPart(1, 8, ("a",)), SpokenPart(6, 16, ("b",))])
+    found = spans([SpokenPart(1, 8, ("a",)), SpokenPart(6, 16, ("b",))])  # those that overlap end where the next begins
     assert [part.words for part in found] == [("a",), ("b",)]
     assert edges(found) == [(0.7, 6.0), (6.0, 16.3)]
 
@@ -287,26 +277,15 @@ def test_any_recording():
         for part in found:
             assert not [t for t in cuts_s if part.start_s + 0.06 < t < part.end_s - 0.06]
         said_s = sum(part.duration_s for part in stretches)
-        kept_s = sum(
-            max(0.0, min(part.end_s, stretch.end_s) - max(part.start_s, stretch.start_s))
-            for part in found
-            for stretch in stretches
-        )
+        shared_s = [min(a.end_s, b.end_s) - max(a.start_s, b.start_s) for a in found for b in stretches]
+        kept_s = sum(max(0.0, each_s) for each_s in shared_s)
         assert kept_s > said_s - MIN_S * (len(stretches) + len(cuts_s))
         assert min(SHORTEST_S, said_s) <= max(part.duration_s for part in found)
 
 
 SUBTITLES = "1\n00:00:01,000 --> 00:00:02,500\nHello there.\n\n2\n00:00:04,000 --> 00:00:05,000\n- Again!\n"
-WHISPER = {
-    "segments": [
-        {
-            "start": 1.0,
-            "end": 2.0,
-            "text": " Hello you",
-            "words": [{"word": " Hello", "start": 1.0, "end": 1.4}, {"word": " you", "start": 1.5, "end": 2.0}],
-        }
-    ]
-}
+WORDS = [{"word": " Hello", "start": 1.0, "end": 1.4}, {"word": " you", "start": 1.5, "end": 2.0}]
+WHISPER = {"segments": [{"start": 1.0, "end": 2.0, "text": " Hello you", "words": WORDS}]}
 
 
 @pytest.mark.parametrize(
@@ -321,16 +300,10 @@ WHISPER = {
 )
 def test_transcripts_beside_a_video(tmp_path, name, text, expected):
     (tmp_path / name).write_text(text)
+    if name.endswith(".srt"):  # subtitles come before plain text
+        (tmp_path / "talk.txt").write_text("hello there again")
     transcript = find_transcript(tmp_path / "talk.mp4")
-    assert transcript is not None
     assert [(part.start_s, part.end_s, part.words) for part in list_spoken_lines(transcript)] == expected
-
-
-def test_subtitles_come_before_plain_text(tmp_path):
-    (tmp_path / "talk.srt").write_text(SUBTITLES)
-    (tmp_path / "talk.txt").write_text("hello there again")
-    transcript = find_transcript(tmp_path / "talk.mp4")
-    assert transcript.has_times
 
 
 def test_times_that_are_missing():
@@ -342,10 +315,8 @@ def test_times_that_are_missing():
         TranscriptLine((you,), 5.0, None),  # not known how long
     )
     found = list_spoken_lines(TimedTranscript(lines))
-    assert [(part.start_s, part.end_s, part.words) for part in found] == [
-        (1.0, 3.0, ("hello", "you")),
-        (3.0, 3.5, ("you",)),
-    ]
+    first, second = ((part.start_s, part.end_s, part.words) for part in found)
+    assert (first, second) == ((1.0, 3.0, ("hello", "you")), (3.0, 3.5, ("you",)))
 
 
 RATE_HZ = 16_000
@@ -369,15 +340,8 @@ def utterance(seed: int, late_s: float, collection: str) -> Utterance:
     samples, opening = voice(seed, late_s)
     audio = Audio(samples, RATE_HZ)
     found = Track(Motion(opening[:, None], 25.0, (Channel("opening"),)), np.ones(75, bool))
-    return Utterance(
-        f"{collection}{seed}",
-        audio,
-        features_of(audio),
-        found,
-        ("a",),
-        "train",
-        {"collection": collection, "sha256": "0"},
-    )
+    source = {"collection": collection, "sha256": "0"}
+    return Utterance(f"{collection}{seed}", audio, features_of(audio), found, ("a",), "train", source)
 
 
 @pytest.fixture
@@ -393,9 +357,12 @@ def corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Corpus:
     return made
 
 
-def test_each_collection_has_its_own(corpus):
+def test_each_collection_has_its_own_and_curves_without_lips_are_passed_over(corpus):
+    one = corpus.utterance("here0")
+    jaw = Track(Motion(np.zeros((75, 1)), 25.0, (Channel("jaw"),)), np.ones(75, bool))
+    corpus.add(replace(one, name="jaw", track=jaw))
     found = measure_offsets(corpus)
-    assert set(found.clips) == set(corpus.names())
+    assert set(found.clips) == set(corpus.names()) - {"jaw"}
     assert found.collections["there"].late_s - found.collections["here"].late_s == pytest.approx(0.12, abs=0.01)
     assert found.collections["there"].known
     assert [line.split(":")[0] for line in found.list_lines()] == ["here", "there"]
@@ -422,15 +389,12 @@ def test_sync_moves_what_is_late_once(corpus):
     assert module.move_sound(one, 0.02).source["offset_removed_ms"] == f"{1000 * late_s + 20:.1f}"
 
 
-def test_early_sound_gets_a_beginning(corpus):
+def test_early_sound_gets_a_beginning_and_labels_move_with_the_sound(corpus):
     late = corpus.utterance("here0")
     moved = module.move_sound(late, -0.1)
     assert moved.audio.duration_s == pytest.approx(late.audio.duration_s + 0.1)
     np.testing.assert_array_equal(moved.audio.samples[1600:], late.audio.samples)
     assert float(moved.source["offset_removed_ms"]) == -100
-
-
-def test_labels_move_with_the_sound(corpus):
     bounds = [0.0, 0.4, 1.2, 3.0]
     spans = tuple(Span(a, b, Unit(phone)) for (a, b), phone in zip(pairwise(bounds), ("sil", "aa", "m"), strict=True))
     for late_s, expected in ((0.5, [0.0, 0.7, 2.5]), (-0.5, [0.0, 1.7, 3.5])):
@@ -438,13 +402,6 @@ def test_labels_move_with_the_sound(corpus):
         found = list(moved.phones)
         assert [found[0].start_s, found[-1].start_s, found[-1].end_s] == pytest.approx(expected)
         assert found[-1].end_s == pytest.approx(moved.audio.duration_s)
-
-
-def test_curves_without_lips_are_passed_over(corpus):
-    one = corpus.utterance("here0")
-    jaw = Track(Motion(np.zeros((75, 1)), 25.0, (Channel("jaw"),)), np.ones(75, bool))
-    corpus.add(replace(one, name="jaw", track=jaw))
-    assert set(measure_offsets(corpus).clips) == set(corpus.names()) - {"jaw"}
 
 
 def test_lips_that_do_not_follow_are_left_alone(corpus):

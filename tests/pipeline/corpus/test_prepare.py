@@ -70,29 +70,21 @@ def test_recordings_become_a_corpus(studio, tmp_path):
     assert found.words == ("hello", "you")
     assert found.features.values.shape == (101, 39)
     assert found.track.motion.rate_hz == 25
-    assert found.source["file"] == "a.mp4"
-    assert found.source["bytes"] == "32044"
+    assert [found.source[name] for name in ("file", "bytes", "mediapipe")] == ["a.mp4", "32044", "0"]
     assert len(found.source["sha256"]) == 64
-    assert found.source["mediapipe"] == "0"
 
 
-@pytest.mark.usefixtures("tracked")
-def test_remarks_on_a_video_are_reported_and_kept(studio, tmp_path):
+def test_what_is_up_to_date_is_kept_and_so_are_remarks(studio, tmp_path, tracked):
     write_noise(studio / "cut.mp4", seed=9)
-    for _ in range(2):  # prepared, then kept
-        report = prepare(studio, tmp_path / "corpus", workers=1)
-        assert report.notes == {"cut": ("cut at 0.50 s",)}
-    assert Corpus.open(report.corpus).utterance("cut").track.notes == ("cut at 0.50 s",)
-
-
-def test_what_is_up_to_date_is_kept(studio, tmp_path, tracked):
-    prepare(studio, tmp_path / "corpus", workers=1)
+    assert prepare(studio, tmp_path / "corpus", workers=1).notes == {"cut": ("cut at 0.50 s",)}
     before = content(tmp_path / "corpus")
     report = prepare(studio, tmp_path / "corpus", workers=1)
-    assert (report.prepared, report.kept) == ((), ("a", "b", "c"))
-    assert report.unseen == {"a": 2, "b": 2, "c": 2}
-    assert tracked == ["a", "b", "c"]
+    assert (report.prepared, report.kept) == ((), ("a", "b", "c", "cut"))
+    assert report.unseen == {"a": 2, "b": 2, "c": 2, "cut": 2}
+    assert report.notes == {"cut": ("cut at 0.50 s",)}
+    assert tracked == ["a", "b", "c", "cut"]
     assert content(tmp_path / "corpus") == before
+    assert Corpus.open(report.corpus).utterance("cut").track.notes == ("cut at 0.50 s",)
 
 
 @pytest.mark.usefixtures("tracked")
@@ -139,9 +131,8 @@ def test_utterances_of_recordings_that_are_gone_are_named(studio, tmp_path, capl
     (studio / "a.mp4").unlink()
     (studio / "c.mp4").write_bytes(b"")
     assert prepare(studio, tmp_path / "corpus", workers=1).kept == ("b",)
-    assert (
-        "2 utterances are from recordings that are no longer there, or cannot be used any longer: a, c;" in caplog.text
-    )
+    assert "2 utterances are from recordings that are no longer there, or cannot be used" in caplog.text
+    assert "any longer: a, c;" in caplog.text
 
 
 def test_missing_packages_are_reported_at_once(studio, tmp_path, monkeypatch):
@@ -302,10 +293,8 @@ def test_counts_and_shares(tmp_path):
     assert (phones.needed, phones.covered) == (5, 3)
     assert phones.share == pytest.approx(8 / 12)
     assert [(unit.unit, unit.count) for unit in phones.missing] == [("iy", 2), ("t", 2)]
-    assert [(unit.unit, unit.count) for unit in diphones.missing] == [
-        *[("iy-b", 2), ("t-iy", 2)],
-        *[("b-t", 1), ("sil-t", 1)],
-    ]
+    assert [(unit.unit, unit.count) for unit in diphones.missing[:2]] == [("iy-b", 2), ("t-iy", 2)]
+    assert [(unit.unit, unit.count) for unit in diphones.missing[2:]] == [("b-t", 1), ("sil-t", 1)]
     assert (diphones.needed, diphones.covered) == (8, 4)
     assert diphones.share == pytest.approx(1 - 6 / 15)
     assert diphones.missing[0].share == pytest.approx(2 / 15)
@@ -376,10 +365,8 @@ def test_text_is_bounded_and_json_holds_everything(tmp_path):
     lines = list(format_coverage(found, 5))
     assert len(lines) == 4 + 3 * (2 + 5 + 1)
     assert max(map(len, lines)) < 80
-    missing = [len(kind.missing) - 5 for kind in found.kinds]
-    assert [line for line in lines if line.startswith("and ")] == [
-        f"and {count} more {kind.kind}" for count, kind in zip(missing, found.kinds, strict=True)
-    ]
+    more = [f"and {len(kind.missing) - 5} more {kind.kind}" for kind in found.kinds]
+    assert [line for line in lines if line.startswith("and ")] == more
     document = json.loads(json.dumps(coverage_to_json(found)))
     assert [len(kind["missing"]) for kind in document["kinds"]] == [len(kind.missing) for kind in found.kinds]
     assert set(document["kinds"][0]["missing"][0]) == {"unit", "count", "share", "stand_in", "recorded"}

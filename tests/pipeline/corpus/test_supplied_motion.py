@@ -1,4 +1,5 @@
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -115,6 +116,9 @@ def test_silence_is_named_as_recognition_names_it():
         *[(1.0, 1.2, "b"), (1.2, 1.3, "sil")],
     )
     assert supplied.read_supplied_phones(recording(None), 1.3) is None
+    with pytest.raises(InputError, match="are they those of another recording"):  # that go on after the sound
+        supplied.read_supplied_phones(recording(said((0, 2, "aa"))), 1.8)
+    assert supplied.read_supplied_phones(recording(said((0, 2, "aa"))), 1.95) == said((0, 1.95, "aa"))
     assert "phones_sha256" not in supplied.digest_sources(recording(None))
 
 
@@ -130,18 +134,10 @@ def test_phones_tile_the_sound(phones, begin_s, longer_s):
     found = supplied.read_supplied_phones(recording(labelled), duration_s)
     assert found[0].start_s == 0
     assert found[-1].end_s == pytest.approx(duration_s)
-    assert all(a.end_s == b.start_s for a, b in zip(found, found.spans[1:], strict=False))
-    assert not any(
-        is_silent(a.label.phone) and is_silent(b.label.phone) for a, b in zip(found, found.spans[1:], strict=False)
-    )
+    assert all(a.end_s == b.start_s for a, b in pairwise(found))
+    assert not any(is_silent(a.label.phone) and is_silent(b.label.phone) for a, b in pairwise(found))
     spoken = [s.label.phone for s in labelled if not is_silent(s.label.phone) and s.start_s < duration_s]
     assert [s.label.phone for s in found if not is_silent(s.label.phone)] == spoken
-
-
-def test_labels_that_go_on_after_the_sound():
-    with pytest.raises(InputError, match="are they those of another recording"):
-        supplied.read_supplied_phones(recording(said((0, 2, "aa"))), 1.8)
-    assert supplied.read_supplied_phones(recording(said((0, 2, "aa"))), 1.95) == said((0, 1.95, "aa"))
 
 
 def test_a_source_is_not_touched(studio):
@@ -226,11 +222,9 @@ def test_the_recorders_sound_is_used_from_the_right_moment(recorded_twice_folder
 
 
 def test_a_long_video_gets_the_recorders_sound_in_its_own_time(recorded_twice_folder):
-    recording = SourceRecording(
-        "take", recorded_twice_folder / "take.wav", None, recorder=recorded_twice_folder / "take.recorder.wav"
-    )
-    own, sound = read_sound(recorded_twice_folder / "take.wav"), supplied.separate_sound(recording)
-    assert sound is not None
+    video, recorder = (recorded_twice_folder / name for name in ("take.wav", "take.recorder.wav"))
+    recording = SourceRecording("take", video, None, recorder=recorder)
+    own, sound = read_sound(video), supplied.separate_sound(recording)
     placed = supplied.align_sound(sound, own.duration_s)
     assert len(placed.samples) == len(own.samples)
     assert np.abs(placed.samples).argmax() == pytest.approx(np.abs(own.samples).argmax(), abs=40)
@@ -254,21 +248,17 @@ def test_a_given_offset_is_used(recorded_twice_folder, tmp_path):
     assert early.phones[0].end_s == pytest.approx(1.0)
 
 
-def test_motion_of_another_length_needs_an_offset(recorded_twice_folder, tmp_path):
+def test_motion_of_another_length_needs_an_offset_and_what_is_not_clear_is_listed(recorded_twice_folder, tmp_path):
+    other = Audio(speech_like(np.random.default_rng(9), 5.0).astype(np.float32), RATE_HZ)
+    write_sound(recorded_twice_folder / "take.recorder.wav", other)
+    with pytest.raises(CorpusError, match=r"take\.recorder\.wav: the offset of the two sounds is not clear"):
+        prepare(recorded_twice_folder, tmp_path / "corpus", workers=1)
     (recorded_twice_folder / "take.recorder.wav").unlink()
     write_ramp(recorded_twice_folder / "take.npz", 3.0)
     with pytest.raises(CorpusError, match="required: the same time from the same start"):
         prepare(recorded_twice_folder, tmp_path / "corpus", workers=1)
     prepare(recorded_twice_folder, tmp_path / "corpus", offset_ms=1000, workers=1)
     assert Corpus.open(tmp_path / "corpus").utterance("take").audio.duration_s == pytest.approx(3.0, abs=0.02)
-
-
-def test_what_is_not_clear_is_listed(recorded_twice_folder, tmp_path):
-    chance = np.random.default_rng(9)
-    other = Audio(speech_like(chance, 5.0).astype(np.float32), RATE_HZ)
-    write_sound(recorded_twice_folder / "take.recorder.wav", other)
-    with pytest.raises(CorpusError, match=r"take\.recorder\.wav: the offset of the two sounds is not clear"):
-        prepare(recorded_twice_folder, tmp_path / "corpus", workers=1)
 
 
 def ramp_track(frames: int) -> Track:
@@ -312,6 +302,10 @@ def write_sentence(folder: Path, person: str, sentence: str) -> np.ndarray:
 
 
 def test_vocaset_becomes_a_corpus_of_lip_distances(tmp_path):
+    (tmp_path / "audio" / "anna").mkdir(parents=True)
+    for name in ("a.wav", "a.csv"):
+        (tmp_path / "audio" / "anna" / name).touch()
+    assert discover(tmp_path).kind == "folder of sounds with motion"  # only the two folders are VOCASET
     for person in ("FaceTalk_170725_00137_TA", "FaceTalk_170728_03272_TA"):
         jaw = write_sentence(tmp_path / "voca", person, "sentence01")
     (tmp_path / "voca/audio/FaceTalk_170725_00137_TA/sentence01.txt").write_text("Hello there.")
@@ -322,12 +316,8 @@ def test_vocaset_becomes_a_corpus_of_lip_distances(tmp_path):
     corpus = Corpus.open(tmp_path / "corpus")
     assert list(corpus.speakers) == ["FaceTalk_170725_00137_TA", "FaceTalk_170728_03272_TA"]
     said = corpus.utterance(report.prepared[0])
-    assert (said.words, said.track.motion.rate_hz, said.source["licence"][:8]) == (
-        ("hello", "there"),
-        MESH_HZ,
-        "research",
-    )
     motion = said.track.motion
+    assert (said.words, motion.rate_hz, said.source["licence"][:8]) == (("hello", "there"), MESH_HZ, "research")
     np.testing.assert_allclose(motion["opening"], (1 + jaw) / 90, atol=1e-6)
     np.testing.assert_allclose(motion["outer"], (16 + jaw) / 90, atol=1e-6)
     np.testing.assert_allclose(motion["width"], 46 / 90, atol=1e-6)
@@ -371,10 +361,3 @@ def test_other_meshes_are_refused(tmp_path):
         (tmp_path / "a.1.ply").write_bytes(content)
         with pytest.raises(InputError, match=message):
             read_mesh_motion(tmp_path / "a.1.ply", MESH_HZ)
-
-
-def test_only_the_two_folders_are_vocaset(tmp_path):
-    (tmp_path / "audio" / "anna").mkdir(parents=True)
-    (tmp_path / "audio" / "anna" / "a.wav").touch()
-    (tmp_path / "audio" / "anna" / "a.csv").touch()
-    assert discover(tmp_path).kind == "folder of sounds with motion"

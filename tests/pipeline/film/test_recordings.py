@@ -5,7 +5,6 @@ import pytest
 
 from cli.conftest import here, run
 from lipmotion import Request, animate, load_face
-from lipmotion.types import Motion
 from lipmotion_faces.film.filmed_video import make_film, write_film
 from lipmotion_faces.tracking.track import track
 from pipeline.made import read_sound
@@ -46,9 +45,7 @@ def opening_in(video: Path, rate_hz: float = 25.0) -> np.ndarray:
     """Return the opening that a tracker finds, a value a frame."""
     tracked = track(video, crops=False)
     assert tracked.seen.mean() > 0.95
-    return np.asarray(
-        Motion(tracked.motion.values, tracked.motion.rate_hz, tracked.motion.channels).resampled(rate_hz)["opening"]
-    )
+    return np.asarray(tracked.motion.resampled(rate_hz)["opening"])
 
 
 def likeness(first: np.ndarray, second: np.ndarray) -> float:

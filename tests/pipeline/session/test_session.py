@@ -51,14 +51,13 @@ def test_a_session_gives_what_one_pass_gives(session, request_, toy_model):
     place = phones(session.units()).index("iy") + 1
     edits = edited(f"phone {place} is aa", "pin opening 0.05 at 1.0")
     session.generate(edited("remove phone 3"))
-    for found in (session.generate(edits), animate(request_, model=toy_model, edits=edits)):
-        assert found.units[place - 1].label.phone == "aa"
-        assert np.array_equal(found.motion.values, session.generate(edits).motion.values)
-        assert np.array_equal(found.variance, session.generate(edits).variance)
-    given = replace(request_, transcript=None, units=session.units(edits))
-    assert animate(given, model=toy_model, edits=edited("pin opening 0.05 at 1.0")).motion.values == pytest.approx(
-        session.generate(edits).motion.values, abs=1e-6
-    )
+    first, second = session.generate(edits), animate(request_, model=toy_model, edits=edits)
+    assert first.units[place - 1].label.phone == second.units[place - 1].label.phone == "aa"
+    assert np.array_equal(first.motion.values, second.motion.values)
+    assert np.array_equal(first.variance, second.variance)
+    known = replace(request_, transcript=None, units=session.units(edits))
+    again = animate(known, model=toy_model, edits=edited("pin opening 0.05 at 1.0"))
+    assert again.motion.values == pytest.approx(first.motion.values, abs=1e-6)
     assert np.array_equal(session.generate().motion.values, animate(request_, model=toy_model).motion.values)
 
 
@@ -115,6 +114,8 @@ def test_edits_of_phones(session):
     numbered = session.units(edited("remove phone 3", "phone 3 is b"))  # numbers are those after the edits before
     assert numbered[2].label.phone == "b"
     assert all(a.end_s == pytest.approx(b.start_s) for a, b in zip(more.spans, more.spans[1:], strict=False))
+    many = edited(*(f"phone {2 + n % 3} is {'pbm'[n % 3]}" for n in range(1200)))  # no deeper than one
+    assert phones(session.units(many))[1:4] == ["p", "b", "m"]
 
 
 def test_another_word_is_aligned_where_it_was(session):
@@ -167,16 +168,10 @@ def test_what_is_drawn_and_held_is_so_and_the_rest_joins_smoothly(session):
         session.generate(edited("draw jaw 0 1 from 1.5 to 1.6"))
 
 
-def test_a_thousand_edits_of_phones_are_no_deeper_than_one(session):
-    edits = Edits().then(*(f"phone {2 + n % 3} is {'pbm'[n % 3]}" for n in range(1200)))
-    assert phones(session.units(edits))[1:4] == ["p", "b", "m"]
-
-
 @pytest.mark.long
 def test_pins_hold_for_channels_and_curves(session, tmp_path):
-    edits = edited(
-        "pin opening 0.1 at 0.8", "pin jawOpen 0.7 at 1.2", "gain 1.5 from 0.5 to 1.0", "pin viseme_PP 0.4 at 1.5"
-    )
+    pins = ("pin opening 0.1 at 0.8", "pin jawOpen 0.7 at 1.2", "pin viseme_PP 0.4 at 1.5")
+    edits = edited(*pins, "gain 1.5 from 0.5 to 1.0")
     found = session.generate(edits)
     assert found.motion["opening"][80] == pytest.approx(0.1, abs=1e-9)
     arkit = make_curves(found.motion, found.units, "arkit", edits=found.curve_edits)
@@ -186,10 +181,9 @@ def test_pins_hold_for_channels_and_curves(session, tmp_path):
     write(found, tmp_path / "a.csv", curves="visemes")
     rows = np.genfromtxt(tmp_path / "a.csv", delimiter=",", names=True)
     assert rows["viseme_PP"][150] == pytest.approx(0.4)
-    later = session.deliver(edits.then("set offset_ms 500"))
-    assert make_curves(later.motion, later.units, "arkit", edits=later.curve_edits)["jawOpen"][170] == pytest.approx(
-        0.7
-    )
+    late = session.deliver(edits.then("set offset_ms 500"))
+    arkit = make_curves(late.motion, late.units, "arkit", edits=late.curve_edits)
+    assert arkit["jawOpen"][170] == pytest.approx(0.7)
 
 
 def test_pins_that_are_close_together_all_hold(session):
@@ -229,6 +223,10 @@ def test_a_locked_span_stays_as_it_was(session):
             session.generate(first.then(refused))
     freed = session.generate(later.then("unlock from 0.6 to 1.0", "pin opening 0.2 at 0.7"))
     assert freed.motion["opening"][70] == pytest.approx(0.2)
+    spoken = session.generate(edited("pin tongue 0.5 at 1.5")).motion["tongue"]  # a channel that is added later
+    locked = session.generate(edited("lock from 0.6 to 1.0", "pin tongue 0.5 at 1.5")).motion["tongue"]
+    assert np.allclose(locked, spoken)
+    assert locked[150] == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("curve", ["opening", "tongue"])
@@ -240,17 +238,9 @@ def test_a_pin_has_a_slope_and_can_be_taken_out(session, curve):
     assert np.array_equal(left.values, session.generate(edited(f"pin {curve} 0.1 at 1.5")).motion.values)
 
 
-def test_a_locked_span_keeps_channels_that_are_added_later(session):
-    spoken = session.generate(edited("pin tongue 0.5 at 1.5"))
-    locked = session.generate(edited("lock from 0.6 to 1.0", "pin tongue 0.5 at 1.5"))
-    assert np.allclose(locked.motion["tongue"], spoken.motion["tongue"])
-    assert locked.motion["tongue"][150] == pytest.approx(0.5)
-
-
 def test_many_locks_take_the_motion_once_each(counted, counting):
-    steps = [
-        each for n in range(12) for each in (f"pin opening 0.1 at {n / 10}", f"lock from {n / 10} to {n / 10 + 0.02}")
-    ]
+    times = [(n / 10, n / 10 + 0.02) for n in range(12)]
+    steps = [step for a, b in times for step in (f"pin opening 0.1 at {a}", f"lock from {a} to {b}")]
     counted.generate(edited(*steps))
     assert 12 <= len(counting.engine.made_s) <= 14  # of every pin once
     counted.generate(edited(*steps, "gain 1.5 from 1.5 to 1.6"))
@@ -318,15 +308,16 @@ def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model, toy_senten
     """Each alone and both at once give the same bits; the matrix products of one do not change those of the other."""
     requests = [Request(toy_sentence.audio, " ".join(toy_sentence.words)), Request(toy_sentence.audio)]
     edits = [edited("phone 3 is p"), edited("pin opening 0.05 at 1.0")]
-    alone = [
-        Session(request, model=toy_model).generate(edit).motion.values
-        for request, edit in zip(requests, edits, strict=True)
-    ]
     both = Barrier(2)
+
+    def generate(number: int) -> np.ndarray:
+        return Session(requests[number], model=toy_model).generate(edits[number]).motion.values
 
     def work(number: int) -> list[np.ndarray]:
         both.wait(60)
-        return [Session(requests[number], model=toy_model).generate(edits[number]).motion.values for _ in range(3)]
+        return [generate(number) for _ in range(3)]
+
+    alone = [generate(number) for number in range(2)]
 
     with ThreadPoolExecutor(2) as pool:
         for number, found in enumerate(pool.map(work, range(2))):
@@ -453,9 +444,6 @@ def test_delivery_and_staging_are_set_where_nothing_else_is_asked_for():
     assert edits.delivery() == Delivery(intensity=1.3, stepped=True)
     assert edits.delivery(Delivery(intensity=2.0)).intensity == 2.0
     assert edits.staging() == Staging(size=360)
-
-
-def test_moods_are_added_to_those_that_are_asked_for():
     edits = Edits().then("mood sad at 2.0", "mood happy:0.7 at 1.0", "mood angry at 2.0")
     assert edits.delivery().mood == "happy:0.7 at 1, angry at 2"
     assert edits.delivery(Delivery(mood="tired")).mood == "tired at 0, happy:0.7 at 1, angry at 2"
@@ -467,13 +455,8 @@ def test_what_is_written_is_read_again(tmp_path, suffix):
     path = tmp_path / f"a.edits{suffix}"
     spans = (Span(0.0, 0.3, Unit("sil")), Span(0.3, 1 / 3 + 0.1, Unit("p", "sil-p+l", 'pl"ease', confidence=0.25)))
     outlook = Outlook("words", 0.5, None, 30.5, ("a \\ transcript",))
-    file = EditFile(
-        Edits().then(*SENTENCES),
-        Request(tmp_path / "in" / "a b.wav", pauses="natural"),
-        Timeline(spans),
-        outlook,
-        sha256="ab",
-    )
+    named = Request(tmp_path / "in" / "a b.wav", pauses="natural")
+    file = EditFile(Edits().then(*SENTENCES), named, Timeline(spans), outlook, sha256="ab")
     write_edits(file, path)
     if suffix == ".toml" and sys.version_info < (3, 11):
         with pytest.raises(InputError, match=r"read by Python 3\.11"):

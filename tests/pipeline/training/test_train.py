@@ -1,6 +1,6 @@
 import logging
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,7 +26,7 @@ from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
 from lipmotion_lab.evaluation.table import format_figures
 from pipeline import made
-from pipeline.made import recogniser_of
+from pipeline.made import corpus_of, recogniser_of
 from testing.toy import SMALL, toy_sentences, toy_utterances
 
 JOINT = engine_named("joint", {})
@@ -37,14 +37,10 @@ def some(corpus: Corpus, count: int = 5) -> list[Utterance]:
     return [corpus.utterance(name) for name in corpus.names("train")[:count]]
 
 
-def corpus_of(utterances: Iterable[Utterance], folder: Path) -> Corpus:
-    return made.corpus_of(folder / "corpus", utterances)
-
-
 @pytest.mark.long
 def test_other_lists_all_and_given_names(toy_corpus, tmp_path):
     assert train(toy_corpus, selection=Selection("val"), recogniser=SMALL, engine=JOINT)[1].used == ("toy08", "toy09")
-    few = corpus_of([toy_corpus.utterance(name) for name in ("toy10", "toy02", "toy03")], tmp_path)
+    few = corpus_of(tmp_path, [toy_corpus.utterance(name) for name in ("toy10", "toy02", "toy03")])
     for selection, used, split in (
         (Selection(None), ("toy02", "toy03", "toy10"), "all"),
         (Selection(names=("toy10", "toy02")), ("toy10", "toy02"), "given names"),
@@ -61,7 +57,7 @@ def test_other_lists_all_and_given_names(toy_corpus, tmp_path):
 def test_untranscribed_utterances_are_recognised_and_used(toy_corpus, tmp_path, caplog):
     utterances = some(toy_corpus, 8)
     utterances[5] = replace(utterances[5], words=None)
-    mixed = corpus_of(utterances, tmp_path)
+    mixed = corpus_of(tmp_path, utterances)
     model, report = train(mixed, recogniser=SMALL, engine=JOINT)
     assert report.used == TRAINED
     assert "1 of 8 recordings have no words: their phones are recognised" in caplog.text
@@ -82,7 +78,7 @@ def test_labelled_phones_are_used_as_they_are(toy_corpus, toy_model, tmp_path):
     """Nothing is aligned, no transcript is needed, and phone models are trained on what is labelled."""
     given = [labelled(utterance) for utterance in some(toy_corpus, 8)]
     given[0] = replace(given[0], words=("not", "what", "is", "said"))
-    model, report = train(corpus_of(given, tmp_path), recogniser=SMALL, engine=JOINT)
+    model, report = train(corpus_of(tmp_path, given), recogniser=SMALL, engine=JOINT)
     assert report.used == TRAINED
     assert report.skipped == {}
     assert set(model.phones.table.units) == set(toy_model.phones.table.units)
@@ -94,7 +90,7 @@ def test_a_transcript_that_does_not_fit_is_skipped_and_reported(toy_corpus, tmp_
     utterances = some(toy_corpus)
     utterances[1] = replace(utterances[1], words=("five",) * 100)
     utterances[2] = replace(utterances[2], words=("mama", "日本"))
-    model, report = train(corpus_of(utterances, tmp_path), recogniser=SMALL, engine=JOINT)
+    model, report = train(corpus_of(tmp_path, utterances), recogniser=SMALL, engine=JOINT)
     assert report.used == ("toy00", "toy03", "toy04")
     assert set(report.skipped) == {"toy01", "toy02"}
     assert "too short" in report.skipped["toy01"]
@@ -104,7 +100,7 @@ def test_a_transcript_that_does_not_fit_is_skipped_and_reported(toy_corpus, tmp_
 
 @pytest.mark.long
 def test_without_any_transcript_the_shipped_phones_are_used(toy_corpus, tmp_path, caplog):
-    silent = corpus_of([replace(utterance, words=None) for utterance in some(toy_corpus)], tmp_path)
+    silent = corpus_of(tmp_path, [replace(utterance, words=None) for utterance in some(toy_corpus)])
     model, report = train(silent, recogniser=SMALL, engine=JOINT)
     assert model.phones.mixtures is load_model().phones.mixtures
     assert not np.array_equal(model.phones.speaker, load_model().phones.speaker)  # whose voice it is, is learned
@@ -116,12 +112,8 @@ def test_without_any_transcript_the_shipped_phones_are_used(toy_corpus, tmp_path
 def test_guessed_words_are_reported(toy_corpus, tmp_path, caplog):
     names = {"papa": "pahpa", "mama": "mahma"}
     utterances = [replace(u, words=tuple(names.get(w, w) for w in u.words or ())) for u in some(toy_corpus, 4)]
-    train(
-        corpus_of(utterances, tmp_path),
-        recogniser=SMALL,
-        engine=JOINT,
-        lexicon=Lexicon({"mahma": (("m", "aa", "m", "ax"),)}),
-    )
+    lexicon = Lexicon({"mahma": (("m", "aa", "m", "ax"),)})
+    train(corpus_of(tmp_path, utterances), recogniser=SMALL, engine=JOINT, lexicon=lexicon)
     assert [record.getMessage().split()[0] for record in caplog.records] == ["'pahpa'"]
 
 
@@ -136,10 +128,12 @@ def test_licence_and_attribution_go_with_the_model(toy_corpus):
     assert about["minutes"] == pytest.approx(0.2, abs=0.05)
 
 
-def test_nothing_usable(toy_corpus, tmp_path):
-    wrong = corpus_of([replace(u, words=("five",) * 100) for u in some(toy_corpus, 2)], tmp_path)
+def test_nothing_usable_and_voices_for_engines_that_have_no_use_for_them(toy_corpus, tmp_path):
+    wrong = corpus_of(tmp_path, [replace(u, words=("five",) * 100) for u in some(toy_corpus, 2)])
     with pytest.raises(CorpusError, match="none of 2 utterances has a transcript that fits"):
         train(wrong, recogniser=SMALL)
+    with pytest.raises(InputError, match="the engine 'joint' does not learn from other voices"):
+        train(toy_corpus, engine=JOINT, voices=others())
 
 
 def others() -> Iterator[SpokenSentence]:
@@ -154,9 +148,8 @@ def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus):
     plain = {"states": 1, "asynchrony": 0, "mixtures": 1, "acoustic_regression": False, "variance_scaling": False}
     engine = engine_named("coupled", plain | {"speech_only_mixtures": 1})
     chosen = {"selection": Selection(names=TRAINED[:4]), "recogniser": SMALL, "engine": engine}
-    model, report = train(
-        toy_corpus, **chosen, voices=others(), run=Run(monitor=lambda event: stages.append(event.stage))
-    )
+    run = Run(monitor=lambda event: stages.append(event.stage))
+    model, report = train(toy_corpus, **chosen, voices=others(), run=run)
     alone, _ = train(toy_corpus, **chosen)
     assert model.about["voices"] == ["anna", "bert"]
     assert model.about["utterances"] == 4
@@ -166,11 +159,6 @@ def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus):
     speech, lips = ([one.learned.chains.groups[group].mixtures.means for one in (model, alone)] for group in (0, 1))
     assert np.abs(speech[0] - speech[1]).max() > 0.1
     assert lips[0].tobytes() == lips[1].tobytes()
-
-
-def test_other_engines_have_no_use_for_voices(toy_corpus):
-    with pytest.raises(InputError, match="the engine 'joint' does not learn from other voices"):
-        train(toy_corpus, engine=engine_named("joint", {}), voices=others())
 
 
 @pytest.mark.long
@@ -224,24 +212,20 @@ def test_training_names_the_transcripts_of_something_else_and_what_has_none(tmp_
     assert wrong.startswith("1 of 6 transcripts seem not to be what is said (toy02): the model learns wrong lips")
 
 
-def test_right_transcripts_are_not_named(right_transcripts, caplog):
-    warn_of_doubtful_transcripts(right_transcripts)
-    warn_of_missing_transcripts([utterance for utterance, _ in right_transcripts])
-    assert not caplog.records
-
-
 def half_of(units: Timeline[Unit]) -> Timeline[Unit]:
     """Return the first phones, and silence in the place of the others."""
     return Timeline((*units[:3], Span(units[3].start_s, units[-1].end_s, Unit("sil"))))
 
 
 def test_words_that_are_left_out(right_transcripts, caplog):
-    """Half of the sentence stands as silence."""
+    """Half of the sentence stands as silence; right transcripts are not named."""
+    warn_of_doubtful_transcripts(right_transcripts)
+    warn_of_missing_transcripts([utterance for utterance, _ in right_transcripts])
+    assert not caplog.records
     utterance, units = right_transcripts[0]
     warn_of_doubtful_transcripts([(utterance, half_of(units))])
-    assert [text[:62] for text in messages(caplog)] == [
-        "1 of 1 transcripts seem to leave out words that are said (toy0"
-    ]
+    (text,) = messages(caplog)
+    assert text.startswith("1 of 1 transcripts seem to leave out words that are said (toy0")
 
 
 def test_labelled_phones_are_believed_and_of_two_alignments_the_better_one_counts(right_transcripts, caplog):
@@ -263,9 +247,8 @@ def test_without_general_models_nothing_is_measured(right_transcripts, caplog, m
 
 def test_only_some_are_named(right_transcripts, caplog):
     named = right_transcripts[0][0]
-    many = [
-        replace(named, name=f"take{number:02d}", words=None, phones=None) for number in range(MAX_NAMED_RECORDINGS + 4)
-    ]
+    names = [f"take{number:02d}" for number in range(MAX_NAMED_RECORDINGS + 4)]
+    many = [replace(named, name=name, words=None, phones=None) for name in names]
     warn_of_missing_transcripts([named, *many])
     (text,) = messages(caplog)
     assert "14 of 15 recordings" in text
@@ -310,9 +293,8 @@ def test_pictures_are_taken_evenly_from_the_frames_that_are_seen(utterances):
 
 
 def test_an_utterance_that_was_never_seen_gives_no_picture(utterances):
-    hidden = replace(
-        utterances[1], track=replace(utterances[1].track, seen=np.zeros(len(utterances[1].track.seen), bool))
-    )
+    track = utterances[1].track
+    hidden = replace(utterances[1], track=replace(track, seen=np.zeros_like(track.seen)))
     some = train_eigenlips([utterances[0], hidden, utterances[2]], 3)
     assert np.array_equal(some.basis, train_eigenlips([utterances[0], utterances[2]], 3).basis)
     with pytest.raises(CorpusError, match="no face is seen in 1 utterances; prepare a corpus of videos with faces"):
@@ -383,9 +365,8 @@ def test_figures_of_pictures(models, toy_corpus):
 @pytest.mark.long
 def test_figures_of_both(models, toy_model, toy_corpus):
     """The eigenlips stand apart: figures of the lip distances are of these alone."""
-    figures, plain = (
-        evaluate(model, toy_corpus, recogniser="own") for model in (load_model(models["both"]), toy_model)
-    )
+    both = load_model(models["both"])
+    figures, plain = (evaluate(model, toy_corpus, recogniser="own") for model in (both, toy_model))
     assert figures["closed_under"] == plain["closed_under"]
     for name, condition in figures["conditions"].items():
         assert set(condition) == set(plain["conditions"][name]) | {"eigenlips"}
@@ -396,17 +377,12 @@ def test_figures_of_both(models, toy_model, toy_corpus):
         assert condition["eigenlips"]["amse"] > 10  # grey levels
         assert condition["leading"] == "opening"
     assert "AMSE of the eigenlips" in format_figures(figures)
-
-
-@pytest.mark.long
-def test_originals_are_the_projected_pictures(models, toy_corpus):
-    model = load_model(models["both"])
-    found = load_held_out(toy_corpus, recogniser_of(model), visual=model.visual, eigenlips=model.eigenlips)
-    assert found.channels == ("opening", "width", "outer", *(channel.name for channel in model.eigenlips.channels))
-    made = generate_clips(found, "with transcript", model.engine, model.learned)
+    held_out = load_held_out(toy_corpus, recogniser_of(both), visual=both.visual, eigenlips=both.eigenlips)
+    assert held_out.channels == ("opening", "width", "outer", *(channel.name for channel in both.eigenlips.channels))
+    made = generate_clips(held_out, "with transcript", both.engine, both.learned)
     for clip, name in zip(made, toy_corpus.names("test"), strict=True):
         images = crops([toy_corpus.utterance(name)])[0]
-        assert np.array_equal(clip.original[:, 3:], model.eigenlips.project(images))
+        assert np.array_equal(clip.original[:, 3:], both.eigenlips.project(images))  # the projected pictures
 
 
 @pytest.mark.long

@@ -33,9 +33,11 @@ def test_voices_are_listed() -> None:
 
 
 @pytest.mark.usefixtures("faked")
-def test_a_voice_says_phones_in_time() -> None:
+def test_a_voice_says_phones_in_time_and_any_letters_reach_it() -> None:
+    lexicon = Lexicon({"helló": (("hh", "ax", "l", "ow"),)})
     for voice in EACH:
-        audio, units = next(installed.speak_sentences(["Hello"], voice))
+        assert len(list(installed.speak_sentences(HARD, voice, lexicon))) == len(HARD)
+        audio, units, _ = next(installed.speak_sentences(["Hello"], voice))
         assert audio.rate_hz == 16_000
         assert audio.duration_s == pytest.approx(1.0)
         found = [(span.label.phone, span.label.word, round(span.start_s, 6)) for span in units]
@@ -45,31 +47,17 @@ def test_a_voice_says_phones_in_time() -> None:
         ]  # fmt: skip
 
 
-@pytest.mark.parametrize("voice", EACH)
-@pytest.mark.usefixtures("faked")
-def test_any_letters_reach_the_synthesiser(voice: synthesiser.SyntheticVoice) -> None:
-    lexicon = Lexicon({"helló": (("hh", "ax", "l", "ow"),)})
-    assert len(list(installed.speak_sentences(HARD, voice, lexicon))) == len(HARD)
-
-
-@pytest.mark.parametrize("voice", EACH)
-def test_errors_are_clear_and_nothing_stays(faked: Path, voice: synthesiser.SyntheticVoice) -> None:
-    for text, message in (("they crash", "failed with 1 .no such sound"), ("nonsense", "nonsense")):
+def test_errors_are_clear_and_nothing_stays_even_if_not_all_is_read(faked: Path) -> None:
+    for voice, text, message in (
+        *((voice, "they crash", "failed with 1 .no such sound") for voice in EACH),
+        *((voice, "nonsense", "nonsense") for voice in EACH),
+        (FAKED[0], "no bytes", "cannot be run|nonsense"),
+        (FAKED[0], "... ", "holds no word"),
+        (FAKED[2], "stop here", "0 of 1 sentences"),
+    ):
         with pytest.raises(errors.InputError, match=message):
-            next(installed.speak_sentences([text], voice))
+            list(installed.speak_sentences([text], voice))
         assert list(faked.iterdir()) == []
-
-
-def test_what_is_no_text_or_has_no_words_is_refused_and_what_festival_leaves_out_is_missed(faked: Path) -> None:
-    for text, message in (("no bytes", "cannot be run|nonsense"), ("... ", "holds no word")):
-        with pytest.raises(errors.InputError, match=message):
-            next(installed.speak_sentences([text], FAKED[0]))
-    with pytest.raises(errors.InputError, match="1 of 2 sentences"):
-        list(installed.speak_sentences(["hello", "stop here"], FAKED[2]))
-    assert list(faked.iterdir()) == []
-
-
-def test_temporary_files_go_even_if_not_all_is_read(faked: Path) -> None:
     said = installed.speak_sentences(["hello", "hello"], FAKED[0])
     next(said)
     assert len(list(faked.iterdir())) == 1
@@ -132,7 +120,7 @@ def test_a_synthesiser_that_does_not_work_is_left_out(faked: Path, caplog: pytes
 
 @pytest.mark.usefixtures("faked")
 def test_a_sound_is_there_until_the_next() -> None:
-    with closing(installed.voice_sentences(["hello", "hello"], FAKED[0])) as said:
+    with closing(installed.speak_sentences(["hello", "hello"], FAKED[0])) as said:
         first = next(said)
         assert first.own_sound().rate_hz == 16_000
         list(said)
@@ -163,7 +151,7 @@ TEXTS = ["Please put both blue bowls on the table.", "The judge measured the bei
 
 def test_real_voices_say_what_the_dictionary_says(real: synthesiser.SyntheticVoice) -> None:
     lexicon = Lexicon()
-    for text, (audio, units) in zip(TEXTS[:2], installed.speak_sentences(TEXTS[:2], real), strict=True):
+    for text, (audio, units, _) in zip(TEXTS[:2], installed.speak_sentences(TEXTS[:2], real), strict=True):
         words = split_words(text)
         assert [span.label.word for span in units if not is_silent(span.label.phone)] != []
         assert list(dict.fromkeys(span.label.word for span in units if span.label.word)) == list(dict.fromkeys(words))
@@ -178,7 +166,7 @@ def test_real_voices_say_what_the_dictionary_says(real: synthesiser.SyntheticVoi
 @pytest.mark.long
 def test_the_times_of_real_voices_are_those_of_the_aligner(real: synthesiser.SyntheticVoice, toy_model: Model) -> None:
     recogniser, late_s = recogniser_of(toy_model, "general"), []
-    for audio, units in installed.speak_sentences(TEXTS, real):
+    for audio, units, _ in installed.speak_sentences(TEXTS, real):
         room = mix_noise(audio, "white", 50)
         placed = recogniser.align_phones(room, features_of(room), units)
         said, aligned = ([span for span in part if not is_silent(span.label.phone)] for part in (units, placed))
@@ -221,19 +209,18 @@ def test_a_program_is_stopped(script: str, message: str, tmp_path: Path) -> None
 
 
 @needs_scripts
-def test_what_a_program_started_ends_with_it(tmp_path: Path) -> None:
-    child = int(synthesiser.run_program([str(_program(tmp_path, "sleep 30 & echo $!"))], "a-package"))
+def test_a_program_reads_what_it_is_given_and_what_it_started_ends_with_it(tmp_path: Path) -> None:
+    for name in ("reader", "starter"):
+        (tmp_path / name).mkdir()
+    reader = [str(_program(tmp_path / "reader", "exec cat"))]
+    assert synthesiser.run_program(reader, "a-package", given="Helló\n") == "Helló\n"
+    child = int(synthesiser.run_program([str(_program(tmp_path / "starter", "sleep 30 & echo $!"))], "a-package"))
     for _ in range(100):
         if not _is_running(child):
             return
         time.sleep(0.01)
     os.kill(child, 9)
     pytest.fail("it is still running")
-
-
-@needs_scripts
-def test_a_program_reads_what_it_is_given(tmp_path: Path) -> None:
-    assert synthesiser.run_program([str(_program(tmp_path, "exec cat"))], "a-package", given="Helló\n") == "Helló\n"
 
 
 def _program(folder: Path, script: str) -> Path:

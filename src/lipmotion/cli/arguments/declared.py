@@ -6,7 +6,7 @@ import argparse
 import stat
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import Field, dataclass, fields, replace
 from pathlib import Path
 from typing import IO, Any, TypeVar
@@ -106,8 +106,8 @@ def check_paths(options: argparse.Namespace) -> None:
 
 def _paths(value: Any) -> list[Path]:
     """Return the values of an argument as paths; none where it was left out."""
-    given = value if isinstance(value, list | tuple) else [value]
-    return [Path(text) for text in given if text is not None]
+    values = value if isinstance(value, list | tuple) else [value]
+    return [Path(text) for text in values if text is not None]
 
 
 def _declare(parser: argparse.ArgumentParser, kind: str, argument: InputArgument | OutputArgument) -> None:
@@ -153,19 +153,14 @@ def read_pipe(path: Path) -> Iterator[Path]:
     if not is_pipe(path):
         yield path
         return
-    from lipmotion.errors import InputError
     from lipmotion.storage.locks import open_temporary
 
     with open_temporary() as folder:
         stored = folder / "standard-input"
-        with stored.open("wb") as file:
-            if str(path) == PIPE and sys.stdin is None:
-                raise InputError("standard input is closed; required: a recording, as of 'ffmpeg ... -f wav -'")
-            if str(path) == PIPE:
-                _copy(sys.stdin.buffer, file)
-            else:
-                with path.open("rb") as source:
-                    _copy(source, file)
+        if str(path) == PIPE and sys.stdin is None:
+            raise InputError("standard input is closed; required: a recording, as of 'ffmpeg ... -f wav -'")
+        with nullcontext(sys.stdin.buffer) if str(path) == PIPE else path.open("rb") as source:
+            _copy(source, stored)
         yield stored
 
 
@@ -187,17 +182,14 @@ def write_pipe(options: argparse.Namespace) -> Iterator[tuple[tuple[str, ...], b
         write_bytes(motion)
 
 
-def _copy(source: IO[bytes], target: IO[bytes]) -> None:
-    from lipmotion.errors import InputError
-
+def _copy(source: IO[bytes], target: Path) -> None:
     size = 0
-    while block := source.read(BLOCK):
-        size += len(block)
-        if size > LARGEST_RECORDING_BYTES:
-            raise InputError(
-                f"more than {LARGEST_RECORDING_BYTES} bytes come through the pipe; save the recording as a file first"
-            )
-        target.write(block)
+    with target.open("wb") as file:
+        while block := source.read(BLOCK):
+            size += file.write(block)
+            if size > LARGEST_RECORDING_BYTES:
+                most = f"more than {LARGEST_RECORDING_BYTES} bytes"
+                raise InputError(f"{most} come through the pipe; save the recording as a file first")
     if not size:
         raise InputError("nothing comes through the pipe; required: a recording, as of 'ffmpeg ... -f wav -'")
 
@@ -243,33 +235,33 @@ def add_outputs(parser: argparse.ArgumentParser, files: str, *, required: bool =
 def add_detail(parser: argparse.ArgumentParser) -> None:
     """Add ``--detail``: options of a level of detail. What the command line says is ahead of them."""
     text = "film: all; game, mobile: fewer frames, keys and curves (docs/controls.md#levels-of-detail)"
-    parser.add_argument("--detail", choices=tuple(DETAILS), action=_Detail, help=text)
+    parser.add_argument("--detail", choices=tuple(DETAILS), action=_Defaults, help=text)
 
 
 def add_job_file(parser: argparse.ArgumentParser) -> None:
     """Add ``--job``: options from a file. What the command line says is ahead of it."""
     text = "options from a TOML file; those that are given here are ahead of it (docs/api.md)"
-    add_input(parser, "--job", what="job file", action=_JobFile, metavar="FILE.toml", help=text)
+    add_input(parser, "--job", what="job file", action=_Defaults, metavar="FILE.toml", help=text)
     parser.set_defaults(start=Job())
 
 
-def pick_part(options: argparse.Namespace, start: PartT, **given: Any) -> PartT:
-    """Return a job, or a part of one, with what was given on the command line.
+def pick_part(options: argparse.Namespace, start: PartT, **values: Any) -> PartT:
+    """Return a job, or a part of one, with the options of the command line.
 
-    start : what has the values that the verb has no options for
-    given : values of fields, ahead of the options
+    start  : what has the values that the verb has no options for
+    values : of fields, ahead of the options
     Raises InputError: a value that is not allowed.
     """
     for each in fields(start):
-        value = getattr(start, each.name)
-        if each.name in given:
+        part = getattr(start, each.name)
+        if each.name in values:
             continue
-        if isinstance(value, Configuration):
-            given[each.name] = pick_part(options, value)
+        if isinstance(part, Configuration):
+            values[each.name] = pick_part(options, part)
         elif "help" in each.metadata and hasattr(options, _name(each)):
-            found = getattr(options, _name(each))
-            given[each.name] = _moves(each, found) if "still" in each.metadata else found
-    return replace(start, **given)
+            value = getattr(options, _name(each))
+            values[each.name] = _moves(each, value) if "still" in each.metadata else value
+    return replace(start, **values)
 
 
 def _moves(each: Field[Any], still: str) -> bool:
@@ -320,44 +312,31 @@ def _add(parser: argparse.ArgumentParser, flags: tuple[str, ...], each: Field[An
 class _Collected(argparse.Action):
     """Appends what is given, once or several times; the default is not among it."""
 
-    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, *given: Any) -> None:  # noqa: ARG002
+    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, *values: Any) -> None:  # noqa: ARG002
         before = getattr(namespace, self.dest)
-        setattr(namespace, self.dest, [*(() if before is self.default else before), *given[0]])
+        setattr(namespace, self.dest, [*(() if before is self.default else before), *values[0]])
 
 
-class _JobFile(argparse.Action):
-    """Makes the options of a file the defaults; for those the command line is parsed again."""
+class _Defaults(argparse.Action):
+    """Makes the options of a job file, or of a level of detail, the defaults; the command line is parsed again then."""
 
-    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, *given: Any) -> None:
-        path: Path = given[0]
-        setattr(namespace, self.dest, path)
-        job = Job.from_file(path)
-        parser.set_defaults(start=job)
-        _make_defaults(parser, job)
-
-
-class _Detail(argparse.Action):
-    """Makes the options of a level of detail the defaults; for those the command line is parsed again."""
-
-    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, *given: Any) -> None:
-        setattr(namespace, self.dest, given[0])
-        _make_defaults(parser, DETAILS[given[0]])
+    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, *values: Any) -> None:
+        setattr(namespace, self.dest, values[0])
+        job = DETAILS[values[0]] if self.choices else Job.from_file(values[0])
+        if not self.choices:
+            parser.set_defaults(start=job)
+        defaults = dict(_list_set(job))
+        for action in parser._actions:
+            if action.dest in defaults and action.default != defaults[action.dest]:
+                action.default, action.required = defaults[action.dest], False
 
 
-def _make_defaults(parser: argparse.ArgumentParser, job: Job) -> None:
-    """Make the options of a job that are not as usual the defaults of a parser."""
-    defaults = dict(_given(job))
-    for action in parser._actions:
-        if action.dest in defaults and action.default != defaults[action.dest]:
-            action.default, action.required = defaults[action.dest], False
-
-
-def _given(part: Configuration) -> Iterator[tuple[str, Any]]:
-    """Yield name and value of every option that is not as usual."""
+def _list_set(part: Configuration) -> Iterator[tuple[str, Any]]:
+    """Yield name and value of every option that has not its default."""
     for each in fields(part):
         value = getattr(part, each.name)
         if isinstance(value, Configuration):
-            yield from _given(value)
+            yield from _list_set(value)
         elif {"help", "still"} & {*each.metadata} == {"help"} and value != each.default:
             yield _name(each), value
     if isinstance(part, Staging):

@@ -10,14 +10,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.arguments.declared import add_options, add_output, is_pipe
-from lipmotion.cli.terminal.progress import describe_outcome, print_lines
+from lipmotion.cli.terminal.progress import Report, describe_outcome, print_line, print_lines, report_progress
+from lipmotion.errors import InputError, LipMotionError
+from lipmotion.extensions import find_version
+from lipmotion.pipeline.job import Job, check_outputs, is_for_several, list_recordings, open_face, plan_outputs, run
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
+from lipmotion.storage.files import atomic_file, check_target, create_folders
+from lipmotion.storage.json_text import as_json, replace_nan
+from lipmotion.types.progress import Item, Monitor, sub_monitor
 
 if TYPE_CHECKING:
-    from lipmotion.cli.terminal.progress import Report
-    from lipmotion.pipeline.job import Job
-    from lipmotion.types import Monitor
     from lipmotion.units import Lexicon
 
 
@@ -25,9 +28,6 @@ class Version(argparse.Action):
     """Prints the version, and a text behind it; it is looked up only when the option is given."""
 
     def __call__(self, *_: object) -> None:  # noqa: D102
-        from lipmotion.cli.terminal.progress import print_line
-        from lipmotion.extensions import find_version
-
         print_line(f"lipmotion {find_version()}{self.const or ''}")
         sys.exit(0)
 
@@ -83,9 +83,6 @@ def report_figures(
     options: argparse.Namespace, compute: Callable[[Lexicon | None, Monitor], Figures], table: Callable[[Figures], str]
 ) -> None:
     """Call ``compute(lexicon, monitor)``, write its figures, and print their table."""
-    from lipmotion.cli.terminal.progress import report_progress
-    from lipmotion.storage.files import atomic_file, check_target
-    from lipmotion.storage.json_text import as_json, replace_nan
     from lipmotion.units import Lexicon
 
     with report_progress(options) as report:
@@ -99,7 +96,7 @@ def report_figures(
         report.finish(table(figures), figures=figures)
 
 
-def animate_one_by_one(job: Job, given: Sequence[Path], options: argparse.Namespace, report: Report) -> bool:
+def animate_one_by_one(job: Job, paths: Sequence[Path], options: argparse.Namespace, report: Report) -> bool:
     """Run a job for each of several recordings, or for all of a folder, or where the output is a folder.
 
     Each recording is reported; at the end the paths that were written are printed. The words and phones in files beside
@@ -109,16 +106,12 @@ def animate_one_by_one(job: Job, given: Sequence[Path], options: argparse.Namesp
     Raises InputError: a transcript, units or a picture of posteriors, which belong to one recording; or a pipe.
     Raises the error of the highest exit code among those that occurred, with the number of recordings that failed.
     """
-    from lipmotion.errors import InputError, LipMotionError
-    from lipmotion.pipeline.job import check_outputs, is_for_several, list_recordings, open_face, plan_outputs, run
     from lipmotion.pipeline.model import load_model
-    from lipmotion.storage.files import create_folders
-    from lipmotion.types.progress import Item, sub_monitor
 
-    if len(given) == 1 and not (given[0].is_dir() or any(map(is_for_several, job.outputs.files))):
+    if len(paths) == 1 and not (paths[0].is_dir() or any(map(is_for_several, job.outputs.files))):
         return False
-    _check_named(given)
-    recordings = list_recordings(given)
+    _check_named(paths)
+    recordings = list_recordings(paths)
     alone = {name: getattr(job.request, name) for name in ("transcript", "units", "edits")}
     alone["posteriors"] = job.outputs.posteriors
     for name, value in alone.items():
@@ -164,9 +157,6 @@ def place_outputs(recording: Path, outputs: Sequence[str], kind: str) -> Iterato
     If the block fails, no new folders are left.
     Raises InputError: a folder for what comes through a pipe. Raises ExportError: as ``plan_outputs``.
     """
-    from lipmotion.pipeline.job import is_for_several, plan_outputs
-    from lipmotion.storage.files import create_folders
-
     if not any(map(is_for_several, outputs)):
         yield [Path(output) for output in outputs]
         return
@@ -181,8 +171,6 @@ def _check_named(recordings: Sequence[Path]) -> None:
     """Raise InputError where a recording has no name for a file in a folder."""
     for recording in recordings:
         if is_pipe(recording):
-            from lipmotion.errors import InputError
-
             raise InputError(
                 f"{recording}: what comes through a pipe has no name for a file in a folder; give it alone, with "
                 "the name of a file: -o FILE.json"

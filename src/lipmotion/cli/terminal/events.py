@@ -111,6 +111,7 @@ class Events:
     """
 
     replaces_errors = False
+    _ended = False
 
     def start(self, options: Namespace) -> None:
         """Report that the command starts."""
@@ -122,9 +123,7 @@ class Events:
 class JsonLines(Events):
     """One JSON object per line on standard output (docs/long-work.md), or on standard error if ``-`` is an output."""
 
-    def __init__(self) -> None:
-        self._ended = False
-        self._on_error = False
+    _on_error = False
 
     def start(self, options: Namespace) -> None:  # noqa: D102
         outputs = getattr(options, "output", None)
@@ -167,9 +166,6 @@ class RhubarbStatus(Events):
     """
 
     replaces_errors = True
-
-    def __init__(self) -> None:
-        self._ended = False
 
     def start(self, options: Namespace) -> None:  # noqa: D102
         from lipmotion.storage.files import as_text

@@ -64,7 +64,7 @@ def print_usage(text: str, *, is_wanted: bool) -> None:
         try:
             print(text, end="", file=sys.stderr, flush=True)
         except OSError:
-            _discard_pending(sys.stderr)  # nobody can be told
+            discard_pending(sys.stderr)  # nobody can be told
 
 
 def with_program_name(text: object) -> str:
@@ -88,7 +88,7 @@ def print_error_json(document: Any, *, spaced: bool = False) -> None:
     try:
         print(_spaced(document) if spaced else as_json(replace_nan(document)), file=sys.stderr, flush=True)
     except OSError as error:
-        _discard_pending(sys.stderr)
+        discard_pending(sys.stderr)
         raise ExportError(f"standard error cannot be written: {error.strerror or error}") from error
 
 
@@ -116,18 +116,14 @@ def _catch_failure() -> Iterator[None]:
         raise explain_output_error(error) from error
 
 
-def discard_pending_output() -> None:
-    """Discard buffered output, which Python would otherwise try to write again when it ends."""
-    _discard_pending(sys.stdout)
-
-
-def _discard_pending(stream: TextIO) -> None:
+def discard_pending(stream: TextIO) -> None:
+    """Discard buffered output of a stream, which Python would otherwise try to write again when it ends."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def explain_output_error(error: OSError) -> ExportError:
     """Discard pending output; return the error that says that standard output cannot be written."""
-    discard_pending_output()
+    discard_pending(sys.stdout)
     return ExportError(f"standard output cannot be written: {error.strerror or error}")
 
 
@@ -169,10 +165,19 @@ class _TerminalReport(Report):
 
     def receive(self, event: Progress | Item) -> None:
         self._stopper.check()
-        if isinstance(event, Progress):
-            self._draw(event)
-        elif event.reason:
-            self.warn(f"{event.outcome} {event.name}: {event.reason}")
+        if isinstance(event, Item):
+            if event.reason:
+                self.warn(f"{event.outcome} {event.name}: {event.reason}")
+        elif self._shown:
+            from tqdm import tqdm
+
+            stage = printable(f"{event.stage} ({event.step}/{event.steps})")
+            if self._bar is None:
+                layout = "{desc} {percentage:3.0f}% |{bar:20}| {elapsed}, left {remaining}"
+                self._bar = tqdm(total=1.0, initial=event.share, desc=stage, bar_format=layout, dynamic_ncols=True)
+            self._bar.set_description_str(stage, refresh=False)
+            self._bar.update(event.share - self._bar.n)
+            self._bar.refresh()
 
     def warn(self, text: str) -> None:
         text = f"warning: {text}"
@@ -192,19 +197,6 @@ class _TerminalReport(Report):
             self._bar.close()
             self._bar = None
 
-    def _draw(self, event: Progress) -> None:
-        if not self._shown:
-            return
-        from tqdm import tqdm
-
-        stage = printable(f"{event.stage} ({event.step}/{event.steps})")
-        if self._bar is None:
-            layout = "{desc} {percentage:3.0f}% |{bar:20}| {elapsed}, left {remaining}"
-            self._bar = tqdm(total=1.0, initial=event.share, desc=stage, bar_format=layout, dynamic_ncols=True)
-        self._bar.set_description_str(stage, refresh=False)
-        self._bar.update(event.share - self._bar.n)
-        self._bar.refresh()
-
 
 class _MachineReport(Report):
     """JSON events for the calling program."""
@@ -216,9 +208,8 @@ class _MachineReport(Report):
     def receive(self, event: Progress | Item) -> None:
         self._stopper.check()
         if isinstance(event, Progress):
-            self._events.emit(
-                "progress", stage=event.stage, step=event.step, steps=event.steps, value=round(event.share, 4)
-            )
+            share = round(event.share, 4)
+            self._events.emit("progress", stage=event.stage, step=event.step, steps=event.steps, value=share)
         else:
             self._events.emit("item", name=event.name, outcome=event.outcome, reason=event.reason)
 
@@ -230,7 +221,7 @@ class _MachineReport(Report):
         self._events.succeed(**figures)
 
 
-GONE = "the current folder has been deleted; go to one that exists"
+NO_FOLDER = "the current folder has been deleted; go to one that exists"
 HEAD_CHARACTERS, TAIL_CHARACTERS = 700, 300
 """Characters of a long line that are shown from its beginning and from its end."""
 
@@ -243,7 +234,7 @@ def describe_outcome(error: BaseException) -> tuple[int, str] | None:
         return InputError.exit_code, f"not enough memory ({error}); give a shorter recording or a smaller file"
     if isinstance(error, OSError):  # what the operating system refuses: no permission, a name too long
         nameless = (error.errno, error.strerror, error.filename) == (errno.ENOENT, os.strerror(errno.ENOENT), None)
-        return InputError.exit_code, shorten_line(GONE if nameless else error)  # the current folder
+        return InputError.exit_code, shorten_line(NO_FOLDER if nameless else error)  # the current folder
     failed = describe_failed_extension(error)
     return None if failed is None else (InputError.exit_code, shorten_line(failed))
 
@@ -251,11 +242,9 @@ def describe_outcome(error: BaseException) -> tuple[int, str] | None:
 def shorten_line(message: object) -> str:
     """Return a message as a printable line of limited length; of a longer one, the middle is left out."""
     line = printable(message)
-    return (
-        line
-        if len(line) <= HEAD_CHARACTERS + TAIL_CHARACTERS
-        else f"{line[:HEAD_CHARACTERS]} ... {line[-TAIL_CHARACTERS:]}"
-    )
+    if len(line) <= HEAD_CHARACTERS + TAIL_CHARACTERS:
+        return line
+    return f"{line[:HEAD_CHARACTERS]} ... {line[-TAIL_CHARACTERS:]}"
 
 
 LEVELS = {"trace": 5, "debug": 10, "info": 20, "warning": 30, "error": 40, "fatal": 50}
@@ -272,7 +261,15 @@ def print_status_lines(options: argparse.Namespace) -> Iterator[Callable[[float]
     """
     events: Events = options.events
     root = logging.getLogger()
-    handlers, log = root.handlers, _log_file(options)
+    path, handlers = options.log_file, root.handlers
+    log: logging.Handler = logging.NullHandler(LEVELS["fatal"] + 1)
+    if path is not None:
+        try:
+            log = logging.FileHandler(path, mode="w", encoding="utf-8", errors="backslashreplace")
+        except OSError as error:
+            raise ExportError(f"{path}: the log cannot be written: {error.strerror or error}") from error
+        log.setLevel(LEVELS[options.log_level])
+        log.setFormatter(_LogFormatter(datefmt="%Y-%m-%d %H:%M:%S"))
     console = [_StatusHandler(events)] if isinstance(events, RhubarbStatus) else handlers
     root.handlers = [*(console if LEVELS[options.console_level] <= logging.WARNING else ()), log]
 
@@ -299,20 +296,6 @@ def print_status_lines(options: argparse.Namespace) -> Iterator[Callable[[float]
     finally:
         root.handlers = handlers
         log.close()
-
-
-def _log_file(options: argparse.Namespace) -> logging.Handler:
-    """Return what writes the log file; without one, what writes nothing."""
-    path: Path | None = options.log_file
-    if path is None:
-        return logging.NullHandler(LEVELS["fatal"] + 1)
-    try:
-        handler = logging.FileHandler(path, mode="w", encoding="utf-8", errors="backslashreplace")
-    except OSError as error:
-        raise ExportError(f"{path}: the log cannot be written: {error.strerror or error}") from error
-    handler.setLevel(LEVELS[options.log_level])
-    handler.setFormatter(_LogFormatter(datefmt="%Y-%m-%d %H:%M:%S"))
-    return handler
 
 
 class _LogFormatter(logging.Formatter):

@@ -35,9 +35,16 @@ def bibliography() -> Mapping[str, str]:
     return {entry[entry.index("{") + 1 : entry.index(",")]: entry for entry in entries}
 
 
-def list_engine_citations(name: str) -> str:
-    """Return the BibTeX entries of lipmotion and of an engine's papers; of another package's engine, a remark."""
-    return _entries((LIPMOTION, *ENGINE_KEYS.get(name, ())), _list_engine_remarks(name))
+def list_engine_citations(name: str, *more: str, owners: Iterable[str] = ()) -> str:
+    """Return the BibTeX entries of lipmotion, of an engine's papers, and of further keys.
+
+    Remarks name other owners of recordings, and say of another package's engine where to find what to cite.
+    """
+    remarks = [f"% recordings: {owner}" for owner in owners]
+    if name not in ENGINE_KEYS:
+        remarks.insert(0, f"% the engine {name!r} comes with another package: cite what its documentation names")
+    keys = dict.fromkeys((LIPMOTION, *ENGINE_KEYS.get(name, ()), *more))
+    return "\n\n".join([*(bibliography()[key] for key in keys), *remarks])
 
 
 def list_model_citations(header: Mapping[str, Any]) -> str:
@@ -45,32 +52,14 @@ def list_model_citations(header: Mapping[str, Any]) -> str:
 
     header : of a model file. Recordings other than those of GRID are named in a BibTeX comment
     """
-    engine = str(header.get("engine"))
     attribution = header.get("attribution") or []
-    owners = [
-        " ".join(str(owner).split()) for owner in (attribution if isinstance(attribution, list) else [attribution])
-    ]
+    attribution = attribution if isinstance(attribution, list) else [attribution]
+    owners = [" ".join(str(owner).split()) for owner in attribution]
     others = [owner for owner in owners if "GRID corpus" not in owner]
-    keys = [LIPMOTION, *ENGINE_KEYS.get(engine, ())]
-    if header.get("visual", "geometry") != "geometry":
-        keys.append(EIGENLIPS)
-    if "adapted" in header:
-        keys.append(ADAPTATION)
-    if len(others) < len(owners):
-        keys.append(GRID)
-    return _entries(keys, [*_list_engine_remarks(engine), *(f"% recordings: {owner}" for owner in others)])
-
-
-def _list_engine_remarks(name: str) -> list[str]:
-    """Return a BibTeX comment for an engine of another package; nothing for a built-in one."""
-    if name in ENGINE_KEYS:
-        return []
-    return [f"% the engine {name!r} comes with another package: cite what its documentation names"]
-
-
-def _entries(keys: Iterable[str], remarks: Iterable[str]) -> str:
-    """Return the entries of some keys, each once, and the remarks, separated by empty lines."""
-    return "\n\n".join([*(bibliography()[key] for key in dict.fromkeys(keys)), *remarks])
+    keys = [EIGENLIPS] if header.get("visual", "geometry") != "geometry" else []
+    keys += [ADAPTATION] if "adapted" in header else []
+    keys += [GRID] if len(others) < len(owners) else []
+    return list_engine_citations(str(header.get("engine")), *keys, owners=others)
 
 
 if TYPE_CHECKING:
@@ -106,7 +95,6 @@ def add_cite(verbs: Verbs) -> None:
 
 def _run_cite(options: argparse.Namespace) -> None:
     """Print the entries. Raises InputError: nothing has that name.  Raises ModelFormatError: the file is no model."""
-    from lipmotion.cli.verbs.about import bibliography, list_engine_citations, list_model_citations
     from lipmotion.engines import ENGINES
     from lipmotion.pipeline.model import find_shipped, read_header
 
@@ -134,9 +122,9 @@ def _run_completion(options: argparse.Namespace) -> None:
 
     from lipmotion.cli.command_line import parser
 
-    whole = parser()
-    _complete_files(whole)
-    print_lines(shtab.complete(whole, shell=options.shell).removesuffix("\n"))
+    program = parser()
+    _complete_files(program)
+    print_lines(shtab.complete(program, shell=options.shell).removesuffix("\n"))
 
 
 def _complete_files(parser: argparse.ArgumentParser) -> None:
@@ -145,8 +133,8 @@ def _complete_files(parser: argparse.ArgumentParser) -> None:
 
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
-            for part in action.choices.values():
-                _complete_files(part)
+            for verb in action.choices.values():
+                _complete_files(verb)
         elif action.choices is None and action.nargs != 0:
             action.complete = shtab.FILE  # type: ignore[attr-defined] # where shtab looks for it
 
@@ -178,8 +166,7 @@ def _run_doctor(options: argparse.Namespace) -> None:
 def add_info(verbs: Verbs) -> None:
     """Add the verb that prints the header of a model, or its decision trees or chains."""
     parser = verbs.add_parser("info", help="print what a model is, and whose recordings it was trained on")
-    shipped = "default: the model that ships with the package"
-    add_input(parser, "model", what="model", nargs="?", help=shipped)
+    add_input(parser, "model", what="model", nargs="?", help="default: the model that ships with the package")
     parser.add_argument("--structure", action="store_true", help="print only its decision trees, or its chains")
     parser.set_defaults(run=run_info)
 

@@ -17,7 +17,7 @@ from lipmotion.cli.arguments.declared import (
     write_pipe,
 )
 from lipmotion.cli.arguments.options import add_execution, animate_one_by_one, count_workers
-from lipmotion.cli.terminal.progress import print_error
+from lipmotion.cli.terminal.progress import print_error, report_progress
 from lipmotion.pipeline.job import run as run_job
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.printable import printable
@@ -37,8 +37,6 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Run the job of each recording; print the paths that were written."""
-    from lipmotion.cli.terminal.progress import report_progress
-
     note = ""
     recordings = options.speech if isinstance(options.speech, list) else [options.speech]
     with report_progress(options) as report:

@@ -7,9 +7,12 @@ from typing import Any
 
 from lipmotion.cli.arguments.declared import add_detail, add_input, add_job_file, add_options, add_output, pick_part
 from lipmotion.cli.arguments.options import add_machine_readable
+from lipmotion.cli.terminal.progress import report_progress
+from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.printable import printable
 from lipmotion.types.delivery import Delivery, Staging
+from lipmotion.types.progress import Item
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -45,10 +48,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``batch`` or, with ``--check``, ``check``; print what was done. Raises InputError: some lines failed."""
-    from lipmotion.cli.terminal.progress import report_progress
-    from lipmotion.errors import InputError
     from lipmotion.pipeline.batch import batch, check
-    from lipmotion.types import Item
 
     with report_progress(options) as report:
         job, monitor = pick_part(options, options.start), report.receive

@@ -13,6 +13,7 @@ from lipmotion.cli.arguments.options import Version, place_outputs
 from lipmotion.cli.terminal.progress import LEVELS, flush_output, print_line, print_lines, print_status_lines
 from lipmotion.errors import shorten
 from lipmotion.pipeline.request import Request
+from lipmotion.storage.files import as_text
 from lipmotion.storage.sources import is_file
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.values import parse_whole
@@ -39,11 +40,6 @@ def _dialogue(path: str) -> str | None:
         raise argparse.ArgumentTypeError(f"no such file: {shorten(path)!r}; the words themselves: --transcript TEXT")
     with Path(path).open("rb") as file:
         return path if NO_WORDS.sub(b"", file.read(1 << 16).strip(BLANK)) else None
-
-
-def _recogniser(name: str) -> str:
-    """Return our name of a recogniser; one that is not Rhubarb's is taken for ours."""
-    return RECOGNISERS.get(name.lower(), name)
 
 
 def _threads(text: str) -> int:
@@ -77,8 +73,11 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     unset: dict[str, Any] = {"default": argparse.SUPPRESS}
     add("-d", "--dialogFile", metavar="FILE", dest="transcript", type=_dialogue, help="--transcript FILE", **unset)
     text = "--recogniser: pocketSphinx is auto, phonetic is fast"
-    recognisers = "pocketSphinx|phonetic"
-    add("-r", "--recognizer", metavar=recognisers, dest="recogniser", type=_recogniser, help=text, **unset)
+    named: dict[str, Any] = {
+        "metavar": "pocketSphinx|phonetic",
+        "type": lambda name: RECOGNISERS.get(name.lower(), name),
+    }
+    add("-r", "--recognizer", dest="recogniser", help=text, **named, **unset)
     add("--extendedShapes", metavar="GHX", dest="shapes", help="--shapes", **unset)
     text = "--fps, for every format; in .dat shapes have their letters then"
     add("--datFrameRate", metavar="FPS", dest="fps", action=_DatFrameRate, type=float, help=text, **unset)
@@ -96,11 +95,12 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.animate``, ``lipmotion.cues`` and ``lipmotion.write_cues``; print the cues or their paths."""
+    from lipmotion.formats.cues import CUE_FORMATS
     from lipmotion.pipeline.analysis.read_request import read_request
     from lipmotion.pipeline.edit_files import edit_file
     from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.model import load_model
-    from lipmotion.pipeline.outputs.cues import check_cue_options, check_cue_outputs, cues, format_cues, write_cues
+    from lipmotion.pipeline.outputs.cues import check_cue_options, check_cue_outputs, cues, write_cues
 
     piped = is_pipe(options.speech)
     placed = place_outputs(options.speech, options.output, options.format or "tsv")
@@ -126,5 +126,6 @@ def run(options: argparse.Namespace) -> None:
         for path in options.output:
             print_line(path)
         if not options.output:
-            print_lines(format_cues(sheet, speech=speech_path, form=options.format or "tsv").removesuffix("\n"))
+            text = CUE_FORMATS[options.format or "tsv"].text(sheet, as_text(speech_path))
+            print_lines(text.removesuffix("\n"))
         flush_output()

@@ -6,6 +6,8 @@ import argparse
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output, pick_part
 from lipmotion.cli.arguments.options import add_machine_readable
+from lipmotion.cli.terminal.progress import report_progress
+from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
 
@@ -27,8 +29,6 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Read or begin the file, add the edits, try them out, and write it."""
-    from lipmotion.cli.terminal.progress import report_progress
-    from lipmotion.errors import InputError
     from lipmotion.pipeline.edit_files import create_edit_file, read_edits, write_edits
     from lipmotion.units import group_words
 
@@ -47,15 +47,11 @@ def run(options: argparse.Namespace) -> None:
         lines = [f"{number:4} {sentence}" for number, sentence in enumerate(edits.sentences, 1)]
         if options.list:
             lines.append("")
-            spans = enumerate(units, 1)
-            words = iter(enumerate((span for span in group_words(units) if span.label), 1))
-            number, word = next(words, (0, None))
-            for n, span in spans:
-                begins = word is not None and span.start_s == word.start_s
-                said = f"  word {number} {word.label}" if begins and word is not None else ""
-                lines.append(f"{n:4} {span.start_s:8.3f} {span.end_s:8.3f}  {span.label.phone:4}{said}".rstrip())
-                if begins:
-                    number, word = next(words, (0, None))
+            words = enumerate((span for span in group_words(units) if span.label), 1)
+            word_at = {span.start_s: f"  word {number} {span.label}" for number, span in words}
+            for number, span in enumerate(units, 1):
+                row = f"{number:4} {span.start_s:8.3f} {span.end_s:8.3f}  {span.label.phone:4}"
+                lines.append((row + word_at.pop(span.start_s, "")).rstrip())
         phones = [[span.start_s, span.end_s, span.label.phone, span.label.word] for span in units]
         text = "\n".join(map(printable, lines)) if lines else printable(str(options.file))
         report.finish(text, files=[str(options.file)], edits=list(edits.sentences), phones=phones)

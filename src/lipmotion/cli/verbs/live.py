@@ -7,6 +7,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -49,45 +50,32 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.live.face import LiveCharacter
     from lipmotion.live.stream import Stream
     from lipmotion.pipeline.model import load_model
+    from lipmotion.speech.sound.audio_files import read_audio
 
     with ExitStack() as stack:
-        rate_hz, sound = _open_sound(options)
+        rate_hz, is_file = options.rate, options.input != "-" and Path(options.input).is_file()
+        if is_file:
+            audio = read_audio(Path(options.input))
+            rate_hz, step = audio.rate_hz, int(CHUNK_S * audio.rate_hz)
+            pieces = (audio.samples[first : first + step] for first in range(0, len(audio.samples), step))
+            sound = pieces if options.as_fast_as_possible else _in_time(pieces)
+        else:
+            sound = _read_pipe(rate_hz) if options.input == "-" else _listen(options.input, rate_hz)
         options.stopper.check()  # a signal that a package swallowed: a page would be waited for without an end
         seed = None if options.still else 0
         stream = Stream(rate_hz, options.look_ahead, load_model(options.model), pauses=options.pauses, seed=seed)
         dress = LiveCharacter(options.character) if options.character else None
-        is_microphone = options.input != "-" and not Path(options.input).is_file()
-        about = LiveSound(rate_hz, options.look_ahead, is_microphone)
+        about = LiveSound(rate_hz, options.look_ahead, options.input != "-" and not is_file)
         consumers = [stack.enter_context(open_consumer(to, print_line, about)) for to in options.to or ["-"]]
         listeners = [each for each in consumers if isinstance(each, Listener)]
-        pieces = iter(sound)
-        while True:
-            try:
-                piece = next(pieces)
-                for listener in listeners:
-                    listener.hear(piece)
-                frames, ended = stream.push(piece), False
-            except StopIteration:
-                frames, ended = stream.flush(), True
+        for piece in chain(sound, (None,)):  # None: the sound has ended
+            for listener in listeners if piece is not None else ():
+                listener.hear(piece)
+            frames = stream.flush() if piece is None else stream.push(piece)
             for frame in map(dress, frames) if dress else frames:
                 for take in consumers:
                     take(frame)
             flush_output()
-            if ended:
-                return
-
-
-def _open_sound(options: argparse.Namespace) -> tuple[int, Iterator[Any]]:
-    from lipmotion.speech.sound.audio_files import read_audio
-
-    if options.input == "-":
-        return options.rate, _read_pipe(options.rate)
-    if Path(options.input).is_file():
-        audio = read_audio(Path(options.input))
-        step = int(CHUNK_S * audio.rate_hz)
-        pieces = (audio.samples[first : first + step] for first in range(0, len(audio.samples), step))
-        return audio.rate_hz, pieces if options.as_fast_as_possible else _in_time(pieces)
-    return options.rate, _listen(options.input, options.rate)
 
 
 def _read_pipe(rate_hz: int) -> Iterator[bytes]:

@@ -9,12 +9,18 @@ from pathlib import Path
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_outputs, add_pipe_format, pick_part, write_pipe
 from lipmotion.cli.arguments.options import add_machine_readable
+from lipmotion.cli.terminal.progress import report_progress
+from lipmotion.errors import InputError
+from lipmotion.extensions import load_provided
 from lipmotion.pipeline.job import Job, check_outputs, open_face, write_outputs
 from lipmotion.pipeline.job import run as run_job
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
+from lipmotion.storage.sources import is_file
 
 LOG = logging.getLogger("lipmotion")
+SILENT_HZ = 16_000
+"""Rate of the silence of videos without a sound."""
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -39,8 +45,6 @@ def run(options: argparse.Namespace) -> None:
 
     The motion of a file of edits is generated again, and its outputs are written as ``animate`` does.
     """
-    from lipmotion.cli.terminal.progress import report_progress
-    from lipmotion.errors import InputError
     from lipmotion.pipeline.edit_files import is_edit_file, read_edits
 
     with report_progress(options) as report:
@@ -78,9 +82,6 @@ def run(options: argparse.Namespace) -> None:
 
 def _find_sound(motion: Path) -> Path | None:
     """Return the sound that a glTF file of motion names, where it is there and begins with the motion."""
-    from lipmotion.extensions import load_provided
-    from lipmotion.storage.sources import is_file
-
     has_name = motion.suffix.lower() == ".glb" and is_file(motion)
     named = load_provided("find_named_sound")(motion) if has_name else None
     if named is None:
@@ -91,7 +92,3 @@ def _find_sound(motion: Path) -> Path | None:
     why = "is not there" if not start_s else f"begins at {start_s:g} s of the motion"
     LOG.warning("%s: its sound %s %s; give a sound: --sound FILE", motion, sound, why)
     return None
-
-
-SILENT_HZ = 16_000
-"""Rate of the silence of videos without a sound."""

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_outputs, pick_part
 from lipmotion.cli.arguments.options import add_machine_readable
+from lipmotion.cli.terminal.progress import Report, report_progress
 from lipmotion.pipeline.job import Job, check_outputs, open_face, write_outputs
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
-from lipmotion.storage.sources import is_file
-
-if TYPE_CHECKING:
-    from lipmotion.cli.terminal.progress import Report
+from lipmotion.storage.sources import is_file, read_text_file
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -41,31 +38,30 @@ def run(options: argparse.Namespace) -> None:
         options.wrong("required: a text, or --text FILE, not both")
     if options.words is not None and is_file(Path(options.words)):
         options.wrong(f"{options.words} is the name of a file; to say what is in it: --text {options.words}")
-    from lipmotion.cli.terminal.progress import report_progress
 
     with report_progress(options) as report:
-        if not options.voices:
-            _speak(options, report)
-            return
-        from lipmotion.speech.voices.installed import list_voices
+        if options.voices:
+            from lipmotion.speech.voices.installed import list_voices
 
-        voices = list_voices()
-        report.finish(
-            "\n".join(f"{voice.full_name:28} {voice.language}" for voice in voices) or "no voice is installed",
-            voices=[{"name": voice.full_name, "language": voice.language} for voice in voices],
-        )
+            voices = [{"name": voice.full_name, "language": voice.language} for voice in list_voices()]
+            text = "\n".join(f"{voice['name']:28} {voice['language']}" for voice in voices)
+            report.finish(text or "no voice is installed", voices=voices)
+        else:
+            _speak(options, report)
 
 
 def _speak(options: argparse.Namespace, report: Report) -> None:
     from lipmotion.corpora import Corpus
     from lipmotion.pipeline.analysis.read_request import read_lexicon
-    from lipmotion.pipeline.generate.speak import read_text, speak
+    from lipmotion.pipeline.generate.speak import LARGEST_TEXT_BYTES, speak
     from lipmotion.pipeline.model import load_model
 
     job = pick_part(options, Job())
     face = open_face(job.outputs)
     check_outputs(job, face)
-    request, text = job.request, read_text(options.text) if options.text else options.words
+    request, text = job.request, options.words
+    if options.text:
+        text = read_text_file(options.text, "text", LARGEST_TEXT_BYTES)
     model, corpus = load_model(request.model), Corpus.open(options.corpus) if options.corpus else None
     sound, result = speak(
         text,

@@ -3,36 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output
 from lipmotion.cli.arguments.options import add_machine_readable, count_workers, list_or_all
+from lipmotion.cli.terminal.progress import print_line, report_progress
+from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Request
-
-if TYPE_CHECKING:
-    from lipmotion.engines import Engine
-    from lipmotion.pipeline.model import Model
-from lipmotion.cli.terminal.progress import print_line
+from lipmotion.storage.files import check_target
 
 FROM = "stand on this model (default: the one that ships), or 'none' (docs/own-model.md)"
 NONE = "none"
-
-
-def load_start_model(name: str, engine: Engine[Any]) -> Model | None:
-    """Return the model of ``--from``: a file, the one that ships (nothing given), or none.
-
-    Raises InputError: a model is given, but the engine's models do not stand on others.
-    """
-    from lipmotion.errors import InputError
-    from lipmotion.pipeline.model import load_model
-
-    if name == NONE:
-        return None
-    if engine.inputs().prior:
-        return load_model(name or None)
-    if name:
-        raise InputError(f"the engine {engine.name!r} does not start from another model; leave --from out")
-    return None
 
 
 ENGINE = "trajectory (default), coupled (chains of states), joint (one model, five streams) or selection (recordings)"
@@ -75,11 +56,13 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Call ``lipmotion.train`` and ``lipmotion.save_model``; report what was used."""
-    from lipmotion.cli.terminal.progress import report_progress
+    """Call ``lipmotion.train`` and ``lipmotion.save_model``; report what was used.
+
+    Raises InputError: a model to start from is given, but the engine's models do not stand on others.
+    """
     from lipmotion.corpora import Corpus, Selection
     from lipmotion.engines import create_engine, find_visual
-    from lipmotion.pipeline.model import GEOMETRY, save_model
+    from lipmotion.pipeline.model import GEOMETRY, load_model, save_model
     from lipmotion.pipeline.training.other_speakers import synthesise_others
     from lipmotion.pipeline.training.train import Run, train
     from lipmotion.storage.locks import keep_unfinished
@@ -90,6 +73,9 @@ def run(options: argparse.Namespace) -> None:
     with report_progress(options) as report:
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
         engine = create_engine(options.engine, preset=preset, units=options.units, settings=options.set)
+        stands_on_prior = options.start != NONE and engine.inputs().prior
+        if options.start not in ("", NONE) and not stands_on_prior:
+            raise InputError(f"the engine {engine.name!r} does not start from another model; leave --from out")
         voices = synthesise_others(
             synthetic=options.voices, recordings=options.recordings, lexicon=lexicon, monitor=report.receive
         )
@@ -101,7 +87,7 @@ def run(options: argparse.Namespace) -> None:
                 lexicon=lexicon,
                 visual=options.visual or find_visual(preset) or GEOMETRY,
                 voices=voices,
-                prior=load_start_model(options.start, engine),
+                prior=load_model(options.start or None) if stands_on_prior else None,
                 run=Run(report.receive, work, workers),
             )
             save_model(model, options.output)
@@ -125,7 +111,6 @@ def run_adapt(options: argparse.Namespace) -> None:
     """Call ``lipmotion.adapt`` and ``lipmotion.save_model``; print how much speech was used."""
     from lipmotion.pipeline.model import save_model
     from lipmotion.pipeline.training.train import adapt
-    from lipmotion.storage.files import check_target
 
     check_target(options.output)
     model = adapt(options.model, options.recordings)

@@ -7,6 +7,7 @@ from typing import Any
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output
 from lipmotion.cli.arguments.options import add_execution, count_workers
+from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.pipeline.request import Request
 
 
@@ -24,7 +25,6 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``recognise_words`` and ``write_words``; print the words or the paths that were written."""
-    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.pipeline.analysis.language import (
         check_word_outputs,
         describe_word,
@@ -32,19 +32,18 @@ def run(options: argparse.Namespace) -> None:
         recognise_words,
         write_words,
     )
-    from lipmotion.pipeline.request import Request
 
     with report_progress(options) as report:
         check_word_outputs(options.output, options.speech)
         request = Request(options.speech, recogniser=options.recogniser)
-        found = recognise_words(request, model=options.model, workers=count_workers(options))
-        write_words(found.words, options.output, options.speech)
-        text = "\n".join(map(str, options.output)) or format_words(found.words).removesuffix("\n")
+        recognition = recognise_words(request, model=options.model, workers=count_workers(options))
+        words, similarity = recognition.words, recognition.similarity
+        write_words(words, options.output, options.speech)
         report.finish(
-            text,
-            words=[describe_word(span) for span in found.words],
-            word_s=round(found.word_s, 2),
-            phone_s=round(found.phone_s, 2),
-            confidence=round(found.confidence or 0.0, 3),
-            similarity=None if found.similarity is None else round(found.similarity, 2),
+            "\n".join(map(str, options.output)) or format_words(words).removesuffix("\n"),
+            words=[describe_word(span) for span in words],
+            word_s=round(recognition.word_s, 2),
+            phone_s=round(recognition.phone_s, 2),
+            confidence=round(recognition.confidence or 0.0, 3),
+            similarity=None if similarity is None else round(similarity, 2),
         )

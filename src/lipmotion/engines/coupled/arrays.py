@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.chains.densities import StreamGroup
 from lipmotion.engines.coupled.chains.lattice import FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.chains.model import Chains, VisualStream
-from lipmotion.engines.coupled.chains.product import Grammar, Transitions, find_reachable
-from lipmotion.engines.coupled.chains.structures import Structure
-from lipmotion.engines.coupled.conversion.mean_regression import OFFSETS, RegressionInputs, VisualRegression
+from lipmotion.engines.coupled.chains.product import Grammar, Structure, Transitions, find_reachable
+from lipmotion.engines.coupled.conversion import OFFSETS, RegressionInputs, VisualRegression
 from lipmotion.engines.coupled.model import CoupledConfig, CoupledModel
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion.arrays import MOTION_ARRAYS, PHONE_SET, motion_from_arrays, motion_to_arrays
@@ -57,44 +56,35 @@ def coupled_to_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
     if isinstance(chains.transitions, FactorialTransitions):
         arrays["pairs"] = chains.transitions.own_density_states.astype(np.int32)
     for number, group in enumerate(chains.groups):
-        arrays |= {f"group_{number}/{key}": array for key, array in _group_arrays(group).items()}
+        arrays |= {
+            f"group_{number}/streams": np.array(group.streams),
+            f"group_{number}/weights": np.array(group.weights),
+            f"group_{number}/tie": group.tie.astype(np.int32),
+            f"group_{number}/log_weights": group.mixtures.log_weights,
+            f"group_{number}/means": group.mixtures.means.astype(np.float16),
+            f"group_{number}/variances": group.mixtures.variances.astype(np.float16),
+        }
     for number, stream in enumerate(model.visual):
         arrays |= {
             f"visual_{number}/columns": stream.columns,
             f"visual_{number}/scale": np.stack([stream.mean, stream.deviation]),
         }
-    return arrays | _pack_regression(model) | filter_to_arrays(model.modulation) | predictor_to_arrays(model.encoding)
-
-
-def _group_arrays(group: StreamGroup) -> dict[str, NDArray[Any]]:
-    return {
-        "streams": np.array(group.streams),
-        "weights": np.array(group.weights),
-        "tie": group.tie.astype(np.int32),
-        "log_weights": group.mixtures.log_weights,
-        "means": group.mixtures.means.astype(np.float16),
-        "variances": group.mixtures.variances.astype(np.float16),
-    }
-
-
-def _pack_regression(model: CoupledModel) -> dict[str, NDArray[Any]]:
-    if model.regression is None:
-        return {}
-    inputs, regressions = model.regression
-    arrays: dict[str, NDArray[Any]] = {
-        "around/window": np.stack([inputs.acoustic.mean, inputs.acoustic.scale]),
-        "around/window_basis": inputs.acoustic.basis.astype(np.float16),
-        "around/belief": inputs.posterior_basis.astype(np.float16),
-        "around/mean": inputs.mean,
-        "around/basis": inputs.basis.astype(np.float16),
-    }
-    for number, regression in enumerate(regressions):
+    if model.regression is not None:
+        inputs, regressions = model.regression
         arrays |= {
-            f"following_{number}/kind": regression.regression_of_state,
-            f"following_{number}/coefficients": regression.coefficients.astype(np.float16),
-            f"following_{number}/variances": regression.variances,
+            "around/window": np.stack([inputs.acoustic.mean, inputs.acoustic.scale]),
+            "around/window_basis": inputs.acoustic.basis.astype(np.float16),
+            "around/belief": inputs.posterior_basis.astype(np.float16),
+            "around/mean": inputs.mean,
+            "around/basis": inputs.basis.astype(np.float16),
         }
-    return arrays
+        for number, regression in enumerate(regressions):
+            arrays |= {
+                f"following_{number}/kind": regression.regression_of_state,
+                f"following_{number}/coefficients": regression.coefficients.astype(np.float16),
+                f"following_{number}/variances": regression.variances,
+            }
+    return arrays | filter_to_arrays(model.modulation) | predictor_to_arrays(model.encoding)
 
 
 def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
@@ -108,7 +98,20 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
         structure = config.structure_with(tuple(sets))
         poses = check_arrays(arrays, POSES, Q=space.dimensions)
         streams = tuple(poses["streams"].tolist())
-        _check_names(arrays, structure, len(streams))
+        visual_streams = range(len(streams) - 1)
+        refuse_undeclared(
+            arrays,
+            MOTION_ARRAYS,
+            POSES,
+            MODULATION,
+            list_predictor_arrays(arrays),
+            PAIRS,
+            (f"chain_{number}/{key}" for number in range(len(sets)) for key in UNITS | CHAIN | ROWS),
+            (f"visual_{number}/{key}" for number in visual_streams for key in VISUAL),
+            (f"following_{number}/{key}" for number in visual_streams for key in VISUAL_REGRESSION),
+            (f"group_{number}/{key}" for number in range(len(streams)) for key in GROUP),
+            (f"around/{key}" for key in REGRESSION_INPUTS),
+        )
         if structure.state_counts[0] > arrays["group_0/tie"].size:
             raise ValueError(
                 f"{structure.state_counts[0]} states of the first chain, of {arrays['group_0/tie'].size} in all"
@@ -164,30 +167,6 @@ VISUAL_REGRESSION = {
     "variances": ArraySpec(np.float32, "N D", POSITIVE, LARGEST_VARIANCE),
 }
 """The arrays of a model: of its chains, visual streams, stream groups, and regressions of visual means."""
-
-
-def _check_names(arrays: Arrays, structure: Structure, streams: int) -> None:
-    """Raise ValueError if there is an array that is not declared above."""
-    chain = (f"chain_{number}/{key}" for number in range(len(structure.chains)) for key in UNITS | CHAIN | ROWS)
-    visual = (
-        f"{part}_{number}/{key}"
-        for part, table in (("visual", VISUAL), ("following", VISUAL_REGRESSION))
-        for number in range(streams - 1)
-        for key in table
-    )
-    group = (f"group_{number}/{key}" for number in range(streams) for key in GROUP)
-    refuse_undeclared(
-        arrays,
-        MOTION_ARRAYS,
-        POSES,
-        MODULATION,
-        list_predictor_arrays(arrays),
-        PAIRS,
-        chain,
-        visual,
-        group,
-        (f"around/{key}" for key in REGRESSION_INPUTS),
-    )
 
 
 def _transitions(arrays: Arrays, structure: Structure) -> Transitions | FactorialTransitions:

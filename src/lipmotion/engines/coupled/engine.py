@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from textwrap import wrap
 from typing import Any, ClassVar, final
@@ -15,13 +15,11 @@ from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, explain_by_trace
 from lipmotion.engines.coupled.arrays import coupled_from_arrays, coupled_to_arrays
 from lipmotion.engines.coupled.chains.densities import Single, infer_components
 from lipmotion.engines.coupled.chains.lattice import Lattice, LatticePosteriors
-from lipmotion.engines.coupled.chains.model import Chains, Inference, VisualStream
-from lipmotion.engines.coupled.chains.product import Product
-from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, Structure
-from lipmotion.engines.coupled.conversion.em_conversion import convert, group_index, path_to_means
-from lipmotion.engines.coupled.conversion.mean_regression import weigh_regressions
+from lipmotion.engines.coupled.chains.model import Chains, Inference, VisualStream, speech_observations
+from lipmotion.engines.coupled.chains.product import COUPLED, FACTORIAL, HMM, MULTISTREAM, Product
+from lipmotion.engines.coupled.conversion import convert, group_index, path_to_means, weigh_regressions
 from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, CoupledModel
-from lipmotion.engines.coupled.training.alignment import mark_allowed_units
+from lipmotion.engines.coupled.training.chain_training import mark_allowed_units
 from lipmotion.engines.coupled.training.coupled_training import THREADS, fit_coupled
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import Statistics, count_unseen, slice_dynamics
@@ -44,7 +42,6 @@ from lipmotion.types import (
     Speech,
     StateTrace,
     Timeline,
-    Unit,
 )
 from lipmotion.units import VISEME_OF
 
@@ -59,37 +56,29 @@ LINE = 110
 
 def describe(model: CoupledModel) -> str:
     """Return a text with the chains, the streams and the regressions of a model, one a line."""
-    return "\n".join(map(printable, [*_chains(model), *_streams(model), *_regressions(model)]))
-
-
-def _chains(model: CoupledModel) -> Iterator[str]:
-    structure, product = model.chains.structure, model.chains.transitions.product
-    yield f"{structure.kind}: {KINDS[structure.kind]}"
+    chains, structure, product = model.chains, model.chains.structure, model.chains.transitions.product
+    lines = [f"{structure.kind}: {KINDS[structure.kind]}"]
     if len(structure.chains) > 1:
         apart = "any number of states" if structure.limit is None else f"up to {structure.limit} state(s)"
         together = "" if structure.cross_units or structure.limit is None else ", units left together"
-        yield f"  asynchrony: {apart} apart{together}"
-    count = len(product.joint_states) if isinstance(product, Product) else product.chain_states.shape[1]
-    yield f"  joint states: {count}"
+        lines.append(f"  asynchrony: {apart} apart{together}")
+    lines.append(f"  joint states: {product.chain_states.shape[1]}")
     for number, (chain, units) in enumerate(zip(structure.chains, structure.units, strict=True), start=1):
-        yield f"chain {number}: {chain.name}, {len(units)} units of {structure.states} states"
-        yield from (f"  {line}" for line in wrap(" ".join(units), LINE))
-
-
-def _streams(model: CoupledModel) -> Iterator[str]:
-    chains = model.chains
-    for number, name in enumerate(chains.streams):
-        mixtures = chains.groups[group_index(chains, number)].stream_mixtures(number)
-        densities, components, size = mixtures.means.shape
-        chain = chains.structure.chain_of(number) + 1
-        yield f"stream {name}: {size} dimensions on chain {chain}, {densities} densities of {components} Gaussian(s)"
-
-
-def _regressions(model: CoupledModel) -> Iterator[str]:
+        lines.append(f"chain {number}: {chain.name}, {len(units)} units of {structure.states} states")
+        lines += [f"  {line}" for line in wrap(" ".join(units), LINE)]
+    for stream, name in enumerate(chains.streams):
+        densities, components, size = chains.groups[group_index(chains, stream)].stream_mixtures(stream).size
+        lines.append(
+            f"stream {name}: {size} dimensions on chain {structure.chain_of(stream) + 1}, "
+            f"{densities} densities of {components} Gaussian(s)"
+        )
     regressions = model.regression[1] if model.regression is not None else ()
-    for stream, regression in zip(model.visual, regressions, strict=False):
+    for visual, regression in zip(model.visual, regressions, strict=False):
         count, inputs, _ = regression.coefficients.shape
-        yield f"means of {stream.name}: {count} regressions on {inputs} inputs, from features and posteriors around"
+        lines.append(
+            f"means of {visual.name}: {count} regressions on {inputs} inputs, from features and posteriors around"
+        )
+    return "\n".join(map(printable, lines))
 
 
 Array = NDArray[np.float64]
@@ -141,7 +130,7 @@ def find_joint_state(chains: Chains, posteriors: LatticePosteriors, row: int) ->
     if posteriors.joint is None:
         return None
     best = int(posteriors.joint.probability[row].argmax())
-    name = chains.transitions.product.name(int(posteriors.joint.states[best]))
+    name = chains.structure.name(chains.transitions.product.chain_states[:, posteriors.joint.states[best]].tolist())
     return NamedProbability(name, float(posteriors.joint.probability[row, best]))
 
 
@@ -158,33 +147,27 @@ def sum_lead_posteriors(chains: Chains, posteriors: LatticePosteriors) -> list[S
         ahead = np.array(list_leads(chains, chain), np.intp)
         lead = np.zeros((len(posteriors.most_probable), len(ahead)), np.float32)
         if isinstance(product, Product) and posteriors.joint is not None:
-            own = product.lead[chain][posteriors.joint.states]
-            lead = posteriors.joint.probability @ (own[:, None] == ahead).astype(np.float32)
+            leads = product.lead[chain][posteriors.joint.states]
+            lead = posteriors.joint.probability @ (leads[:, None] == ahead).astype(np.float32)
         result.append(lead)
     return result
 
 
-def infer_units(chains: Chains, posteriors: LatticePosteriors, kept: slice) -> list[ChainPosteriors]:
+def infer_units(chains: Chains, posteriors: LatticePosteriors, frames: slice) -> list[ChainPosteriors]:
     """Return the posteriors of the units of each chain in some frames."""
     structure = chains.structure
     return [
         ChainPosteriors(
             unit_set.name,
             units,
-            posteriors.chains[number][kept].reshape(-1, len(units), structure.states).sum(axis=2),
+            posteriors.chains[number][frames].reshape(-1, len(units), structure.states).sum(axis=2),
             list_leads(chains, number),
-            lead[kept],
+            lead[frames],
         )
         for number, (unit_set, units, lead) in enumerate(
             zip(structure.chains, structure.units, sum_lead_posteriors(chains, posteriors), strict=True)
         )
     ]
-
-
-def join_posteriors(parts: Sequence[ChainPosteriors]) -> ChainPosteriors:
-    """Return the posteriors of one chain in successive parts of an utterance as one."""
-    probability, lead = (np.concatenate([getattr(part, name) for part in parts]) for name in ("probability", "lead"))
-    return replace(parts[0], probability=probability, lead=lead)
 
 
 def _rank_by_probability(names: Sequence[str], probability: NDArray[np.floating]) -> tuple[NamedProbability, ...]:
@@ -196,7 +179,7 @@ def _rank_by_probability(names: Sequence[str], probability: NDArray[np.floating]
 def _find_dominant_gaussian(model: CoupledModel, inference: Inference, row: int, stream: int) -> DominantGaussian:
     chains = model.chains
     number = group_index(chains, stream)
-    group, responsibilities = chains.groups[number], inference.emissions.responsibilities[number]
+    group, responsibilities = chains.groups[number], inference.responsibilities[number]
     posterior = inference.posteriors.densities[number][row : row + 1]
     weight = infer_components(posterior, None if responsibilities is None else responsibilities[row : row + 1])[0]
     component, position = np.unravel_index(weight.argmax(), weight.shape)
@@ -208,27 +191,24 @@ def _find_dominant_gaussian(model: CoupledModel, inference: Inference, row: int,
         visual = model.visual[stream - 1]
         means, precisions = visual.unstandardised(mean[None], 1 / variance[None])
         channels = _list_channel_values(model, visual, means[0, 0], 1 / precisions[0, 0])
+    observed, distance = inference.observations.observed[stream], None
+    if observed is None or observed[row]:  # how far the observation is from the Gaussian, in standard deviations (RMS)
+        error = inference.observations.streams[stream][row] - mean
+        distance = float(np.sqrt(np.mean(error * error / variance)))
     states = chains.transitions.product.chain_states[:, group.tie == density]
     return DominantGaussian(
         chains.streams[stream],
         " | ".join(
-            chains.structure.state_name(chain, int(own[0])) for chain, own in enumerate(states) if (own == own[0]).all()
+            chains.structure.state_name(chain, int(each[0]))
+            for chain, each in enumerate(states)
+            if (each == each[0]).all()
         ),
         int(component) + 1,
         len(weight),
         float(weight[component, position]),
-        _distance(inference, stream, row, mean, variance),
+        distance,
         channels,
     )
-
-
-def _distance(inference: Inference, stream: int, row: int, mean: Array, variance: Array) -> float | None:
-    """Return how far an observation is from a Gaussian, in standard deviations (RMS); None: it was not observed."""
-    observed = inference.observations.observed[stream]
-    if observed is not None and not observed[row]:
-        return None
-    error = inference.observations.streams[stream][row] - mean
-    return float(np.sqrt(np.mean(error * error / variance)))
 
 
 def _list_means(model: CoupledModel, inference: Inference, rows: Sequence[int]) -> list[tuple[RegressedMean, ...]]:
@@ -241,9 +221,9 @@ def _list_means(model: CoupledModel, inference: Inference, rows: Sequence[int]) 
     for row in rows:
         shares = rest if away[row] else _list_regression_shares(model, inference, row)
         regressed = []
-        for stream, own in zip(model.visual, shares, strict=False):
+        for stream, weights in zip(model.visual, shares, strict=False):
             mean, variance = means[row, 0, stream.columns], 1 / precisions[row, 0, stream.columns]
-            regressed.append(RegressedMean(stream.name, own, _list_channel_values(model, stream, mean, variance)))
+            regressed.append(RegressedMean(stream.name, weights, _list_channel_values(model, stream, mean, variance)))
         result.append(tuple(regressed))
     return result
 
@@ -255,17 +235,14 @@ def _list_regression_shares(model: CoupledModel, inference: Inference, row: int)
         chain, regression_of_state = structure.chain_of(number + 1), regression.regression_of_state
         posterior = inference.posteriors.chains[chain][row : row + 1]
         weights = weigh_regressions(posterior, regression_of_state, len(regression.coefficients))[0]
-        names = [_name_regression(structure, chain, regression_of_state, k) for k in range(len(weights))]
+        names = []  # the viseme of the states that share a regression, with their position if it is the same: ``bi.2``
+        for k in range(len(weights)):
+            units, positions = np.divmod(np.flatnonzero(regression_of_state == k), structure.states)
+            phones = {structure.chains[chain].phones(structure.units[chain][unit])[0] for unit in units}
+            viseme = "/".join(sorted({VISEME_OF[phone] for phone in phones}))
+            names.append(f"{viseme}.{positions[0] + 1}" if len(set(positions.tolist())) == 1 else viseme)
         result.append(_rank_by_probability(names, weights))
     return result
-
-
-def _name_regression(structure: Structure, chain: int, regression_of_state: NDArray[np.intp], regression: int) -> str:
-    """Return the viseme of the states that share a regression, with their position if it is the same: ``bi.2``."""
-    units, positions = np.divmod(np.flatnonzero(regression_of_state == regression), structure.states)
-    phones = {structure.chains[chain].phones(structure.units[chain][unit])[0] for unit in units}
-    viseme = "/".join(sorted({VISEME_OF[phone] for phone in phones}))
-    return f"{viseme}.{positions[0] + 1}" if len(set(positions.tolist())) == 1 else viseme
 
 
 def _list_channel_values(
@@ -329,32 +306,31 @@ class CoupledEngine(Engine[CoupledModel]):
             reliability=np.maximum(speech.confidence, 1 - speech.voice),  # the chains know their own voice better
         )
         states, positions = np.unique(path, return_inverse=True)
-        return Generation(
-            motion,
-            variance,
-            _with_units(model, speech.units),
-            StateTrace(tuple(model.chains.transitions.product.name(int(state)) for state in states), positions),
-        )
+        structure, chain_states = model.chains.structure, model.chains.transitions.product.chain_states
+        names = tuple(structure.name(each) for each in chain_states[:, states].T.tolist())
+        of_chains = ("/".join(each.unit(span.label.phone) for each in structure.chains) for span in speech.units)
+        labelled = zip(speech.units, of_chains, strict=True)
+        units = Timeline(tuple(replace(span, label=replace(span.label, unit=unit)) for span, unit in labelled))
+        return Generation(motion, variance, units, StateTrace(names, positions))
 
     def lattice(self, model: CoupledModel, speech: Speech, wanted: slice) -> Lattice:
         """Return the lattice of some frames: joint states near the phones of a transcript, or all without one."""
-        chains = model.chains
         if not speech.units_decide:
-            return chains.full_lattice
-        frames = len(speech.features.values)
-        allowed = mark_allowed_units(chains.structure, speech.units, frames)[wanted]
-        return chains.lattice(allowed)
+            return model.chains.full_lattice
+        allowed = mark_allowed_units(model.chains.structure, speech.units, len(speech.features.values))
+        return model.chains.lattice(allowed[wanted])
 
     def _statistics(self, model: CoupledModel, speech: Speech, frames: slice) -> tuple[Statistics, NDArray[np.intp]]:
         """Return means and precisions [each shape=(T, 3, Q)], and the most probable joint state of every frame."""
         chains = model.chains
         if self.config.conversion == PATH:
-            observations, lattice = model.speech_observations(speech, frames), self.lattice(model, speech, frames)
-            path, _ = chains.best_path(chains.emission_log_densities(observations, lattice), lattice)
+            observations = speech_observations(speech, model.visual, frames)
+            path, _ = chains.best_path(observations, self.lattice(model, speech, frames))
             return model.frame_statistics([path_to_means(chains, path, s + 1) for s in range(len(model.visual))]), path
         inference = self.infer(model, speech, frames)
         if self.config.conversion != TRAJECTORY:
-            streams = convert(chains, inference.observations, inference.lattice, self.config.em, inference).streams[1:]
+            how = self.config.start, self.config.update, self.config.steps
+            streams, _ = convert(chains, inference.observations, inference.lattice, *how, inference)
             return model.frame_statistics(streams), inference.posteriors.most_probable
         means, precisions = model.motion_statistics(inference)
         share = ENCODING_SHARE * min(2 * count_unseen(speech.voice), 1.0)
@@ -368,11 +344,13 @@ class CoupledEngine(Engine[CoupledModel]):
 
         With ``trajectory`` conversion, each of its steps infers again, with the generated motion as observed motion.
         """
-        observations, lattice = model.speech_observations(speech, frames), self.lattice(model, speech, frames)
+        observations = speech_observations(speech, model.visual, frames)
+        lattice = self.lattice(model, speech, frames)
         inference = model.chains.infer(observations, lattice)
         for _ in range(self.config.steps if self.config.conversion == TRAJECTORY else 0):
             values = solve_mlpg(*model.motion_statistics(inference))[0]
-            inference = model.chains.infer(model.with_motion(observations, values), lattice)
+            seen = observations.with_visual_streams([stream.standardised(values) for stream in model.visual])
+            inference = model.chains.infer(seen, lattice)
         return inference
 
     def explain(self, model: CoupledModel, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...]:  # noqa: D102
@@ -390,9 +368,16 @@ class CoupledEngine(Engine[CoupledModel]):
         blocks = []
         for inner, outer in split_into_blocks(len(speech.features.values)):
             inference = self.infer(model, speech, outer)
-            kept = slice(inner.start - outer.start, inner.stop - outer.start)
-            blocks.append(infer_units(model.chains, inference.posteriors, kept))
-        return tuple(join_posteriors(parts) for parts in zip(*blocks, strict=True))
+            frames = slice(inner.start - outer.start, inner.stop - outer.start)
+            blocks.append(infer_units(model.chains, inference.posteriors, frames))
+        return tuple(
+            replace(
+                parts[0],
+                probability=np.concatenate([part.probability for part in parts]),
+                lead=np.concatenate([part.lead for part in parts]),
+            )
+            for parts in zip(*blocks, strict=True)
+        )
 
     def describe(self, model: CoupledModel) -> str:  # noqa: D102
         return describe(model)
@@ -402,10 +387,3 @@ class CoupledEngine(Engine[CoupledModel]):
 
     def from_arrays(self, arrays: Arrays) -> CoupledModel:  # noqa: D102
         return coupled_from_arrays(arrays, self.config)
-
-
-def _with_units(model: CoupledModel, units: Timeline[Unit]) -> Timeline[Unit]:
-    chains = model.chains.structure.chains
-    return Timeline(
-        tuple(replace(s, label=replace(s.label, unit="/".join(c.unit(s.label.phone) for c in chains))) for s in units)
-    )

@@ -10,25 +10,25 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, Single
-from lipmotion.engines.coupled.chains.model import EIGENLIPS, Chains, Inference, VisualStream, speech_observations
-from lipmotion.engines.coupled.chains.structures import PRESETS, STRUCTURES, UNSEEN_LOSS, Structure, list_unit_sets
-from lipmotion.engines.coupled.conversion.em_conversion import (
+from lipmotion.engines.coupled.chains.densities import Single
+from lipmotion.engines.coupled.chains.model import EIGENLIPS, Chains, Inference, VisualStream
+from lipmotion.engines.coupled.chains.product import PRESETS, STRUCTURES, UNSEEN_LOSS, Structure, list_unit_sets
+from lipmotion.engines.coupled.conversion import (
     EXACT,
     SOFT,
     STARTS,
     UPDATES,
-    ConversionSettings,
+    RegressionInputs,
+    VisualRegression,
     sum_precisions,
 )
-from lipmotion.engines.coupled.conversion.mean_regression import RegressionInputs, VisualRegression
 from lipmotion.motion.articulation import ArticulationPrior
 from lipmotion.motion.closure import Closure
 from lipmotion.motion.generation import LearnedMotion, VarianceScaling
 from lipmotion.motion.modulation_filter import STRENGTH, ModulationFilter
 from lipmotion.motion.predictors import Predictor
 from lipmotion.motion.space import MotionLimits, MotionSpace, measure_limits
-from lipmotion.types import FRAME_RATE_HZ, Configuration, Rule, Speech, option
+from lipmotion.types import FRAME_RATE_HZ, Configuration, Rule, option
 from lipmotion.units import UnitSet
 
 TRAJECTORY, FRAMES, PATH = "trajectory", "em", "viterbi"
@@ -57,7 +57,7 @@ class CoupledConfig(Configuration):
                  and of eigenlips
     conversion : ``trajectory``: parameter generation from expected precisions and means of static values, Δ and Δ²;
                  ``em``: the paper's, frame by frame;  ``viterbi``: means along the best path
-    start, update, steps : of EM conversion (``conversion.em_conversion.ConversionSettings``); ``trajectory`` takes no
+    start, update, steps : of EM conversion (``conversion.em_conversion.convert``); ``trajectory`` takes no
                  steps after its soft start unless asked to
     acoustic_regression : regress visual means on the acoustic features and state posteriors around the frame
                  (``trajectory`` only)
@@ -133,12 +133,7 @@ class CoupledConfig(Configuration):
     @property
     def uses_encoding(self) -> bool:
         """Whether voices that training does not know follow their encoding."""
-        return self.dynamic and self.acoustic_regression and self.conversion == TRAJECTORY
-
-    @property
-    def em(self) -> ConversionSettings:
-        """The conversion by EM."""
-        return ConversionSettings(self.start, self.update, self.steps)
+        return self.dynamic and self.acoustic_regression
 
 
 Array = NDArray[np.float64]
@@ -208,16 +203,6 @@ class CoupledModel:
             low[stream.columns], high[stream.columns] = measure_limits(poses)
         return MotionLimits(low, high)
 
-    def speech_observations(self, speech: Speech, frames: slice = slice(None)) -> AudioVisualObservations:
-        """Return observations of some frames of speech in which no visual stream was observed."""
-        return speech_observations(speech, self.visual, frames)
-
-    def with_motion(self, observations: AudioVisualObservations, values: Array) -> AudioVisualObservations:
-        """Return the observations with motion in the space [shape=(T, Q)] as the visual streams."""
-        for number, stream in enumerate(self.visual, start=1):
-            observations = observations.with_stream(number, stream.standardised(values))
-        return observations
-
     def motion_statistics(self, inference: Inference) -> tuple[Array, Array]:
         """Return the expected means and precisions of the motion in its space [each shape=(T, 3, Q)].
 
@@ -225,15 +210,20 @@ class CoupledModel:
         """
         shape = (inference.observations.frames, 3, self.space.dimensions)
         means, precisions = np.zeros(shape), np.zeros(shape)
-        inputs = self.regression_inputs(inference)
+        regressions: tuple[VisualRegression, ...] = ()
+        if self.regression is not None:
+            regression_inputs, regressions = self.regression
+            inputs = regression_inputs(inference.observations.streams[0], inference.posteriors.chains[0])
         for number, stream in enumerate(self.visual):
-            if inputs is None or self.regression is None:
+            if not regressions:
                 precision, weighted = sum_precisions(self.chains, inference, number + 1)
                 mean = weighted / np.maximum(precision, 1e-300)
             else:
                 posterior = inference.posteriors.chains[self.chains.structure.chain_of(number + 1)]
-                regression = self.regression[1][number]
-                mean, precision = regression.means(inputs, posterior), regression.precisions(posterior)
+                mean, precision = (
+                    regressions[number].means(inputs, posterior),
+                    regressions[number].precisions(posterior),
+                )
             means[:, :, stream.columns], precisions[:, :, stream.columns] = stream.unstandardised(mean, precision)
         away = self.is_away_from_speech(inference.posteriors.chains[0])
         means[away] = 0
@@ -254,12 +244,6 @@ class CoupledModel:
             means[:, :, stream.columns], precisions[:, :, stream.columns] = mean, precision
         precisions[:, 1:] = 0
         return means, precisions
-
-    def regression_inputs(self, inference: Inference) -> Single | None:
-        """Return the regression inputs of all frames [shape=(T, F + 1)]; None: there is no regression."""
-        if self.regression is None:
-            return None
-        return self.regression[0](inference.observations.streams[0], inference.posteriors.chains[0])
 
     def is_away_from_speech(self, posterior: Single) -> NDArray[np.bool_]:
         """Return whether each frame is silence away from speech [shape=(T,)], by posteriors of the first chain."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, final
@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
 from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.hmm.multistream.densities import MOTION, StreamObservations, StreamWeights, stream_observations
-from lipmotion.hmm.multistream.generate import merge_gaussians, select_densities
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_arrays, joint_to_arrays
-from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, grow_joint, train_joint, with_durations
-from lipmotion.hmm.multistream.recognise import StatePath, align, build_recogniser
+from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, grow_joint, measure_durations, train_joint
+from lipmotion.hmm.multistream.recognise import StatePath, align, build_recogniser, merge_gaussians, select_densities
 from lipmotion.hmm.multistream.unit_states import Inventory, RecognisedUnit, frames_to_units, units_to_frames
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.arrays import (
@@ -198,22 +197,6 @@ class JointModel:
         return measure_limits(means * stream.scale.deviation[:Q] + stream.scale.mean[:Q])
 
 
-@dataclass(frozen=True, eq=False)
-class _Learning:
-    """What a joint model is trained on, and what its ``JointModel`` has besides."""
-
-    units: UnitSet
-    space: MotionSpace
-    utterances: Sequence[TrainingUtterance]
-    inventory: Inventory
-    closure: Closure | None
-    prior: ArticulationPrior | None
-
-    def model(self, hmm: JointHmm) -> JointModel:
-        """Return the model with a trained joint model."""
-        return JointModel(self.units, self.space, hmm, self.closure, self.prior)
-
-
 @final
 @dataclass(frozen=True)
 class JointEngine(Engine[JointModel]):
@@ -235,72 +218,78 @@ class JointEngine(Engine[JointModel]):
         self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
     ) -> Fit[JointModel]:
         examples = self._with_channels(examples)
-        learning = self._learning(examples)
-        classes = learning.units.classes()
-        hmm = train_joint(learning.utterances, learning.inventory, classes, self.config.hmm, monitor, checkpoint)
+        utterances, inventory, classes, make_model = self._prepare(examples)
+        hmm = train_joint(utterances, inventory, classes, self.config.hmm, monitor, checkpoint)
         figures = {f"leaves_{name}": float(stream.forest.size) for name, stream in hmm.models.items()}
         frames = sum(int(example.valid.sum()) for example in examples)
-        model = learning.model(hmm)
-        return Fit(self._with_filter(model, examples), {"frames": frames, **figures})
+        return Fit(self._with_filter(make_model(hmm), examples), {"frames": frames, **figures})
 
     def growing_models(self, examples: Sequence[Example], monitor: Monitor) -> Iterator[JointModel]:
         """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``."""
-        learning = self._learning(self._with_channels(examples))
-        classes = learning.units.classes()
-        for hmm in grow_joint(learning.utterances, learning.inventory, classes, self.config.hmm, monitor):
-            yield learning.model(with_durations(hmm, learning.utterances))
+        utterances, inventory, classes, make_model = self._prepare(self._with_channels(examples))
+        for hmm in grow_joint(utterances, inventory, classes, self.config.hmm, monitor):
+            yield make_model(replace(hmm, durations=measure_durations(hmm, utterances)))
 
     def _with_channels(self, examples: Sequence[Example]) -> Sequence[Example]:
         """Return examples with the channels that are modelled. Raises InputError: there is no such channel."""
         names = self.config.channels.split()
         return [replace(each, motion=each.motion.selected(names)) for each in examples] if names else examples
 
-    def _learning(self, examples: Sequence[Example]) -> _Learning:
-        """Return what the joint model is trained on. Raises CorpusError: there is no speech."""
+    def _prepare(self, examples: Sequence[Example]) -> tuple[
+        list[TrainingUtterance], Inventory, Mapping[str, frozenset[str]], Callable[[JointHmm], JointModel]
+    ]:  # fmt: skip
+        """Return what ``train_joint`` takes, and what makes a model of its result. Raises CorpusError: no speech."""
         units = load_unit_set(self.config.units)
         space, values = fit_reduced_motion(examples, self.config.components)
-        utterances = [self._training_utterance(example, x, units) for example, x in zip(examples, values, strict=True)]
+        utterances = []
+        for example, x in zip(examples, values, strict=True):
+            observed = self._observations(example.speech, x, example.valid)
+            names, bounds = units_to_frames(example.speech.units, observed.frames, units.silence[0], units.unit_of)
+            utterances.append(TrainingUtterance(observed, names, None if self.config.flat_start else bounds))
         if all(set(utterance.units) <= set(units.silence) for utterance in utterances):
             raise CorpusError(f"no speech in {len(examples)} examples; train on speech")
         silence = units.silence[:1] + tuple(unit for unit in units.silence[1:] if units.silent(unit))  # only silence
         inventory = Inventory(units.units, silence, self.config.states)
         closure = fit_closure(space.direct_names, values, examples)
         prior = fit_articulation_prior(space, values, examples) if self.config.articulation else None
-        return _Learning(units, space, utterances, inventory, closure, prior)
+        return utterances, inventory, units.classes(), lambda hmm: JointModel(units, space, hmm, closure, prior)
 
     def _with_filter(self, model: JointModel, examples: Sequence[Example]) -> JointModel:
-        """Return a model with the modulation filter, and the variance scaling before it, if the filter is asked for."""
+        """Return a model with the modulation filter, and the variance scaling before it, if the filter is wanted."""
         if not self.config.modulation_filter:
             return model
         examples = [example for example in examples if example.valid.any()]
         values = [model.space.reduce(example.motion.values.astype(float)) for example in examples]
         recorded = [x[example.valid] for x, example in zip(values, examples, strict=True)]
-        generated = [self._generated(model, example.speech)[example.valid] for example in examples]
+        generated = []
+        for example in examples:
+            path = _align(model, self._observations(example.speech), example.speech.units)
+            generated.append(solve_mlpg(*merge_gaussians(select_densities(model.hmm, path)))[0][example.valid])
         factors = fit_scaling_factors(recorded, generated)
         rest = np.median(np.concatenate(select_resting_motion(examples, values) or recorded), axis=0)
         compared = ((x, factors * made) for x, made in zip(recorded, generated, strict=True))
         modulation = learn_filter(self.config.modulation_filter, compared, examples, values)
         return replace(model, scaling=VarianceScaling(factors, rest), modulation=modulation)
 
-    def _generated(self, model: JointModel, speech: Speech) -> NDArray[np.float64]:
-        """Return motion in the motion space for phones in time, as parameter generation makes it [shape=(T, Q)]."""
-        path = _aligned(model, self._observations(speech), speech.units)
-        return solve_mlpg(*merge_gaussians(select_densities(model.hmm, path)))[0]
-
     def without_closures(self) -> JointEngine:  # noqa: D102
         return replace(self, config=replace(self.config, closures=False))
 
     def generate(self, model: JointModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
-        observations = self._observations(speech)
+        observations, duration_s = self._observations(speech), speech.features.duration_s
+
+        def recognise() -> tuple[Timeline[Unit], StatePath]:
+            segments = build_recogniser(model.hmm).recognise(observations)
+            units = frames_to_units(segments, duration_s, lambda unit: replace(model.units.label(unit), confidence=0.0))
+            bounds = np.array([*(segment.first for segment in segments), observations.frames])
+            return units, align(model.hmm, observations, [segment.unit for segment in segments], bounds)
+
         if self.config.recognise_units and not speech.units_decide:
-            units, path = speech.cached(
-                model.hmm, lambda: self._recognised(model, observations, speech.features.duration_s)
-            )
+            units, path = speech.cached(model.hmm, recognise)
         else:
             units = speech.units
             if self.config.own_alignment and speech.units_known and not speech.times_given:
-                units = _restore_times(model, observations, units, speech.features.duration_s)
-            path = _aligned(model, observations, units)
+                units = _align_times(model, observations, units, duration_s)
+            path = _align(model, observations, units)
         means, precisions = merge_gaussians(select_densities(model.hmm, path))
 
         def statistics(frames: slice) -> Statistics:
@@ -351,26 +340,13 @@ class JointEngine(Engine[JointModel]):
         f0 = speech.log_f0 if self.config.f0 else None
         return stream_observations(np.asarray(speech.features.values), f0, motion, valid)
 
-    def _training_utterance(self, example: Example, values: NDArray[np.float64], units: UnitSet) -> TrainingUtterance:
-        observations = self._observations(example.speech, values, example.valid)
-        sequence, bounds = units_to_frames(example.speech.units, observations.frames, units.silence[0], units.unit_of)
-        return TrainingUtterance(observations, sequence, None if self.config.flat_start else bounds)
 
-    def _recognised(
-        self, model: JointModel, observations: StreamObservations, duration_s: float
-    ) -> tuple[Timeline[Unit], StatePath]:
-        segments = build_recogniser(model.hmm).recognise(observations)
-        units = frames_to_units(segments, duration_s, lambda unit: replace(model.units.label(unit), confidence=0.0))
-        bounds = np.array([*(segment.first for segment in segments), observations.frames])
-        return units, align(model.hmm, observations, [segment.unit for segment in segments], bounds)
-
-
-def _restore_times(
+def _align_times(
     model: JointModel, observations: StreamObservations, units: Timeline[Unit], duration_s: float
 ) -> Timeline[Unit]:
-    """Return given units at the times that the model gives them by forced alignment."""
-    least_s = model.hmm.inventory.states / FRAME_RATE_HZ
-    spoken = [span for span in units if span.duration_s >= least_s or not is_silent(span.label.phone)]
+    """Return units at the times that the model gives them by forced alignment."""
+    min_s = model.hmm.inventory.states / FRAME_RATE_HZ
+    spoken = [span for span in units if span.duration_s >= min_s or not is_silent(span.label.phone)]
     names = [model.units.unit_of(span.label) for span in spoken]
     try:
         bounds = align(model.hmm, observations, names).bounds(len(names))
@@ -381,6 +357,6 @@ def _restore_times(
     return frames_to_units(timed, duration_s, lambda _: next(labels))
 
 
-def _aligned(model: JointModel, observations: StreamObservations, units: Timeline[Unit]) -> StatePath:
+def _align(model: JointModel, observations: StreamObservations, units: Timeline[Unit]) -> StatePath:
     sequence, bounds = units_to_frames(units, observations.frames, model.units.silence[0], model.units.unit_of)
     return align(model.hmm, observations, sequence, bounds)

@@ -5,7 +5,7 @@ Source: Minnis & Breen 2000, §4.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from lipmotion.engines.selection.costs import ABUTTING_JOIN, JOIN_AFTER, JOIN_BEFORE, NO_JOIN, Costs, Target
-from lipmotion.engines.selection.inventory import RecordedUnits, UnitNumbers
+from lipmotion.engines.selection.inventory import PROTECTED_PHONES, RecordedUnits, UnitNumbers
 from lipmotion.engines.selection.model import SelectionModel
-from lipmotion.engines.selection.windows import PROTECTED_PHONES
 from lipmotion.motion.articulation import Statistics
 from lipmotion.motion.frame_labels import find_digital_silence, find_runs, mark_distant
 from lipmotion.stats.curves import with_dynamics
@@ -134,9 +133,20 @@ class TimeMap:
         first = piece.first - (piece.join == JOIN_BEFORE)
         stop = piece.stop + (following is not None and following.join == JOIN_AFTER)
         shift = piece.unit - piece.first
-        times = np.array([pair for number in range(first, stop) for pair in _knots(inventory, target, number, shift)])
-        kept = np.append(np.diff(times[:, 0]) > SHORTEST_S, True)
-        return cls(times[kept, 0], times[kept, 1])
+        pairs = []  # the start and the end of each phone, in the target and in the recording; of a silence, its pause
+        for number in range(first, stop):
+            start_s, end_s = target.windows.times_s[number].tolist()
+            from_s, to_s = inventory.windows.times_s[number + shift].tolist()
+            pairs.append((start_s, from_s))
+            missing_s = (end_s - start_s) - (to_s - from_s)
+            silent = is_silent(PHONES[target.windows.phones[number]]) and not target.by_sound
+            if silent and missing_s > 0:
+                half_s = (to_s - from_s) / 2
+                pairs += [(start_s + half_s, from_s + half_s), (end_s - half_s, from_s + half_s)]
+            pairs.append((end_s, to_s))
+        times = np.array(pairs)
+        apart = np.append(np.diff(times[:, 0]) > SHORTEST_S, True)
+        return cls(times[apart, 0], times[apart, 1])
 
     def __call__(self, time_s: Array) -> Array:
         """Return times in the recording [shape=(N,)]."""
@@ -144,20 +154,6 @@ class TimeMap:
             return self.recorded_s[0] + time_s - self.target_s[0]
         inside = np.clip(time_s, self.target_s[0], self.target_s[-1])
         return PchipInterpolator(self.target_s, self.recorded_s)(inside) + (time_s - inside)
-
-
-def _knots(inventory: RecordedUnits, target: Target, number: int, shift: int) -> Iterator[tuple[float, float]]:
-    """Yield the start and the end of a phone, in the target and in the recording; of a silence, its pause as well."""
-    start_s, end_s = target.windows.times_s[number].tolist()
-    from_s, to_s = inventory.windows.times_s[number + shift].tolist()
-    yield start_s, from_s
-    missing_s = (end_s - start_s) - (to_s - from_s)
-    silent = is_silent(PHONES[target.windows.phones[number]]) and not target.by_sound
-    if silent and missing_s > 0:
-        half_s = (to_s - from_s) / 2
-        yield start_s + half_s, from_s + half_s
-        yield end_s - half_s, from_s + half_s
-    yield end_s, to_s
 
 
 def _rise(time_s: Array, piece: Piece) -> Array:
@@ -177,8 +173,9 @@ def _smooth(
     recording = inventory.windows.recording
     left, right = (inventory.at(recording[[piece.unit]], clock(np.array([join_s])))[0] for piece, clock in sides)
     jump = right - left
-    kept = [PHONES[target.windows.phones[number]] in PROTECTED_PHONES for number in (after.first - 1, after.first)]
-    shares = (0.0, 1.0) if kept[0] and not kept[1] else (1.0, 0.0) if kept[1] and not kept[0] else (0.5, 0.5)
+    phones = (PHONES[target.windows.phones[number]] for number in (after.first - 1, after.first))
+    one, other = (phone in PROTECTED_PHONES for phone in phones)
+    shares = (0.0, 1.0) if one and not other else (1.0, 0.0) if other and not one else (0.5, 0.5)
     spans_s = (
         SMOOTHED_SHARE * (join_s - times_s[before.first, 0]),
         SMOOTHED_SHARE * (times_s[after.stop - 1, 1] - join_s),
@@ -225,7 +222,13 @@ def join_motion(
         return means[block].copy(), precisions[block].copy()
 
     learned = model.motion.for_voice(speech.voice)
-    reliability = _substitute_rest(costs, chosen.target, chosen.units, frames)
+    target, middle = chosen.target, costs.config.window // 2
+    around = slice(middle - 1, middle + 2)  # units that were recorded between other phones may be corrected
+    differs = (costs.index.contexts[chosen.units][:, around] != target.contexts[:, around]).any(axis=1)
+    reliability = np.zeros(frames)
+    for (start_s, end_s), other in zip(target.windows.times_s.tolist(), differs.tolist(), strict=True):
+        within = slice(int(start_s * FRAME_RATE_HZ), int(np.ceil(end_s * FRAME_RATE_HZ)))
+        reliability[within] = float(other and not target.by_sound)
     return learned.generate(statistics, frames, speech.units, constraints, close=close, reliability=reliability)
 
 
@@ -242,14 +245,3 @@ def _resting(features: NDArray[np.floating], units: Timeline[Unit], *, always: b
     window = np.hanning(2 * width + 1)
     padded = np.pad(resting, width, mode="edge")
     return np.convolve(padded, window / window.sum(), "valid")
-
-
-def _substitute_rest(costs: Costs, target: Target, units: NDArray[np.intp], frames: int) -> Array:
-    """Return 1 in the frames whose unit was recorded between other phones than are wanted, else 0 [shape=(T,)]."""
-    middle = costs.config.window // 2
-    around = slice(middle - 1, middle + 2)
-    differs = (costs.index.contexts[units][:, around] != target.contexts[:, around]).any(axis=1) & (not target.by_sound)
-    result = np.zeros(frames)
-    for (start_s, end_s), other in zip(target.windows.times_s.tolist(), differs.tolist(), strict=True):
-        result[int(start_s * FRAME_RATE_HZ) : int(np.ceil(end_s * FRAME_RATE_HZ))] = float(other)
-    return result

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, ClassVar
 
@@ -11,28 +11,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.selection.inventory import (
-    RecordedUnits,
-    UnitIndex,
-    UnitNumbers,
-    find_substitutes,
-    index_units,
-    substitute_symbols,
-)
-from lipmotion.engines.selection.windows import (
     INVISIBLE,
     INVISIBLE_SYMBOL,
     OVERLAPS,
+    PHONE_NUMBER,
     PROTECTED_PHONES,
     SILENT,
     VISEME_NUMBER,
     PhoneWindows,
+    RecordedUnits,
+    UnitIndex,
+    UnitNumbers,
     find_lip_class,
+    find_substitutes,
+    index_units,
     parse_invisible,
 )
 from lipmotion.errors import InputError
 from lipmotion.motion.modulation_filter import STRENGTH
 from lipmotion.motion.predictors import AUTOMATIC, check_predictor
-from lipmotion.types import Configuration, Rule, option
+from lipmotion.types import FRAME_RATE_HZ, Configuration, Rule, option
 from lipmotion.units import PHONES
 from lipmotion.units.phones import CLASSES
 
@@ -207,7 +205,8 @@ class Costs:
         self, windows: PhoneWindows, guided: Array | None, predicted: Array | None, *, by_sound: bool = False
     ) -> Target:
         """Return phones to compare with units, and motion predicted at ``POINTS`` [each shape=(U, POINTS, Q)]."""
-        known = substitute_symbols(windows, self.stand_ins)
+        table = np.array([PHONE_NUMBER[self.stand_ins.get(phone, phone)] for phone in PHONES], np.int16)
+        known = replace(windows, phones=table[windows.phones])
         contexts = known.contexts(self.config.invisible_phones, self.config.window // 2)
         if guided is None or predicted is None:
             return Target(known, contexts, None, None)
@@ -221,24 +220,22 @@ class Costs:
     def target_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
         """Return the cost of each of some units for one phone [shape=(N,)]."""
         config, windows = self.config, self.inventory.windows
-        costs = np.zeros(len(units)) if target.by_sound else self._context_costs(target, number, units)
+        costs = np.zeros(len(units))
+        if not target.by_sound:
+            symbols, others = target.contexts[number], self.index.contexts[units]
+            other_visemes = VISEME_NUMBER[others] != VISEME_NUMBER[symbols]
+            costs = ((others != symbols).astype(float) + other_visemes) @ (self._context_weights / 2)
+            costs = costs + self._phonological_costs(target, number, units)
         duration_s = max(float(target.windows.durations_s[number]), MIN_S)
         costs += config.duration * np.abs(np.log(np.maximum(windows.durations_s[units], MIN_S) / duration_s))
-        is_shown = target.by_sound or target.symbol(number) != INVISIBLE_SYMBOL
-        if is_shown and target.guided is not None and target.predicted is not None and self._recorded is not None:
+        is_visible = target.by_sound or target.symbol(number) != INVISIBLE_SYMBOL
+        if is_visible and target.guided is not None and target.predicted is not None and self._recorded is not None:
             distance = np.square(self._recorded[units] - target.guided[number]).mean(axis=1).sum(axis=1)
             if self._predicted is not None and config.trust:
                 unlike = np.square(self._predicted[units] - target.predicted[number]).mean(axis=1).sum(axis=1)
                 distance *= np.minimum(unlike / config.trust**2, 1)
             costs += config.guide * PER_S * duration_s * distance
         return costs
-
-    def _context_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
-        """Return what the phones around, words and stress of each of some units cost for one phone [shape=(N,)]."""
-        differs = self.index.contexts[units] != target.contexts[number]
-        other_viseme = VISEME_NUMBER[self.index.contexts[units]] != VISEME_NUMBER[target.contexts[number]]
-        costs = (differs.astype(float) + other_viseme) @ (self._context_weights / 2)
-        return costs + self._phonological_costs(target, number, units)
 
     def _phonological_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
         """Return what other edges of a word and other stress of each of some units cost for one phone [shape=(N,)]."""
@@ -322,9 +319,9 @@ class Costs:
     def _states(self, fraction: float) -> Array:
         """Return position and velocity of all units at a fraction of their durations [shape=(U, 2Q)]."""
         if fraction not in self._known_states:
-            units, inventory = np.arange(len(self.inventory.windows)), self.inventory
-            velocities = inventory.velocities(units, fraction) * self.config.velocity
-            state = np.concatenate([inventory.poses(units, fraction), velocities], axis=1) * np.tile(self.scale, 2)
+            step_s, poses = 1 / FRAME_RATE_HZ, self.inventory.poses
+            velocities = (poses(fraction, step_s) - poses(fraction, -step_s)) / (2 * step_s) * self.config.velocity
+            state = np.concatenate([poses(fraction), velocities], axis=1) * np.tile(self.scale, 2)
             self._known_states[fraction] = state
         return self._known_states[fraction]
 
@@ -355,8 +352,7 @@ class Costs:
         """The motion at ``POINTS`` of every unit, times ``scale`` [shape=(U, POINTS, Q)]; None: there is no guide."""
         if self.inventory.predicted is None or not self.config.guide:
             return None
-        units = np.arange(len(self.inventory.windows))
-        return np.stack([self.inventory.poses(units, fraction) for fraction in FRACTIONS], axis=1) * self.scale
+        return np.stack([self.inventory.poses(fraction) for fraction in FRACTIONS], axis=1) * self.scale
 
     @cached_property
     def _predicted(self) -> Array | None:
@@ -369,37 +365,18 @@ def _differ(one: NDArray[np.int8], other: NDArray[np.int8]) -> NDArray[np.bool_]
     return (one != other) & (one >= 0) & (other >= 0)
 
 
-@dataclass(frozen=True, eq=False)
-class SelectedUnits:
-    """The chosen units.
-
-    units        : one for each phone of the target [shape=(U,)]
-    target_costs : of each [shape=(U,)]
-    join_costs   : of each with the unit before it; the first is 0 [shape=(U,)]
-    """
-
-    units: UnitNumbers
-    target_costs: Array
-    join_costs: Array
-
-    @property
-    def cost(self) -> float:
-        """The total cost."""
-        return float(self.target_costs.sum() + self.join_costs.sum())
-
-
 def select(
     costs: Costs,
     target: Target,
     excluded: NDArray[np.bool_] | None = None,
     *,
-    given: Mapping[int, int] | None = None,
+    required: Mapping[int, int] | None = None,
     prune: bool = True,
-) -> SelectedUnits:
-    """Return the candidates of least total cost.
+) -> tuple[UnitNumbers, float]:
+    """Return the candidates of least total cost, one for each phone of the target, and this cost.
 
     excluded : units that must not be used [shape=(all units,)]
-    given    : units that must be used, by the number of their phone in the target
+    required : units that must be used, by the number of their phone in the target
     prune    : leave out candidates that cannot be part of the best sequence, and those beyond the beam
     A candidate whose target cost exceeds the least one of its phone by more than two joins can cost is never the best:
     the one of least target cost in its place would be better. So this does not change the cost of the result. Of the
@@ -407,36 +384,29 @@ def select(
     (docs/results/selection.md).
     Source: Minnis & Breen 2000, §3.
     """
-    given = given or {}
-    found = [_candidates(costs, target, number, excluded, given.get(number), prune) for number in range(len(target))]
-    total, backward, joins = found[0][1].copy(), [], []
+    required = required or {}
+    found = [_candidates(costs, target, n, excluded, required.get(n), prune) for n in range(len(target))]
+    total, backward = found[0][1], []
     for number in range(1, len(found)):
         (left, _), (right, right_costs) = found[number - 1], found[number]
         join = costs.join_costs(target, number, left, right)
         sums = total[:, None] + join
         best = sums.argmin(axis=0)
-        columns = np.arange(len(right))
         backward.append(best)
-        joins.append(join[best, columns])
-        total = sums[best, columns] + right_costs
-    place = int(total.argmin())
-    places = [place]
+        total = sums[best, np.arange(len(right))] + right_costs
+    places = [int(total.argmin())]
     for best in reversed(backward):
         places.append(int(best[places[-1]]))
-    places.reverse()
-    return SelectedUnits(
-        np.array([units[n] for (units, _), n in zip(found, places, strict=True)], np.intp),
-        np.array([each[n] for (_, each), n in zip(found, places, strict=True)]),
-        np.array([0.0, *(join[n] for join, n in zip(joins, places[1:], strict=True))]),
-    )
+    units = [candidates[place] for (candidates, _), place in zip(found, reversed(places), strict=True)]
+    return np.array(units, np.intp), float(total.min())
 
 
 def _candidates(
-    costs: Costs, target: Target, number: int, excluded: NDArray[np.bool_] | None, given: int | None, prune: bool
+    costs: Costs, target: Target, number: int, excluded: NDArray[np.bool_] | None, required: int | None, prune: bool
 ) -> tuple[UnitNumbers, Array]:
     """Return the candidates for one phone, and their target costs. Where all units are excluded, they are allowed."""
-    if given is not None:
-        units = np.array([given], np.intp)
+    if required is not None:
+        units = np.array([required], np.intp)
         return units, costs.target_costs(target, number, units)
     if target.by_sound:
         usable = costs.inventory.usable

@@ -6,7 +6,7 @@ import logging
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from textwrap import wrap
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -15,15 +15,22 @@ from numpy.typing import NDArray
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
 from lipmotion.engines.selection.concatenation import Chosen, Piece, TimeMap, join_motion, list_shown_units, to_pieces
 from lipmotion.engines.selection.costs import JOIN_AFTER, JOIN_BEFORE, Costs, SelectionConfig, Target, select
-from lipmotion.engines.selection.inventory import SOURCE, RecordedUnits, count_by_source, find_source, list_inventory
+from lipmotion.engines.selection.inventory import (
+    PHONE_NUMBER,
+    SOURCE,
+    RecordedUnits,
+    find_source,
+    find_substitutes,
+    list_windows,
+)
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
 from lipmotion.engines.selection.selection_training import build_target, fit_selection
-from lipmotion.engines.selection.windows import PHONE_NUMBER, list_windows
 from lipmotion.errors import InputError
 from lipmotion.motion.predictors import count_conditions
 from lipmotion.printable import printable
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Configuration, Constraints, Example, Generation, Monitor, Speech, StateTrace, Timeline, Unit
+from lipmotion.units import PHONES
 
 Array = NDArray[np.float64]
 SOUND: dict[str, Any] = {
@@ -44,45 +51,6 @@ SOUND: dict[str, Any] = {
 ROUNDING_S = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class AcousticUnits(RecordedUnits):
-    """Units of which the sound is compared, not the motion: features of all recordings in turn [shape=(F, D)]."""
-
-    acoustic: Array
-
-    @cached_property
-    def values(self) -> Array:
-        """The acoustic features [shape=(F, D)]."""
-        return self.acoustic
-
-
-def source_pieces(
-    model: SelectionModel,
-    config: SelectionConfig,
-    units: Timeline[Unit],
-    recorded_features: Mapping[str, NDArray[np.floating[Any]]],
-) -> tuple[tuple[SourcePiece, ...], Timeline[Unit]]:
-    """Return pieces of recordings and the phones with their sources, as of ``SelectsRecordings``."""
-    inventory = _with_sound(model.inventory, recorded_features)
-    costs = Costs(inventory, replace(config, **SOUND), 1 / np.maximum(inventory.acoustic.std(axis=0), 1e-9))
-    target = costs.target(list_windows([units]), None, None)
-    chosen = select(costs, target).units
-    pieces = to_pieces(costs, target, chosen)
-    sources = [find_source(inventory, unit) for unit in chosen.tolist()]
-    found = [
-        _source_piece(inventory, target, piece, following)
-        for piece, following in zip(pieces, [*pieces[1:], None], strict=True)
-    ]
-    return tuple(found), with_sources(units, target.windows.times_s[:, 0], sources)
-
-
-def typical_duration_s(inventory: RecordedUnits, phone: str) -> float:
-    """Return the median duration of a phone, or that of all phones if none was recorded."""
-    durations_s = inventory.windows.durations_s
-    own = inventory.usable & (inventory.windows.phones == PHONE_NUMBER[phone])
-    return float(np.median(durations_s[own if own.any() else inventory.usable]))
-
-
 def with_sources(units: Timeline[Unit], starts_s: Array, sources: Sequence[str]) -> Timeline[Unit]:
     """Return the timeline with the source of the unit of every phone as the name of its unit."""
     return Timeline(
@@ -91,22 +59,6 @@ def with_sources(units: Timeline[Unit], starts_s: Array, sources: Sequence[str])
             for span in units
         )
     )
-
-
-def _with_sound(inventory: RecordedUnits, recorded_features: Mapping[str, NDArray[np.floating[Any]]]) -> AcousticUnits:
-    """Return the units with their sound. Raises InputError: features of other recordings, or of other lengths."""
-    lengths = np.diff(inventory.first).tolist()
-    for name, length in zip(inventory.names, lengths, strict=True):
-        if name not in recorded_features or len(recorded_features[name]) != length:
-            found = f"{len(recorded_features[name])} frames" if name in recorded_features else "nothing"
-            raise InputError(
-                f"recording {name}: {found} of sound, required {length} frames; give the corpus that the model learned"
-            )
-    features = np.concatenate([np.asarray(recorded_features[name], float) for name in inventory.names])
-    return AcousticUnits(
-        inventory.names, inventory.windows, inventory.usable, inventory.first, inventory.kept, inventory.motion, None,
-        features,
-    )  # fmt: skip
 
 
 def _source_piece(inventory: RecordedUnits, target: Target, piece: Piece, following: Piece | None) -> SourcePiece:
@@ -130,6 +82,7 @@ def _source_piece(inventory: RecordedUnits, target: Target, piece: Piece, follow
 
 
 LOG = logging.getLogger("lipmotion")
+LINE = 110
 NAMED_UNITS = 3
 """Units that one warning names."""
 
@@ -171,8 +124,7 @@ class SelectionEngine(Engine[SelectionModel]):
         costs = model.costs(self.config)
         target = build_target(model, costs, speech)
         frames = len(speech.features.values)
-        given = _given(costs, target, speech.units)
-        units = select(costs, target, given=given).units
+        units = select(costs, target, required=_find_named_units(costs, target, speech.units))[0]
         pieces = to_pieces(costs, target, units)
         chosen = Chosen(target, units, pieces)
         motion, variance = join_motion(model, costs, chosen, speech, constraints, close=self.config.closures)
@@ -190,15 +142,45 @@ class SelectionEngine(Engine[SelectionModel]):
         return {phone: other for phone, other in model.costs(self.config).stand_ins.items() if phone not in suppressed}
 
     def typical_duration_s(self, model: SelectionModel, phone: str) -> float:  # noqa: D102
-        return typical_duration_s(model.inventory, phone)
+        windows, usable = model.inventory.windows, model.inventory.usable
+        alike = usable & (windows.phones == PHONE_NUMBER[phone])
+        return float(np.median(windows.durations_s[alike if alike.any() else usable]))
 
     def source_pieces(  # noqa: D102
         self, model: SelectionModel, units: Timeline[Unit], features: Mapping[str, NDArray[np.floating[Any]]]
     ) -> tuple[tuple[SourcePiece, ...], Timeline[Unit]]:
-        return source_pieces(model, self.config, units, features)
+        inventory, lengths = model.inventory, np.diff(model.inventory.first).tolist()
+        for name, length in zip(inventory.names, lengths, strict=True):
+            if name not in features or len(features[name]) != length:
+                found = f"{len(features[name])} frames" if name in features else "nothing"
+                raise InputError(
+                    f"recording {name}: {found} of sound, required {length} frames; "
+                    "give the corpus that the model learned"
+                )
+        sound = np.concatenate([np.asarray(features[name], float) for name in inventory.names])
+        inventory = replace(inventory, kept=np.array([[0, len(sound)]]), motion=sound, predicted=None)
+        costs = Costs(inventory, replace(self.config, **SOUND), 1 / np.maximum(sound.std(axis=0), 1e-9))
+        target = costs.target(list_windows([units]), None, None)
+        chosen = select(costs, target)[0]
+        pieces = to_pieces(costs, target, chosen)
+        sources = [find_source(inventory, unit) for unit in chosen.tolist()]
+        pairs = zip(pieces, [*pieces[1:], None], strict=True)
+        return (
+            tuple(_source_piece(inventory, target, *pair) for pair in pairs),
+            with_sources(units, target.windows.times_s[:, 0], sources),
+        )
 
     def describe(self, model: SelectionModel) -> str:  # noqa: D102
-        return list_inventory(model.inventory)
+        windows, usable = model.inventory.windows, model.inventory.usable
+        counts = {phone: int((usable & (windows.phones == number)).sum()) for number, phone in enumerate(PHONES)}
+        stand_ins = find_substitutes(windows, usable)
+        lines = [f"{int(usable.sum())} units of {len(model.inventory.names)} recordings"]
+        for title, items in (
+            ("units of each phone", [f"{phone} {count}" for phone, count in counts.items() if count]),
+            ("phones without units, and what stands in for them", [f"{p} ({q})" for p, q in stand_ins.items()]),
+        ):
+            lines += [f"{title}:", *(f"  {line}" for line in wrap(", ".join(items), LINE))] if items else []
+        return "\n".join(lines)
 
     def to_arrays(self, model: SelectionModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         return model_arrays(model)
@@ -207,19 +189,22 @@ class SelectionEngine(Engine[SelectionModel]):
         return model_from_arrays(arrays, filtered=self.config.modulation_filter > 0)
 
 
-def _given(costs: Costs, target: Target, units: Timeline[Unit]) -> dict[int, int]:
+def _find_named_units(costs: Costs, target: Target, units: Timeline[Unit]) -> dict[int, int]:
     """Return the units that edited labels name, by phone; those of another symbol than their phone are ignored."""
     if target.by_sound:
         return {}
-    named = count_by_source(costs.inventory, (span.label.unit for span in units if span.label.unit))
+    inventory, recordings = costs.inventory, {span.label.unit.split(" ")[0] for span in units if span.label.unit}
+    numbers = [number for number, name in enumerate(inventory.names) if name.split(" ")[0] in recordings]
+    candidates = np.flatnonzero(np.isin(inventory.windows.recording, numbers) & inventory.usable).tolist()
+    named = {find_source(inventory, unit): unit for unit in candidates}
     starts_s, symbols = target.windows.times_s[:, 0], costs.index.contexts[:, costs.config.window // 2]
-    given, useless = {}, []
+    required, useless = {}, []
     for span in units:
         if span.duration_s <= 0 or not SOURCE.search(span.label.unit):
             continue
         unit, number = named.get(span.label.unit), int(np.argmin(np.abs(starts_s - span.start_s)))
         if unit is not None and symbols[unit] == target.symbol(number):
-            given[number] = unit
+            required[number] = unit
         else:
             useless.append(f"{span.label.phone} at {span.start_s:.2f} s: {span.label.unit!r}")
     if useless:
@@ -228,4 +213,4 @@ def _given(costs: Costs, target: Target, units: Timeline[Unit]) -> dict[int, int
             "%d of %d units name no recorded unit of their phone in this model (%s%s); these phones are selected again",
             *(len(useless), len(units), printable("; ".join(useless[:NAMED_UNITS])), more),
         )
-    return given
+    return required

@@ -1,22 +1,212 @@
-"""The inventory: every recorded phone in its window, with the motion that was recorded, and an index of the windows."""
+"""The inventory: every recorded phone in its context, with the motion that was recorded, and an index of the contexts.
+
+The context of a phone is the N-phone window around it, with words, position, stress and duration.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from textwrap import wrap
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.selection.windows import PHONE_NUMBER, SYMBOLS, PhoneWindows
-from lipmotion.types import FRAME_RATE_HZ
-from lipmotion.units import PHONES, find_similar_lips
+from lipmotion.errors import InputError
+from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
+from lipmotion.units import PHONES, SILENCE, close_gaps, describe_unknown_phone, find_similar_lips, is_silent
+from lipmotion.units.phones import VISEME_OF, VISEMES
+from lipmotion.units.stress import NUCLEI, find_stress
 
-LINE = 110
+PROTECTED_PHONES = ("f", "v", "m", "em", "p", "b")
+"""Phones whose lip shape every join must preserve. The paper lists /v/ twice and /b/ never."""
+PROTECTED, INVISIBLE, NORMAL = "protected", "invisible", "normal"
+
+Overlaps = Mapping[tuple[str, str], float]
+"""The forward share of a shared phone, 0 to 1, by the classes of the phones before and after it."""
+
+TABLE_1: Overlaps = {
+    (PROTECTED, PROTECTED): 0.50,
+    (PROTECTED, INVISIBLE): 0.77,
+    (PROTECTED, NORMAL): 0.55,
+    (INVISIBLE, PROTECTED): 0.23,
+    (INVISIBLE, INVISIBLE): 0.50,
+    (INVISIBLE, NORMAL): 0.27,
+    (NORMAL, PROTECTED): 0.45,
+    (NORMAL, INVISIBLE): 0.77,
+    (NORMAL, NORMAL): 0.50,
+}
+"""Table 1 as printed. Its rows (forward) are the phone before, its columns (backward) the phone after."""
+SYMMETRIC: Overlaps = {**TABLE_1, (NORMAL, INVISIBLE): 0.73}
+"""Table 1 with the one entry changed that makes it symmetric: 73/27 opposite to 27/73."""
+ANTICIPATORY: Overlaps = {(before, after): 1 - TABLE_1[after, before] for before, after in TABLE_1}
+"""Table 1 with its rows read as the phone after: the abstract calls the influence of the following segment forward."""
+MIDDLE: Overlaps = dict.fromkeys(TABLE_1, 0.5)
+LEARNED: Overlaps = {**MIDDLE, (NORMAL, PROTECTED): 0.1}
+"""The shares with the least errors of joined motion on the training list of GRID s1 (docs/results/selection.md)."""
+OVERLAPS: Mapping[str, Overlaps] = {"learned": LEARNED, "printed": TABLE_1, "symmetric": SYMMETRIC,
+                                    "anticipatory": ANTICIPATORY, "middle": MIDDLE}  # fmt: skip
+
+
+def find_lip_class(phone: str, invisible: Collection[str]) -> str:
+    """Return the class of a phone: ``protected``, ``invisible`` or ``normal``."""
+    if phone in PROTECTED_PHONES:
+        return PROTECTED
+    return INVISIBLE if phone in invisible else NORMAL
+
+
+def parse_invisible(text: str) -> frozenset[str]:
+    """Return the phones of a text such as ``t d g k``. Raises InputError: one that cannot be invisible."""
+    phones = frozenset(text.split())
+    for phone in sorted(phones):
+        if phone not in PHONES or is_silent(phone) or phone in PROTECTED_PHONES:
+            allowed = " ".join(p for p in PHONES if not is_silent(p) and p not in PROTECTED_PHONES)
+            raise InputError(f"the phone {phone!r} cannot be invisible; required some of: {allowed}")
+    return phones
+
+
+INVISIBLE_SYMBOL = len(PHONES)
+"""The symbol of all suppressed phones."""
+SYMBOLS = len(PHONES) + 1
+PHONE_NUMBER = {phone: number for number, phone in enumerate(PHONES)}
+SILENT = PHONE_NUMBER[SILENCE]
+VISEME_NUMBER = np.array([*(list(VISEMES).index(VISEME_OF[phone]) for phone in PHONES), len(VISEMES)])
+UNKNOWN_STRESS = -1
+SHORTEST_S = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class PhoneWindows:
+    """The phones of one or several recordings, in context: one row a phone.
+
+    recording : number of the recording of each phone [shape=(U,)]
+    phones    : number of each phone in ``PHONES`` [shape=(U,)]
+    times_s   : its start and its end in the recording [shape=(U, 2)]
+    words     : whether it begins a word, and whether it ends one [bool, shape=(U, 2)]
+    stress    : whether its syllable is stressed, 1 or 0; -1: not known [shape=(U,)]
+    words_known : whether phones know their words
+    hidden    : whether a suppressed phone came before each; None: none is suppressed [shape=(U,)]
+    """
+
+    recording: NDArray[np.int32]
+    phones: NDArray[np.int16]
+    times_s: NDArray[np.float64]
+    words: NDArray[np.bool_]
+    stress: NDArray[np.int8]
+    words_known: bool = True
+    hidden: NDArray[np.bool_] | None = None
+
+    def __len__(self) -> int:
+        return len(self.phones)
+
+    @property
+    def durations_s(self) -> NDArray[np.float64]:
+        """The duration of every phone [shape=(U,)]."""
+        return self.times_s[:, 1] - self.times_s[:, 0]
+
+    def symbols(self, invisible: Collection[str]) -> NDArray[np.intp]:
+        """Return the symbol of every phone [shape=(U,)]: pauses are silence, suppressed phones are one symbol."""
+        table = np.array([SILENT if is_silent(p) else INVISIBLE_SYMBOL if p in invisible else n
+                          for n, p in enumerate(PHONES)], np.intp)  # fmt: skip
+        return table[self.phones]
+
+    def contexts(self, invisible: Collection[str], reach: int) -> NDArray[np.intp]:
+        """Return the symbols around every phone [shape=(U, 2·reach + 1)]; beyond a recording there is silence."""
+        symbols = self.symbols(invisible)
+        numbers = np.arange(len(self))
+        columns = []
+        for offset in range(-reach, reach + 1):
+            there = np.clip(numbers + offset, 0, len(self) - 1)
+            inside = (there == numbers + offset) & (self.recording[there] == self.recording)
+            columns.append(np.where(inside, symbols[there], SILENT))
+        return np.stack(columns, axis=1)
+
+    @property
+    def continues(self) -> NDArray[np.bool_]:
+        """Whether the phone after each one is of the same recording [shape=(U,)]."""
+        return np.append(self.recording[1:] == self.recording[:-1], False)
+
+    @property
+    def adjoins(self) -> NDArray[np.bool_]:
+        """Whether the phone after each one is of the same recording, and none was left out between them."""
+        gaps_s = np.append(self.times_s[1:, 0] - self.times_s[:-1, 1], np.inf)
+        return self.continues & (gaps_s < SHORTEST_S / 2)
+
+    def without(self, phones: Collection[str]) -> tuple[PhoneWindows, NDArray[np.intp]]:
+        """Return the other phones, with their own times, and their numbers here; all phones, if there are no others.
+
+        A phone beside one that was left out begins or ends the word that this one began or ended.
+        """
+        kept = np.flatnonzero(~np.isin(self.phones, [PHONE_NUMBER[phone] for phone in phones]))
+        if len(kept) in (0, len(self)):
+            return self, np.arange(len(self))
+        begins = np.logical_or.reduceat(self.words[: kept[-1] + 1, 0], np.append(0, kept[:-1] + 1))
+        ends = np.logical_or.reduceat(self.words[:, 1], kept)
+        taken = replace(
+            self,
+            recording=self.recording[kept],
+            phones=self.phones[kept],
+            times_s=self.times_s[kept],
+            words=np.stack([begins, ends], axis=1),
+            stress=self.stress[kept],
+            hidden=np.diff(kept, prepend=-1) > 1,
+        )
+        return taken, kept
+
+    def suppressed(self, phones: Collection[str]) -> PhoneWindows:
+        """Return the phones of one recording without some, whose time the vowel that follows takes.
+
+        Where no vowel follows, the phone before takes it; at the start, the phone after.
+        Source: Minnis & Breen 2000, §3: "the following vowel gives the shape of the mouth".
+        """
+        others, kept = self.without(phones)
+        times_s = others.times_s.copy()
+        if len(kept) == len(self):
+            return self
+        times_s[0, 0], times_s[-1, 1] = self.times_s[0, 0], self.times_s[-1, 1]
+        vowel = np.array([PHONES[phone] in NUCLEI for phone in others.phones[1:]], bool)
+        times_s[1:, 0] = np.where(vowel, times_s[:-1, 1], times_s[1:, 0])
+        times_s[:-1, 1] = times_s[1:, 0]
+        return replace(others, times_s=times_s)
+
+
+def cover_recording(units: Timeline[Unit], duration_s: float) -> Timeline[Unit]:
+    """Return phones in time without gaps, and without phones of no duration; at least one."""
+    spans = tuple(span for span in close_gaps(units, duration_s) if span.duration_s > 0)
+    return Timeline(spans or (Span(0.0, SHORTEST_S, Unit(SILENCE)),))
+
+
+def list_windows(timelines: Sequence[Timeline[Unit]]) -> PhoneWindows:
+    """Return the phones of some recordings. Raises InputError: an unknown phone."""
+    recording, phones, times_s, words, stress = [], [], [], [], []
+    for number, units in enumerate(timelines):
+        for span in units:
+            if span.label.phone not in PHONE_NUMBER:
+                raise InputError(describe_unknown_phone(span.label.phone, f" at {span.start_s} s"))
+        spoken = [(span.label.word, is_silent(span.label.phone)) for span in units]
+        for position, span in enumerate(units):
+            recording.append(number)
+            phones.append(PHONE_NUMBER[span.label.phone])
+            times_s.append((span.start_s, span.end_s))
+            words.append(
+                tuple(
+                    not 0 <= other < len(spoken) or spoken[other] != spoken[position]
+                    for other in (position - 1, position + 1)
+                )
+            )
+        stress += [UNKNOWN_STRESS if each is None else each for each in find_stress(units)]
+    return PhoneWindows(
+        np.array(recording, np.int32),
+        np.array(phones, np.int16),
+        np.array(times_s, float).reshape(-1, 2),
+        np.array(words, bool).reshape(-1, 2),
+        np.array(stress, np.int8),
+        any(span.label.word for units in timelines for span in units),
+    )
+
+
 SOURCE = re.compile(r" \d+\.\d+-\d+\.\d+ s \S+$")
 """The end of what ``find_source`` returns."""
 
@@ -26,34 +216,6 @@ def find_source(inventory: RecordedUnits, unit: int) -> str:
     windows = inventory.windows
     start_s, end_s = windows.times_s[unit].tolist()
     return f"{inventory.names[windows.recording[unit]]} {start_s:.3f}-{end_s:.3f} s {PHONES[windows.phones[unit]]}"
-
-
-def count_by_source(inventory: RecordedUnits, sources: Iterable[str]) -> dict[str, int]:
-    """Return the units that some texts of ``find_source`` name; other texts are left out."""
-    wanted = set(sources)
-    recordings = {source.split(" ")[0] for source in wanted}
-    numbers = [number for number, name in enumerate(inventory.names) if name.split(" ")[0] in recordings]
-    units = np.flatnonzero(np.isin(inventory.windows.recording, numbers) & inventory.usable).tolist()
-    named = {find_source(inventory, unit): unit for unit in units}
-    return {source: named[source] for source in wanted if source in named}
-
-
-def list_inventory(inventory: RecordedUnits) -> str:
-    """Return how many units each phone has, and what stands in for phones without units."""
-    windows, usable = inventory.windows, inventory.usable
-    counts = {phone: int((usable & (windows.phones == n)).sum()) for n, phone in enumerate(PHONES)}
-    stand_ins = find_substitutes(windows, usable)
-    lines = [f"{int(usable.sum())} units of {len(inventory.names)} recordings"]
-    lines += _wrap_text("units of each phone", [f"{phone} {count}" for phone, count in counts.items() if count])
-    if stand_ins:
-        lines += _wrap_text(
-            "phones without units, and what stands in for them", [f"{p} ({q})" for p, q in stand_ins.items()]
-        )
-    return "\n".join(lines)
-
-
-def _wrap_text(name: str, items: list[str]) -> list[str]:
-    return [f"{name}:", *(f"  {line}" for line in wrap(", ".join(items), LINE))]
 
 
 Array = NDArray[np.float64]
@@ -103,17 +265,10 @@ class RecordedUnits:
         predicted = self.predicted[kept] if self.predicted is not None else None
         return replace(self, windows=windows, usable=self.usable[kept], predicted=predicted)
 
-    def poses(self, units: UnitNumbers, fraction: float) -> Array:
-        """Return the motion of some units at a fraction of their duration, 0 to 1 [shape=(N, Q)]."""
-        start_s, end_s = self.windows.times_s[units].T
-        return self.at(self.windows.recording[units], start_s + fraction * (end_s - start_s))
-
-    def velocities(self, units: UnitNumbers, fraction: float) -> Array:
-        """Return the change of the motion per second, at a fraction of the duration of some units [shape=(N, Q)]."""
-        start_s, end_s = self.windows.times_s[units].T
-        time_s, recording = start_s + fraction * (end_s - start_s), self.windows.recording[units]
-        step_s = 1 / FRAME_RATE_HZ
-        return (self.at(recording, time_s + step_s) - self.at(recording, time_s - step_s)) / (2 * step_s)
+    def poses(self, fraction: float, later_s: float = 0.0) -> Array:
+        """Return the motion of all units at a fraction of their duration, 0 to 1, or some time later [shape=(U, Q)]."""
+        start_s, end_s = self.windows.times_s.T
+        return self.at(self.windows.recording, start_s + fraction * (end_s - start_s) + later_s)
 
     def at(self, recording: NDArray[np.integer], time_s: Array) -> Array:
         """Return the motion of recordings at times, interpolated; held beyond their ends [shape=(N, Q)]."""
@@ -197,12 +352,6 @@ def find_substitutes(windows: PhoneWindows, usable: NDArray[np.bool_]) -> dict[s
     """Return for every phone that no usable unit has the phone that stands in for it."""
     known = {PHONES[number] for number in np.unique(windows.phones[usable])}
     return {phone: find_similar_lips(phone, known) for phone in PHONES if phone not in known} if known else {}
-
-
-def substitute_symbols(windows: PhoneWindows, stand_ins: dict[str, str]) -> PhoneWindows:
-    """Return windows in which each missing phone is the one that stands in for it."""
-    table = np.array([PHONE_NUMBER[stand_ins.get(phone, phone)] for phone in PHONES], np.int16)
-    return replace(windows, phones=table[windows.phones])
 
 
 def _keys(columns: NDArray[np.intp]) -> NDArray[np.int64]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.selection.costs import FRACTIONS, POINTS, Costs, SelectionConfig
-from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.windows import PhoneWindows
+from lipmotion.engines.selection.inventory import PhoneWindows, RecordedUnits
 from lipmotion.hmm.multistream.phone_recogniser import (
     JOINT_PREFIX,
     OwnPhoneRecogniser,
@@ -23,13 +21,9 @@ from lipmotion.motion.arrays import LEARNED_MOTION_ARRAYS, learned_motion_from_a
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.predictors import Predictor, list_predictor_arrays, predictor_from_arrays, predictor_to_arrays
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
-from lipmotion.types import FRAME_RATE_HZ, Example, Speech
+from lipmotion.types import FRAME_RATE_HZ
 from lipmotion.types.motion import interpolate_rows
 from lipmotion.units import PHONES
-
-MIN_EXPANSION, MAX_EXPANSION = 1.0, 1.6
-NEW_SPEECH_EXPANSION = 1.05
-"""Predictions for new recordings are so much narrower again than those for recordings of the training."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,21 +34,9 @@ class Guide:
     centre: Array
     expansion: Array
 
-    def predict(self, speech: Speech) -> tuple[Array, Array]:
-        """Return the predicted motion [shape=(T, Q)] and the distortion of the sound, 0 to 1 [shape=(T,)]."""
-        return self.predictor.predict(speech)
-
     def expanded(self, predicted: Array) -> Array:
         """Return predicted motion [shape=(..., Q)] as wide as recorded motion."""
         return self.centre + (predicted - self.centre) * self.expansion
-
-
-def fit_guide(predictor: Predictor, examples: Sequence[Example], values: Sequence[Array]) -> Guide:
-    """Return a guide."""
-    recorded = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
-    predicted = np.concatenate([predictor.predict(e.speech)[0][e.valid] for e in examples])
-    ratio = NEW_SPEECH_EXPANSION * recorded.std(axis=0) / np.maximum(predicted.std(axis=0), 1e-9)
-    return Guide(predictor, recorded.mean(axis=0), np.clip(ratio, MIN_EXPANSION, MAX_EXPANSION))
 
 
 def interpolate_at(motion: Array, times_s: Array) -> Array:

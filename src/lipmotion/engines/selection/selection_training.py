@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.selection.concatenation import Chosen, join_motion, join_pieces, to_pieces
 from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target, select
-from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.model import Guide, SelectionModel, fit_guide, interpolate_at
-from lipmotion.engines.selection.windows import cover_recording, list_windows
+from lipmotion.engines.selection.inventory import RecordedUnits, cover_recording, list_windows
+from lipmotion.engines.selection.model import Guide, SelectionModel, interpolate_at
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.closure import OPENING
@@ -45,16 +44,14 @@ def build_target(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
     units, guide = cover_recording(speech.units, duration_s), model.guide
     if guide is None or not guide.predictor.can_predict(speech) or not costs.config.guide:
         return costs.target(costs.shown(list_windows([units])), None, None)
-    motion, distortion = guide.predict(speech)
+    motion, distortion = guide.predictor.predict(speech)
     by_sound = bool(rate_phones(speech, distortion, frames).mean() < MIN_RELIABILITY)
-    windows = list_windows([_segments(duration_s)]) if by_sound else costs.shown(list_windows([units]))
+    if by_sound:
+        edges = np.linspace(0, duration_s, max(round(duration_s / SEGMENT_S), 1) + 1).tolist()
+        units = Timeline(tuple(Span(a, b, Unit(SILENCE)) for a, b in pairwise(edges)))
+    windows = list_windows([units]) if by_sound else costs.shown(list_windows([units]))
     predicted = interpolate_at(motion, windows.times_s)
     return costs.target(windows, guide.expanded(predicted), predicted, by_sound=by_sound)
-
-
-def _segments(duration_s: float) -> Timeline[Unit]:
-    edges = np.linspace(0, duration_s, max(round(duration_s / SEGMENT_S), 1) + 1).tolist()
-    return Timeline(tuple(Span(a, b, Unit(SILENCE)) for a, b in pairwise(edges)))
 
 
 Array = NDArray[np.float64]
@@ -62,6 +59,9 @@ CHANNEL_WEIGHTS = {"opening": 8.0, "width": 3.0}
 """Weights of channels in comparisons of motion; that of any other dimension is 1."""
 LEFT_OUT_RECORDINGS = 24
 """Recordings that are generated without their own units, which come back as they were; spread evenly over all."""
+MIN_EXPANSION, MAX_EXPANSION = 1.0, 1.6
+NEW_SPEECH_EXPANSION = 1.05
+"""Predictions for new recordings are so much narrower again than those for recordings of the training."""
 REST_AWAY_S = 0.3
 """The rest pose is that of silence further than this from speech,"""
 MIN_REST_FRAMES = 20
@@ -84,16 +84,19 @@ def fit_selection(
     recogniser = None
     if config.joint_recogniser:
         recogniser = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.3), checkpoint)
+    recorded = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
     guide = None
     if config.guide:
         kind = choose_predictor(config.predictor, examples) or PREDICTORS.load("prior")
         direct, of_guide = len(motion.space.direct), sub_monitor(monitor, 0.3, 0.9)
         training = PredictorTraining(examples, values, direct, config.epochs, of_guide, checkpoint)
-        guide = fit_guide(kind.fit(training).predictor, examples, values)
+        predictor = kind.fit(training).predictor
+        predicted = np.concatenate([predictor.predict(e.speech)[0][e.valid] for e in examples])
+        ratio = NEW_SPEECH_EXPANSION * recorded.std(axis=0) / np.maximum(predicted.std(axis=0), 1e-9)
+        guide = Guide(predictor, recorded.mean(axis=0), np.clip(ratio, MIN_EXPANSION, MAX_EXPANSION))
     monitor(Progress(_STAGE, 1, 3, 0.9))
     inventory = build_inventory(examples, values, guide)
     monitor(Progress(_STAGE, 2, 3, 0.92))
-    recorded = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
     deviations = np.maximum(recorded.std(axis=0), 1e-9)
     count = len(motion.space.direct)
     deviations[count:] = deviations[count:].max(initial=1e-9)
@@ -102,19 +105,25 @@ def fit_selection(
     scale = np.sqrt(weights) / deviations
     rest, unknown = _rest_pose(examples, values, motion.space), np.ones((3, len(scale)))
     model = SelectionModel(motion, inventory, scale, rest, unknown, guide, recogniser)
-    costs, left_out = model.costs(config), _list_left_out(model, config, examples)
-    errors = []
-    for one in left_out:
-        original, chosen = values[one.number], one.chosen
-        joined = join_pieces(costs.inventory, chosen.target, chosen.pieces, len(original))
-        errors.append(with_dynamics(original - joined)[one.frames])
+    costs, errors = model.costs(config), []
+    left_out: list[tuple[int, NDArray[np.bool_], Chosen]] = []  # recordings, measured frames, what stands in for them
+    numbers = np.unique(np.linspace(0, len(examples) - 1, LEFT_OUT_RECORDINGS).astype(int)).tolist()
+    for number in numbers if len(examples) > 1 else ():
+        frames = mark_known_dynamics(examples[number].valid)
+        if frames.any():
+            target = build_target(model, costs, examples[number].speech)
+            units = select(costs, target, costs.inventory.windows.recording == number)[0]
+            chosen = Chosen(target, units, to_pieces(costs, target, units))
+            left_out.append((number, frames, chosen))
+            joined = join_pieces(costs.inventory, target, chosen.pieces, len(values[number]))
+            errors.append(with_dynamics(values[number] - joined)[frames])
     spread = with_dynamics(recorded).var(axis=0)
     variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else spread
     model = replace(model, variances=np.maximum(variances, 1e-4 * spread + 1e-12))
     compared = (
-        (values[out.number][out.frames], motion.space.reduce(made.values.astype(float))[out.frames])
-        for out in left_out
-        for made, _ in [join_motion(model, costs, out.chosen, examples[out.number].speech)]
+        (values[number][frames], motion.space.reduce(made.values.astype(float))[frames])
+        for number, frames, chosen in left_out
+        for made, _ in [join_motion(model, costs, chosen, examples[number].speech)]
     )
     modulation = learn_filter(config.modulation_filter, compared, examples, values)
     model = replace(model, motion=replace(motion, modulation=modulation))
@@ -143,17 +152,18 @@ def build_inventory(examples: Sequence[Example], values: Sequence[Array], guide:
     if guide is not None:
         predicted = np.concatenate(
             [
-                interpolate_at(guide.predict(example.speech)[0], windows.times_s[windows.recording == number])
+                interpolate_at(guide.predictor.predict(example.speech)[0], windows.times_s[windows.recording == number])
                 for number, example in enumerate(examples)
             ]
         ).astype(np.float16)
     names = tuple(example.name for example in examples)
-    kept = list[list[int]]()  # ranges of rows: not the middle of long silences, nor what was not measured
+    stored = list[list[int]]()  # ranges of rows: not the middle of long silences, nor what was not measured
     for example, begin in zip(examples, first[:-1].tolist(), strict=True):
         near = example.valid & ~mark_distant(example.speech.units, len(example.valid), KEPT_SILENCE_S)
-        kept += (find_runs(near) + begin).tolist()
-    motion = np.concatenate(values)[np.concatenate([np.arange(start, stop) for start, stop in kept])].astype(np.float16)
-    return RecordedUnits(names, windows, usable, first, np.array(kept, np.intp), motion, predicted)
+        stored += (find_runs(near) + begin).tolist()
+    rows = np.concatenate([np.arange(start, stop) for start, stop in stored])
+    motion = np.concatenate(values)[rows].astype(np.float16)
+    return RecordedUnits(names, windows, usable, first, np.array(stored, np.intp), motion, predicted)
 
 
 def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: MotionSpace) -> Array:
@@ -170,31 +180,3 @@ def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: Moti
             opening = poses[:, space.direct_names.index(OPENING)]
             poses = poses[opening <= np.percentile(opening, 10)]
     return poses.mean(axis=0)
-
-
-@dataclass(frozen=True, eq=False)
-class _LeftOut:
-    """What was chosen for recording ``number`` without its own units, and the measured frames [shape=(T,)]."""
-
-    number: int
-    frames: NDArray[np.bool_]
-    chosen: Chosen
-
-
-def _list_left_out(model: SelectionModel, config: SelectionConfig, examples: Sequence[Example]) -> list[_LeftOut]:
-    """Return what is chosen for some examples without their own units; nothing for a single example."""
-    costs, found = model.costs(config), list[_LeftOut]()
-    if len(examples) < 2:
-        return found
-    for number in np.unique(np.linspace(0, len(examples) - 1, LEFT_OUT_RECORDINGS).astype(int)).tolist():
-        frames = mark_known_dynamics(examples[number].valid)
-        if frames.any():
-            chosen = _chosen(model, costs, examples[number], costs.inventory.windows.recording == number)
-            found.append(_LeftOut(number, frames, chosen))
-    return found
-
-
-def _chosen(model: SelectionModel, costs: Costs, example: Example, excluded: NDArray[np.bool_]) -> Chosen:
-    target = build_target(model, costs, example.speech)
-    units = select(costs, target, excluded).units
-    return Chosen(target, units, to_pieces(costs, target, units))

@@ -1,15 +1,17 @@
-"""Options and model of the trajectory engine: a Gaussian for each tied state, combined with a predictor."""
+"""The trajectory engine, its options and model: a Gaussian for each tied state, combined with a predictor."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.engines.base import Engine, Fit, Inputs
 from lipmotion.hmm.multistream.phone_recogniser import (
     JOINT_PREFIX,
     OwnPhoneRecogniser,
@@ -32,7 +34,14 @@ from lipmotion.motion.context_window import (
     acoustic_context_from_arrays,
     acoustic_context_to_arrays,
 )
-from lipmotion.motion.frame_labels import FullContextState, StateLayout, rate_phones
+from lipmotion.motion.frame_labels import (
+    FullContextState,
+    StateLayout,
+    find_digital_silence,
+    label_full_context,
+    rate_phones,
+    with_unit_names,
+)
 from lipmotion.motion.generation import LearnedMotion, VarianceScaling
 from lipmotion.motion.modulation_filter import (
     MODULATION,
@@ -41,19 +50,35 @@ from lipmotion.motion.modulation_filter import (
     filter_from_arrays,
     filter_to_arrays,
 )
+from lipmotion.motion.network_steps import hear_articulators
 from lipmotion.motion.predictors import (
     ADDED,
     AUTOMATIC,
     Predictor,
     check_predictor,
+    count_conditions,
     list_predictor_arrays,
     predictor_from_arrays,
     predictor_to_arrays,
 )
 from lipmotion.motion.space import MotionLimits, MotionSpace, check_poses, check_spread, measure_limits
+from lipmotion.printable import printable
 from lipmotion.stats.trees import TREES, Context, Tree, trees_from_arrays, trees_to_arrays
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
-from lipmotion.types import Configuration, Rule, Speech, option
+from lipmotion.types import (
+    Configuration,
+    Constraints,
+    Example,
+    Generation,
+    Monitor,
+    Rule,
+    Speech,
+    StateTrace,
+    Timeline,
+    Unit,
+    option,
+)
 from lipmotion.units import UnitSet, load_unit_set
 
 ABOVE_ZERO, ODD = Rule(above=0), Rule(least=1, odd=True)
@@ -172,29 +197,24 @@ class Emission:
     regression: AcousticRegression | None
 
     @cached_property
-    def _first(self) -> dict[str, int]:
-        counts = np.cumsum([0, *(len(tree.leaves) for tree in self.forest.values())])
-        return dict(zip(self.forest, counts.tolist(), strict=False))
-
-    @cached_property
-    def _rank(self) -> dict[str, NDArray[np.intp]]:
-        return {name: np.cumsum(tree.asked < 0) - 1 for name, tree in self.forest.items()}
+    def _rows(self) -> dict[tuple[str, int], int]:
+        leaves = [(name, leaf) for name, tree in self.forest.items() for leaf in tree.leaves.tolist()]
+        return {leaf: row for row, leaf in enumerate(leaves)}
 
     def row(self, state: FullContextState, layout: StateLayout) -> int:
         """Return the number of the density of a full-context state: its row in ``means``."""
         if state == layout.rest:
             return len(self.means) - 1
         name = layout.name(state)
-        return self._first[name] + int(self._rank[name][self._leaf(name, state.context)])
+        return self._rows[name, self._leaf(name, state.context)]
 
     def _leaf(self, name: str, context: Context) -> int:
         """Return the leaf of a context in a tree; it is looked for once."""
-        found = self._leaves.get((name, context))
-        if found is None:
+        if (name, context) not in self._leaves:
             if len(self._leaves) > MAX_CONTEXTS:
                 self._leaves.clear()
-            found = self._leaves[name, context] = self.forest[name].path(context)[-1]
-        return found
+            self._leaves[name, context] = self.forest[name].path(context)[-1]
+        return self._leaves[name, context]
 
     @cached_property
     def _leaves(self) -> dict[tuple[str, Context], int]:
@@ -234,22 +254,6 @@ def add_acoustic_regression(
         means[frames] += (z[frames] @ regression.coefficients[row]).reshape(len(frames), *means.shape[1:])
 
 
-def emission_to_arrays(emission: Emission) -> dict[str, NDArray[Any]]:
-    """Serialise the densities; means and coefficients are stored at half precision."""
-    arrays = trees_to_arrays(emission.forest) | {
-        "means": emission.means.astype(np.float16),
-        "variances": emission.variances,
-    }
-    if emission.regression is not None:
-        context = emission.regression.context
-        arrays |= {
-            **acoustic_context_to_arrays(context),
-            "coefficients": emission.regression.coefficients.astype(np.float16),
-            "coefficient_rows": emission.regression.rows,
-        }
-    return arrays
-
-
 def emission_from_arrays(arrays: Arrays, layout: StateLayout, dimensions: int) -> Emission:
     """Deserialise the densities.
 
@@ -265,7 +269,13 @@ def emission_from_arrays(arrays: Arrays, layout: StateLayout, dimensions: int) -
     leaves = sum(len(tree.leaves) for tree in forest.values()) + 1
     densities = check_arrays(arrays, DENSITIES, L=leaves, Q=dimensions)
     check_spread(densities["means"][:, 0], densities["variances"][:, 0])
-    regression = _regression_from_arrays(arrays, leaves, dimensions) if REGRESSION.keys() & arrays.keys() else None
+    regression = None
+    if REGRESSION.keys() & arrays.keys():
+        stored = check_arrays(arrays, REGRESSION, L=leaves, V=3 * dimensions)
+        rows = stored["coefficient_rows"]
+        if rows.max() >= stored.sizes["C"]:
+            raise ValueError(f"a density that uses regression {rows.max()} of {stored.sizes['C']}")
+        regression = AcousticRegression(acoustic_context_from_arrays(stored), stored["coefficients"], rows)
     return Emission(forest, densities["means"], densities["variances"], regression)
 
 
@@ -276,15 +286,7 @@ REGRESSION = {
     "coefficient_rows": ArraySpec(np.int32, "L", -1, 1e6),
 }
 EMISSION = (*TREES, *DENSITIES, *REGRESSION)
-"""Names of the arrays of ``emission_to_arrays``: L densities, C regressions on A components."""
-
-
-def _regression_from_arrays(arrays: Arrays, leaves: int, dimensions: int) -> AcousticRegression:
-    stored = check_arrays(arrays, REGRESSION, L=leaves, V=3 * dimensions)
-    rows = stored["coefficient_rows"]
-    if rows.max() >= stored.sizes["C"]:
-        raise ValueError(f"a density that uses regression {rows.max()} of {stored.sizes['C']}")
-    return AcousticRegression(acoustic_context_from_arrays(stored), stored["coefficients"], rows)
+"""Names of the arrays of an emission: L densities, C regressions on A components."""
 
 
 NETWORK_SHARE = 0.6
@@ -292,7 +294,7 @@ NETWORK_SHARE = 0.6
 RESTING_SHARE = 0.5
 """Share of its weight that the predictor has where the states rest, with voices that training knows: their mouths open
 before they speak."""
-STRANGER_LOSS = 0.8
+UNSEEN_VOICE_LOSS = 0.8
 """Share of their weight that states lose with voices that training does not know at all."""
 
 
@@ -344,11 +346,11 @@ class Experts:
         if self.prior is not None and not (self.network is not None and self.network.uses_articulation):
             familiarity = self.prior.familiarity(self.speech.units, len(self.rows))
         resting = self.rows == len(self.emission.means) - 1
-        own = self.network is not None and self.network.uses_prior  # states of a person, not of a distant speaker
-        strange = count_unseen(self.speech.voice)
-        known = 1.0 if own else 1 - STRANGER_LOSS * strange
+        personal = self.network is not None and self.network.uses_prior  # states of a person, not a distant speaker
+        unseen = count_unseen(self.speech.voice)
+        known = 1.0 if personal else 1 - UNSEEN_VOICE_LOSS * unseen
         states = (1 - self.network_share) * self.reliability * familiarity * known
-        at_rest = np.maximum(1 - self.reliability, 0.0 if own else RESTING_SHARE * (1 - strange))
+        at_rest = np.maximum(1 - self.reliability, 0.0 if personal else RESTING_SHARE * (1 - unseen))
         if self.silent is not None:
             at_rest[self.silent] = 0
         network = self.network_share * np.where(resting, at_rest, 1.0)
@@ -395,8 +397,8 @@ class TrajectoryModel:
         scaling = VarianceScaling(self.variance_factors, self.emission.means[-1, 0])
         prior = self.prior
         if prior is not None and self.network is not None:
-            beside = replace(prior, weight=TABLE_WEIGHT_WITH_PREDICTOR, known_voice_share=KNOWN_VOICE_SHARE)
-            prior = None if self.network.uses_articulation else beside
+            weaker = replace(prior, weight=TABLE_WEIGHT_WITH_PREDICTOR, known_voice_share=KNOWN_VOICE_SHARE)
+            prior = None if self.network.uses_articulation else weaker
         return LearnedMotion(self.space, self.closure, self.limits, scaling, prior, self.modulation)
 
     @property
@@ -405,37 +407,110 @@ class TrajectoryModel:
         return measure_limits(self.emission.means[:, 0])
 
 
-def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
-    """Serialise a model."""
-    arrays = motion_to_arrays(model.units, model.space, model.closure, model.prior) | {"gain": model.variance_factors}
-    recogniser = recogniser_to_arrays(model.phone_recogniser) if model.phone_recogniser is not None else {}
-    network = predictor_to_arrays(model.network)
-    if model.network is not None:
-        network |= {"network_share": np.array([model.network_share])}
-    return arrays | emission_to_arrays(model.emission) | network | recogniser | filter_to_arrays(model.modulation)
-
-
-def model_from_arrays(
-    arrays: Arrays, layout: Callable[[UnitSet], StateLayout], units: str, *, filtered: bool
-) -> TrajectoryModel:
-    """Deserialise a model, ``filtered`` with a modulation filter. Raises ModelFormatError: a missing or wrong array."""
-    with format_errors("the trajectory model"):
-        joint = (name for name in arrays if name.startswith(JOINT_PREFIX))
-        others = list_predictor_arrays(arrays)
-        refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, VARIANCE_FACTORS, others, SHARE, joint, MODULATION)
-        unit_set, space, closure, prior = motion_from_arrays(arrays, units)
-        emission = emission_from_arrays(arrays, layout(unit_set), space.dimensions)
-        factors = check_arrays(arrays, VARIANCE_FACTORS, Q=space.dimensions)["gain"]
-        recogniser, network = recogniser_from_arrays(arrays), predictor_from_arrays(arrays, space.dimensions)
-        stored = "network_share" in arrays or any(name.startswith(ADDED) for name in others)  # not in former models
-        share = float(check_arrays(arrays, SHARE)["network_share"][0]) if stored else NETWORK_SHARE
-        modulation = filter_from_arrays(arrays, space.dimensions, needed=filtered)
-        model = TrajectoryModel(
-            unit_set, space, emission, factors, closure, recogniser, network, prior, share, modulation
-        )
-        check_poses(model.poses, space, closure)
-        return model
-
-
 VARIANCE_FACTORS = {"gain": ArraySpec(np.float64, "Q", POSITIVE, 10)}
 SHARE = {"network_share": ArraySpec(np.float64, "1", 0, 1)}
+
+
+@final
+@dataclass(frozen=True)
+class TrajectoryEngine(Engine[TrajectoryModel]):
+    """Full-context hidden Markov models of motion, and maximum-likelihood parameter generation from them.
+
+    Source: Hofer 2008, §5.  Deviations: the state of a frame follows from the times of its phone, which are known from
+    recognition or forced alignment; means are regressed on the acoustic features around the frame.
+    """
+
+    config: TrajectoryConfig
+    name: ClassVar[str] = "trajectory"
+    Config: ClassVar[type[Configuration]] = TrajectoryConfig
+
+    def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102
+        conditions = count_conditions(self.config.predictor, motion_s, self.config.conditions)
+        return Inputs(self.config.joint_recogniser, conditions, prior=True, posteriors=True, encoding=True)
+
+    def fit(  # noqa: D102
+        self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
+    ) -> Fit[TrajectoryModel]:
+        from lipmotion.engines.trajectory.trajectory_training import fit_trajectory  # who animates does not train
+
+        model = fit_trajectory(examples, self.config, monitor, checkpoint)
+        frames = sum(int(example.valid.sum()) for example in examples)
+        uses_prior = model.network is not None and model.network.uses_prior
+        return Fit(model, {"frames": frames, "leaves": len(model.emission.means)}, uses_prior)
+
+    def hidden(  # noqa: D102
+        self, model: TrajectoryModel, speech: Speech
+    ) -> tuple[NDArray[np.float32], NDArray[np.float64]] | None:
+        return model.network.hidden(speech) if model.network is not None else None
+
+    def recognise(self, model: TrajectoryModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
+        return model.phone_recogniser.phones(speech) if model.phone_recogniser is not None else None
+
+    def without_closures(self) -> TrajectoryEngine:  # noqa: D102
+        return replace(self, config=replace(self.config, closures=False))
+
+    def generate(self, model: TrajectoryModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
+        frames = len(speech.features.values)
+        layout = self.config.layout(model.units)
+        states = label_full_context(speech.units, frames, layout)
+        distinct = {state: number for number, state in enumerate(dict.fromkeys(states))}
+        path = np.array([distinct[state] for state in states], np.intp)
+        rows = np.array([model.emission.row(state, layout) for state in distinct], np.intp)
+        densities = rows[path]
+        silent = find_digital_silence(np.asarray(speech.features.values), speech.units)
+        densities[silent] = len(model.emission.means) - 1
+        experts = Experts(model.emission, densities, speech, model.network, model.prior, model.network_share, silent)
+
+        learned = model.motion if self.config.variance_scaling else replace(model.motion, scaling=None)
+        motion, variance = learned.for_voice(speech.voice).generate(
+            experts.statistics,
+            frames,
+            speech.units,
+            constraints,
+            close=self.config.closures,
+            reliability=experts.reliability,
+            articulators=None if model.prior is None else hear_articulators(speech),
+            voice=speech.voice,
+        )
+        return Generation(
+            motion,
+            variance,
+            with_unit_names(speech.units, model.units),
+            StateTrace(tuple(model.emission.source(state, layout) for state in distinct), path),
+        )
+
+    def describe(self, model: TrajectoryModel) -> str:  # noqa: D102
+        return "\n\n".join(f"{printable(name)}\n{tree.text()}" for name, tree in model.emission.forest.items())
+
+    def to_arrays(self, model: TrajectoryModel) -> dict[str, NDArray[Any]]:  # noqa: D102
+        emission, regression = model.emission, model.emission.regression
+        arrays = motion_to_arrays(model.units, model.space, model.closure, model.prior)
+        arrays |= {"gain": model.variance_factors} | trees_to_arrays(emission.forest)
+        arrays |= {"means": emission.means.astype(np.float16), "variances": emission.variances}
+        if regression is not None:
+            arrays |= acoustic_context_to_arrays(regression.context)
+            arrays |= {"coefficients": regression.coefficients.astype(np.float16), "coefficient_rows": regression.rows}
+        if model.network is not None:
+            arrays |= predictor_to_arrays(model.network) | {"network_share": np.array([model.network_share])}
+        if model.phone_recogniser is not None:
+            arrays |= recogniser_to_arrays(model.phone_recogniser)
+        return arrays | filter_to_arrays(model.modulation)
+
+    def from_arrays(self, arrays: Arrays) -> TrajectoryModel:  # noqa: D102
+        with format_errors("the trajectory model"):
+            joint = (name for name in arrays if name.startswith(JOINT_PREFIX))
+            others = list_predictor_arrays(arrays)
+            refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, VARIANCE_FACTORS, others, SHARE, joint, MODULATION)
+            units, space, closure, prior = motion_from_arrays(arrays, self.config.units)
+            emission = emission_from_arrays(arrays, self.config.layout(units), space.dimensions)
+            factors = check_arrays(arrays, VARIANCE_FACTORS, Q=space.dimensions)["gain"]
+            recogniser, network = recogniser_from_arrays(arrays), predictor_from_arrays(arrays, space.dimensions)
+            # former models hold no share
+            has_share = "network_share" in arrays or any(name.startswith(ADDED) for name in others)
+            share = float(check_arrays(arrays, SHARE)["network_share"][0]) if has_share else NETWORK_SHARE
+            modulation = filter_from_arrays(arrays, space.dimensions, needed=self.config.modulation_filter > 0)
+            model = TrajectoryModel(
+                units, space, emission, factors, closure, recogniser, network, prior, share, modulation
+            )
+            check_poses(model.poses, space, closure)
+            return model

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +22,7 @@ from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
-from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
+from lipmotion.motion.context_window import fit_acoustic_context
 from lipmotion.motion.frame_labels import FullContextState, StateLayout, label_full_context
 from lipmotion.motion.generation import fit_scaling_factors
 from lipmotion.motion.modulation_filter import learn_filter
@@ -31,10 +31,8 @@ from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 from lipmotion.stats.trees import (
     Question,
-    RegressionStatistics,
     Tree,
     create_statistics,
-    fit_regression_node,
     fit_tree_regressions,
     grow_tree,
     ridge,
@@ -92,63 +90,45 @@ def fit_acoustic_regression(
     that of its parent node, so that states with few frames share the regression of their relatives.
     """
     context = fit_acoustic_context((clip.features for clip in clips), options.acoustic_components)
-    least = max(options.ridge_frames, sum(float(tree.frames[0]) for tree in emission.forest.values()) / SHARE_DIVISOR)
-    nodes: list[_Node | None] = []
+    min_frames = max(
+        options.ridge_frames, sum(float(tree.frames[0]) for tree in emission.forest.values()) / SHARE_DIVISOR
+    )
+    owners: list[_Node | None] = []  # of each density, the last node on its path with enough frames; or the root
     for name, tree in emission.forest.items():
-        nodes += [(name, fit_regression_node(tree, tree.path_to(int(leaf)), least)) for leaf in tree.leaves]
-    owners = [*nodes, None]
-    components, outputs = context.basis.shape[1], emission.means[0].size
-    statistics = {node: create_statistics(components, outputs) for node in dict.fromkeys(owners) if node is not None}
-    for node, z, error in _frames(emission, clips, layout, context, owners):
-        statistics[node].add(z, error)
-    coefficients, index = _coefficients(emission, statistics, options)
-    rows = np.array([-1 if node is None else index[node] for node in owners], np.int32)
-    regression = AcousticRegression(context, coefficients, rows)
-    return replace(emission, regression=regression, variances=_variances(emission, regression, clips, options, layout))
-
-
-_Node = tuple[str, int]
-"""A node of a tree: name of the tree, number of the node."""
-
-
-def _frames(
-    emission: Emission,
-    clips: Sequence[TrainingClip],
-    layout: StateLayout,
-    context: AcousticContext,
-    owners: Sequence[_Node | None],
-) -> Iterator[tuple[_Node, NDArray[np.float32], NDArray[np.float32]]]:
-    """Yield, by blocks, each node with a regression, the features around its frames, and its motion less its mean."""
-    numbers = {node: number for number, node in enumerate(dict.fromkeys(owners))}
-    nodes, of_row = list(numbers), np.array([numbers[node] for node in owners])
+        for leaf in tree.leaves.tolist():
+            path = reversed(tree.path_to(leaf))
+            owners.append((name, next((node for node in path if tree.frames[node] >= min_frames), 0)))
+    nodes = list(dict.fromkeys(owners))
+    owners.append(None)  # the rest pose
+    size = context.basis.shape[1], emission.means[0].size
+    statistics = {node: create_statistics(*size) for node in nodes if node is not None}
+    number_of_row = np.array([nodes.index(node) if node is not None else len(nodes) for node in owners])
     for start in range(0, len(clips), CLIPS_PER_BLOCK):
         block = clips[start : start + CLIPS_PER_BLOCK]
         rows = np.concatenate([find_density_rows(emission, clip.training_states, layout) for clip in block])
         z = np.concatenate([context(clip.features, clip.frames) for clip in block])
         error = np.concatenate([clip.rows for clip in block]) - emission.means[rows]
-        order = np.argsort(of_row[rows], kind="stable")
+        order = np.argsort(number_of_row[rows], kind="stable")
         z, error = z[order], error[order].reshape(len(order), -1).astype(np.float32)
-        present, first = np.unique(of_row[rows][order], return_index=True)
+        present, first = np.unique(number_of_row[rows][order], return_index=True)
         for number, begin, end in zip(present, first, [*first[1:], len(order)], strict=True):
-            node = nodes[number]
-            if node is not None:
-                yield node, z[begin:end], error[begin:end]
-
-
-def _coefficients(
-    emission: Emission, statistics: dict[_Node, RegressionStatistics], options: TrajectoryConfig
-) -> tuple[NDArray[np.float32], dict[_Node, int]]:
-    """Return the coefficients of all regressions [shape=(R, F, 3·Q)], and the number of the regression of each node."""
-    all_statistics = list(statistics.values())
-    total = sum(all_statistics[1:], all_statistics[0])
-    shared = ridge(total, np.zeros_like(all_statistics[0].targets), options.shared_ridge)
+            if number < len(nodes):
+                statistics[nodes[number]].add(z[begin:end], error[begin:end])
+    total = sum(list(statistics.values())[1:], next(iter(statistics.values())))
+    shared = ridge(total, np.zeros_like(total.targets), options.shared_ridge)
     matrices: dict[_Node, Array] = {}
     for name, tree in emission.forest.items():
-        own = {node: statistics[tree_name, node] for tree_name, node in statistics if tree_name == name}
-        fitted = fit_tree_regressions(tree, own, shared, options.ridge)
+        of_tree = {node: statistics[tree_name, node] for tree_name, node in statistics if tree_name == name}
+        fitted = fit_tree_regressions(tree, of_tree, shared, options.ridge)
         matrices |= {(name, node): matrix for node, matrix in fitted.items()}
     index = {node: number for number, node in enumerate(matrices)}
-    return np.array(list(matrices.values()), np.float32), index
+    rows = np.array([-1 if node is None else index[node] for node in owners], np.int32)
+    regression = AcousticRegression(context, np.array(list(matrices.values()), np.float32), rows)
+    return replace(emission, regression=regression, variances=_variances(emission, regression, clips, options, layout))
+
+
+_Node = tuple[str, int]
+"""A node of a tree: name of the tree, number of the node."""
 
 
 def _variances(
@@ -192,7 +172,13 @@ def fit_trajectory(
         phone_recogniser = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.3), checkpoint)
     monitor = sub_monitor(monitor, 0.3, 1)
     layout = options.training_layout
-    clips = [build_training_clip(example, x, layout) for example, x in zip(examples, values, strict=True)]
+    clips = []
+    for example, x in zip(examples, values, strict=True):
+        frames = np.nonzero(mark_known_dynamics(example.valid))[0]
+        rows = with_dynamics(x)[frames].astype(np.float32)
+        clips.append(
+            TrainingClip(example.speech, label_full_context(example.speech.units, len(x), layout), frames, rows)
+        )
     states = (state for clip in clips for state in clip.training_states)
     covered = {layout.name(state) for state in states if state.unit not in layout.units.silence}
     if len(covered) < layout.speech:
@@ -205,13 +191,12 @@ def fit_trajectory(
         monitor(Progress(_STAGE, 2, 3, 0.3))
         emission = fit_acoustic_regression(emission, clips, options, layout)
     prior = fit_articulation_prior(space, values, examples) if options.articulation else None
-    network: Predictor | None = None
-    share = NETWORK_SHARE
-    kind, direct = choose_predictor(options.predictor, examples), len(space.direct)
+    network, share, direct = None, NETWORK_SHARE, len(space.direct)
+    kind = choose_predictor(options.predictor, examples)
     if kind is not None:
-        of_predictor = sub_monitor(monitor, 0.4, 0.99)
+        predictor_monitor = sub_monitor(monitor, 0.4, 0.99)
         network, held_out = kind.fit(
-            PredictorTraining(examples, values, direct, options.epochs, of_predictor, checkpoint)
+            PredictorTraining(examples, values, direct, options.epochs, predictor_monitor, checkpoint)
         )
         if held_out is not None:
             share = _weigh_predictor(held_out, clips, options, layout, direct)
@@ -266,8 +251,7 @@ def _generate_pairs(
     layout: StateLayout,
 ) -> tuple[list[NDArray[np.float32]], list[Array]]:
     """Return recorded and generated motion in the valid frames of every clip that has two [each shape=(N, Q)]."""
-    recorded: list[NDArray[np.float32]] = []
-    generated: list[Array] = []
+    recorded, generated = list[NDArray[np.float32]](), list[Array]()
     for clip in clips:
         if len(clip.frames) < 2:
             continue
@@ -278,48 +262,49 @@ def _generate_pairs(
     return recorded, generated
 
 
-def build_training_clip(example: Example, values: Array, layout: StateLayout) -> TrainingClip:
-    """Return an example prepared for training."""
-    frames = np.nonzero(mark_known_dynamics(example.valid))[0]
-    states = label_full_context(example.speech.units, len(values), layout)
-    dynamics = with_dynamics(values)[frames].astype(np.float32)
-    return TrainingClip(example.speech, states, frames, dynamics)
-
-
 def _fit_emission(clips: Sequence[TrainingClip], options: TrajectoryConfig, layout: StateLayout) -> Emission:
     """Return the Gaussians of all leaves; each mean and variance is shrunk towards that of its parent node."""
     moving = np.concatenate(
         [clip.rows[[state != layout.rest for state in clip.training_states]] for clip in clips], dtype=np.float64
     )
     centre, overall = moving.mean(axis=0), moving.var(axis=0)
-    least = np.maximum(MIN_VARIANCE_SHARE * overall, MIN_VARIANCE)
-    scale = np.sqrt(np.maximum(overall, least))
+    floor = np.maximum(MIN_VARIANCE_SHARE * overall, MIN_VARIANCE)
+    scale = np.sqrt(np.maximum(overall, floor))
     grouped = _sum_context_moments(clips, layout, centre, scale)
-    forest = {name: _grow_tree(contexts, 2 * overall.size, options, layout) for name, contexts in grouped.items()}
+    questions = [Question(place, *unit_class) for place in range(3) for unit_class in layout.units.classes().items()]
+    empty = {layout.rest.context: np.zeros(1 + 2 * overall.size)}  # a state without any frame has a single leaf
+    forest = {
+        name: grow_tree(
+            list(contexts or empty),
+            np.array(list((contexts or empty).values())),
+            questions,
+            score_gaussian,
+            parameters=2 * overall.size,
+            factor=options.tree_factor,
+            least=options.least_frames,
+        )
+        for name, contexts in grouped.items()
+    }
     leaves = [
         gaussian
         for name, tree in forest.items()
         for gaussian in _fit_leaves(tree, grouped[name], overall.size, options)
     ]
     means, variances = (np.array(rows).reshape(-1, *overall.shape) for rows in zip(*leaves, strict=True))
-    rest_mean, rest_variance = _estimate_rest(clips, options, layout, centre, overall)
+    poses = [
+        clip.rows[number, 0]
+        for clip in clips
+        for number, state in enumerate(clip.training_states)
+        if state == layout.rest
+    ]
+    rest_mean, rest_variance = centre, overall
+    if poses:  # the rest pose is the median pose in silence away from speech
+        rest_mean = np.zeros_like(overall)
+        rest_mean[0] = np.median(poses, axis=0)
+        rest_variance = options.variance_shrinkage * overall / (len(poses) + options.variance_shrinkage)
     means = np.concatenate([means * scale + centre, rest_mean[None]])
     variances = np.concatenate([variances * scale * scale, rest_variance[None]])
-    return Emission(forest, means.astype(np.float32), np.maximum(variances, least).astype(np.float32), None)
-
-
-def _grow_tree(contexts: _Contexts, parameters: int, options: TrajectoryConfig, layout: StateLayout) -> Tree:
-    """Return the decision tree of one state; a single leaf where no training frame is in this state."""
-    empty = {layout.rest.context: np.zeros(1 + parameters)}
-    return grow_tree(
-        list(contexts or empty),
-        np.array(list((contexts or empty).values())),
-        [Question(place, *unit_class) for place in range(3) for unit_class in layout.units.classes().items()],
-        score_gaussian,
-        parameters=parameters,
-        factor=options.tree_factor,
-        least=options.least_frames,
-    )
+    return Emission(forest, means.astype(np.float32), np.maximum(variances, floor).astype(np.float32), None)
 
 
 _Contexts = dict[tuple[str, str, str], Array]
@@ -361,20 +346,3 @@ def _fit_leaves(tree: Tree, contexts: _Contexts, size: int, options: TrajectoryC
         deviations = squares - 2 * means[node] * sums + count * means[node] ** 2
         variances[node] = (deviations + options.variance_shrinkage * variance) / (count + options.variance_shrinkage)
     return [(means[leaf], variances[leaf]) for leaf in tree.leaves]
-
-
-def _estimate_rest(
-    clips: Sequence[TrainingClip], options: TrajectoryConfig, layout: StateLayout, fallback: Array, overall: Array
-) -> tuple[Array, Array]:
-    """Return mean and variance [each shape=(3, Q)] of the rest pose: the median pose in silence away from speech."""
-    poses = [
-        clip.rows[number, 0]
-        for clip in clips
-        for number, state in enumerate(clip.training_states)
-        if state == layout.rest
-    ]
-    if not poses:
-        return fallback, overall
-    mean = np.zeros_like(overall)
-    mean[0] = np.median(poses, axis=0)
-    return mean, options.variance_shrinkage * overall / (len(poses) + options.variance_shrinkage)

@@ -278,10 +278,6 @@ class TiedDensities:
         voiced = np.clip(total[:, 0] / np.maximum(frames, 1e-30), MIN_VOICED_PROBABILITY, 1 - MIN_VOICED_PROBABILITY)
         return TiedDensities(mixtures, np.where(frames >= MIN_FRAMES, voiced, self.voiced))
 
-    def can_split(self, statistics: GaussianStatistics) -> bool:
-        """Return whether any Gaussian has enough data to be split."""
-        return bool((statistics.moments[:, :, 0] >= SPLIT_FRAMES).any())
-
     def split(self, statistics: GaussianStatistics) -> TiedDensities:
         """Return mixtures of up to twice as many Gaussians; those with too little data are not split."""
         halves, M = self.mixtures.split(), self.mixtures.size[1]

@@ -168,69 +168,6 @@ def choose_positions(
     return {-1: (0, 1), 0: (1,), 1: (1, 2)}[inventory.side(unit, state)]
 
 
-@dataclass(frozen=True)
-class TreeCosts:
-    """What trees may ask, and what limits their growth.
-
-    factor         : price of a leaf, in units of its description length
-    least_frames   : frames that a leaf must have
-    least_variance : of a leaf's Gaussian, in the scale of the stream
-    both_neighbours : as of ``choose_positions``
-    """
-
-    factor: float
-    least_frames: float
-    least_variance: float
-    both_neighbours: bool = False
-
-
-def grow_forest(
-    stream: str,
-    inventory: Inventory,
-    questions: tuple[Question, ...],
-    triphones: Sequence[TriphoneState],
-    statistics: GaussianStatistics,
-    *,
-    has_spaces: bool,
-    costs: TreeCosts,
-) -> Forest:
-    """Return the trees that tie the states in context of one stream.
-
-    triphones  : every state in context that occurred
-    statistics : of the frames of each, for one Gaussian each
-    has_spaces : whether frames may be without a value: densities then have a point mass
-    Source: ``stats.trees.grow_tree``; a leaf costs its mean, its variance and, where there is one, its point mass.
-    """
-    values = statistics.moments[:, 0]
-    if has_spaces:
-        values = np.concatenate([statistics.frames[:, None], values], axis=1)
-    likelihood = score_multispace if has_spaces else score_gaussian
-    names = np.array([inventory.tree(context[1], state) for context, state in triphones])
-    trees = {}
-    for name, (unit, state) in inventory.trees.items():
-        asked = choose_positions(stream, inventory, unit, state, both_neighbours=costs.both_neighbours)
-        in_tree = np.flatnonzero(names == name)
-        index: dict[Context, int] = {}  # contexts reduced to the positions asked about
-        groups = [
-            index.setdefault(
-                tuple(part if place in asked else "" for place, part in enumerate(triphones[i][0])), len(index)
-            )
-            for i in in_tree.tolist()
-        ]
-        pooled = np.zeros((max(len(index), 1), values.shape[1]))
-        np.add.at(pooled, np.array(groups, np.intp), values[in_tree])
-        trees[name] = grow_tree(
-            list(index) or [("", "", "")],
-            pooled,
-            [q if q.position in asked else q._replace(members=frozenset()) for q in questions],  # always no
-            partial(likelihood, least_variance=costs.least_variance),
-            parameters=values.shape[1] - 1,
-            factor=costs.factor,
-            least=costs.least_frames,
-        )
-    return Forest(inventory, {name: Tree(questions, tree.asked, tree.no, tree.frames) for name, tree in trees.items()})
-
-
 ACOUSTIC_ONLY = StreamWeights(motion=0.0)
 MOTION_ONLY = StreamWeights(0.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -277,6 +214,53 @@ class JointConfig:
             raise InputError("tree_factor, least_frames and variance_floor must be more than 0")
         if not self.training.active:
             raise InputError("all streams are switched off in training; give at least one a weight")
+
+
+def grow_forest(
+    stream: str,
+    inventory: Inventory,
+    questions: tuple[Question, ...],
+    triphones: Sequence[TriphoneState],
+    statistics: GaussianStatistics,
+    *,
+    has_spaces: bool,
+    config: JointConfig,
+) -> Forest:
+    """Return the trees that tie the states in context of one stream.
+
+    triphones  : every state in context that occurred
+    statistics : of the frames of each, for one Gaussian each
+    has_spaces : whether frames may be without a value: densities then have a point mass
+    Source: ``stats.trees.grow_tree``; a leaf costs its mean, its variance and, where there is one, its point mass.
+    """
+    values = statistics.moments[:, 0]
+    if has_spaces:
+        values = np.concatenate([statistics.frames[:, None], values], axis=1)
+    likelihood = score_multispace if has_spaces else score_gaussian
+    names = np.array([inventory.tree(context[1], state) for context, state in triphones])
+    trees = {}
+    for name, (unit, state) in inventory.trees.items():
+        asked = choose_positions(stream, inventory, unit, state, both_neighbours=config.both_neighbours)
+        in_tree = np.flatnonzero(names == name)
+        index: dict[Context, int] = {}  # contexts reduced to the positions asked about
+        groups = [
+            index.setdefault(
+                tuple(part if place in asked else "" for place, part in enumerate(triphones[i][0])), len(index)
+            )
+            for i in in_tree.tolist()
+        ]
+        pooled = np.zeros((max(len(index), 1), values.shape[1]))
+        np.add.at(pooled, np.array(groups, np.intp), values[in_tree])
+        trees[name] = grow_tree(
+            list(index) or [("", "", "")],
+            pooled,
+            [q if q.position in asked else q._replace(members=frozenset()) for q in questions],  # always no
+            partial(likelihood, least_variance=config.variance_floor),
+            parameters=values.shape[1] - 1,
+            factor=config.tree_factor,
+            least=config.least_frames,
+        )
+    return Forest(inventory, {name: Tree(questions, tree.asked, tree.no, tree.frames) for name, tree in trees.items()})
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.hmm.baum_welch import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES, group_by_length
 from lipmotion.hmm.multistream.densities import (
     F0_STREAMS,
     MIN_POSTERIOR,
     MOTION,
     SPEECH,
+    SPLIT_FRAMES,
     STREAMS,
     GaussianStatistics,
     StreamObservations,
@@ -28,13 +28,13 @@ from lipmotion.hmm.multistream.model import (
     JointConfig,
     JointHmm,
     StreamModel,
-    TreeCosts,
     build_unit_forest,
     grow_forest,
     list_context_questions,
 )
-from lipmotion.hmm.multistream.recognise import check_bounds, measure_durations
+from lipmotion.hmm.multistream.recognise import align, check_bounds
 from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState, expand_triphones
+from lipmotion.hmm.unit_training import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES, group_by_length
 from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.em import Sums, run_em, sum_statistics
@@ -44,6 +44,8 @@ from lipmotion.types import Monitor, Progress, silent_monitor, sub_monitor
 
 MIN_STAY_PROBABILITY = 0.05
 """Smallest probability of staying in a state."""
+MIN_DURATION_VARIANCE = 1.0
+"""Smallest variance of a duration, in frames²; durations that were all equal have variance 0."""
 MIN_MIXTURE_POSTERIOR = 1e-5
 """Smaller state posteriors are left out of the statistics of mixtures; nearly all posteriors are smaller."""
 Rows = NDArray[np.float32]
@@ -79,10 +81,6 @@ class PreparedUtterances:
 
     items: tuple[PreparedUtterance, ...]
     triphones: tuple[TriphoneState, ...]
-
-    def leaves(self, hmm: JointHmm) -> Leaves:
-        """Return the leaves of all states in context, by stream [shape=(len(triphones),)]."""
-        return hmm.leaves(self.triphones)
 
 
 class StatePosteriors(NamedTuple):
@@ -177,7 +175,7 @@ def accumulate_statistics(
     usable = [item for item in utterances.items if item.fits and active & set(item.streams)]
     batches = group_by_length([item.frames for item in usable], [len(item.monophones) for item in usable])
     shards = [[usable[i] for i in batch] for batch in batches] or [[]]
-    accounts = _Accounts(hmm, utterances.leaves(hmm), by_triphone)
+    accounts = _Accounts(hmm, hmm.leaves(utterances.triphones), by_triphone)
     return _statistics(hmm, sum_statistics(_shard_sums, accounts, shards, work))
 
 
@@ -189,10 +187,8 @@ def _shard_sums(job: tuple[_Accounts, Sequence[PreparedUtterance]]) -> Sums:
 def _add_up(accounts: _Accounts, posteriors: Iterable[tuple[PreparedUtterance, StatePosteriors]]) -> Sums:
     """Return the statistics of utterances with the posteriors of their states."""
     hmm, leaves, by_triphone = accounts
-    statistics, waiting = (
-        dict[str, GaussianStatistics](),
-        defaultdict[str, list[tuple[Rows, NDArray[np.intp], Rows]]](list),
-    )
+    statistics = dict[str, GaussianStatistics]()
+    waiting = defaultdict[str, list[tuple[Rows, NDArray[np.intp], Rows]]](list)
     for name, model in hmm.models.items():
         count, components, dimensions = model.tied.mixtures.size
         statistics[name] = GaussianStatistics.zeros(len(leaves[name]) if by_triphone else count, components, dimensions)
@@ -217,8 +213,8 @@ def _add_up(accounts: _Accounts, posteriors: Iterable[tuple[PreparedUtterance, S
         arrays = (np.concatenate(each) for each in zip(*pairs, strict=True))
         hmm.models[name].tied.accumulate_components(statistics[name], *arrays)
     sums = {"stay": stay, "occupied": occupied, "log likelihood": np.array(log_likelihood), "frames": np.array(frames)}
-    for name, own in statistics.items():
-        sums |= {f"{name} frames": own.frames, f"{name} moments": own.moments}
+    for name, each in statistics.items():
+        sums |= {f"{name} frames": each.frames, f"{name} moments": each.moments}
     return sums
 
 
@@ -279,7 +275,7 @@ def train_joint(
 ) -> JointHmm:
     """Return models of all streams, trained together: the last of ``grow_joint``, which says what it takes."""
     *_, hmm = grow_joint(utterances, inventory, classes, config, monitor, work)
-    return with_durations(hmm, utterances)
+    return replace(hmm, durations=measure_durations(hmm, utterances))
 
 
 def grow_joint(
@@ -292,7 +288,7 @@ def grow_joint(
 ) -> Iterator[JointHmm]:
     """Yield models of all streams, trained together, of 1, 2, 4 … Gaussians for speech, then of more for motion.
 
-    Their durations are not measured (NaN): ``with_durations``.
+    Their durations are not measured (NaN): ``measure_durations``.
 
     classes : sets of units, by name, that the trees ask about, besides single units
     A stream of weight 0 in training does not affect the alignment, but its densities are learned.
@@ -341,14 +337,19 @@ def _start(
         )
 
     def posteriors() -> Iterator[tuple[PreparedUtterance, StatePosteriors]]:
+        """Give all states of a unit, or without bounds all states, equally many frames."""
         for item, utterance in zip(prepared.items, utterances, strict=True):
             if item.fits:
                 positions = expand_triphones(inventory, utterance.units).positions
+                path = np.arange(item.frames) * len(positions) // item.frames
+                for position, (start, end) in enumerate(pairwise([] if utterance.bounds is None else utterance.bounds)):
+                    states = np.flatnonzero(positions == position)
+                    path[start:end] = states[np.arange(end - start) * len(states) // max(end - start, 1)]
                 posterior = np.zeros((item.frames, len(item.monophones)))
-                posterior[np.arange(item.frames), _spread_states(positions, item.frames, utterance.bounds)] = 1
+                posterior[np.arange(item.frames), path] = 1
                 yield item, StatePosteriors(posterior, np.maximum(posterior.sum(axis=0) - 1, 0), 0.0)
 
-    sums = _add_up(_Accounts(hmm, prepared.leaves(hmm), by_triphone=False), posteriors())
+    sums = _add_up(_Accounts(hmm, hmm.leaves(prepared.triphones), by_triphone=False), posteriors())
     return reestimate_hmm(hmm, _statistics(hmm, sums)), prepared
 
 
@@ -371,20 +372,25 @@ def _make_equal_models(
     return JointHmm(config, inventory, models, log_stay, durations, spoken, bigram)
 
 
-def _spread_states(positions: NDArray[np.intp], frames: int, bounds: NDArray[np.intp] | None) -> NDArray[np.intp]:
-    """Return the state of every frame [shape=(T,)]: all states of a unit, or without bounds all, last equally long."""
-    if bounds is None:
-        return np.arange(frames) * len(positions) // frames
-    path = np.empty(frames, np.intp)
-    for position, (start, end) in enumerate(pairwise(bounds.tolist())):
-        states = np.flatnonzero(positions == position)
-        path[start:end] = states[np.arange(end - start) * len(states) // max(end - start, 1)]
-    return path
-
-
-def with_durations(hmm: JointHmm, utterances: Sequence[TrainingUtterance]) -> JointHmm:
-    """Return models with the durations of states that are measured in the alignment of their training."""
-    return replace(hmm, durations=measure_durations(hmm, [(u.observed, u.units) for u in utterances]))
+def measure_durations(hmm: JointHmm, utterances: Sequence[TrainingUtterance]) -> NDArray[np.float64]:
+    """Return mean and variance of the duration of each state without context, in frames [shape=(R, 2)]."""
+    sums = np.zeros((len(hmm.log_stay), 3))
+    for utterance in utterances:
+        observed, units = utterance.observed, utterance.units
+        active = set(hmm.config.training.active) & set(observed.streams) & set(hmm.models)
+        if not active or len(expand_triphones(hmm.inventory, units).monophones) > observed.frames:
+            continue
+        path = align(hmm, observed, units, weights=hmm.config.training)
+        frames = np.bincount(path.frames, minlength=len(path.states.monophones)).astype(float)
+        np.add.at(sums, path.states.monophones, np.stack([np.ones(len(frames)), frames, frames * frames], axis=1))
+    leave = np.exp(hmm.log_move)
+    geometric = np.stack([1 / leave, (1 - leave) / leave**2], axis=1)
+    count = np.maximum(sums[:, 0], 1)
+    mean = sums[:, 1] / count
+    measured = np.stack([mean, sums[:, 2] / count - mean * mean], axis=1)
+    durations = np.where(sums[:, :1] > 0, measured, geometric)
+    durations[:, 1] = np.maximum(durations[:, 1], MIN_DURATION_VARIANCE)
+    return durations
 
 
 def _split_monitor(monitor: Monitor, widths: Sequence[int]) -> list[Monitor]:
@@ -409,12 +415,11 @@ def _tie_states(
     """Return the models with their states in context tied by decision trees, one Gaussian a leaf."""
     config, triphones = hmm.config, prepared.triphones
     statistics = accumulate_statistics(hmm, prepared, work, by_triphone=True).densities
-    costs = TreeCosts(config.tree_factor, config.least_frames, config.variance_floor, config.both_neighbours)
     models = {}
     for step, (name, model) in enumerate(hmm.models.items(), start=1):
         has_spaces = model.tied.voiced is not None
         forest = grow_forest(
-            name, hmm.inventory, questions, triphones, statistics[name], has_spaces=has_spaces, costs=costs
+            name, hmm.inventory, questions, triphones, statistics[name], has_spaces=has_spaces, config=config
         )
         of_leaves = statistics[name].pool(forest.leaves(triphones), forest.size)
         untrained = make_standard_normals(forest.size, len(model.scale.mean), has_spaces)
@@ -428,7 +433,7 @@ def _split(
 ) -> JointHmm | None:
     """Return the models with a stream's Gaussians split, and trained; None: too little data."""
     model, statistics = hmm.models[name], accumulate_statistics(hmm, prepared, work).densities[name]
-    if not model.tied.can_split(statistics):
+    if not (statistics.moments[:, :, 0] >= SPLIT_FRAMES).any():
         return None
     tied = model.tied.split(statistics)
     new = replace(hmm, models={**hmm.models, name: replace(model, tied=tied)})

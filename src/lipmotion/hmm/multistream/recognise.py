@@ -1,11 +1,12 @@
-"""Alignment and recognition with multi-stream models: the most probable units."""
+"""Inference with multi-stream models: alignment, recognition of the most probable units, and generation of motion."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +15,9 @@ from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.multistream.densities import ACOUSTIC_STREAMS, MOTION, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.unit_states import RecognisedUnit, TriphoneStates, expand_triphones
-from lipmotion.hmm.network import LogLikelihoods, NetworkBuilder, UnitLoop, build_chain, decode_units
-
-MIN_VARIANCE = 1.0
-"""Smallest variance of a duration, in frames²; durations that were all equal have variance 0."""
+from lipmotion.hmm.network import LogLikelihoods, NetworkBuilder, UnitLoop, build_chain, decode_path
+from lipmotion.kernels.banded import solve_mlpg
+from lipmotion.stats.curves import with_dynamics
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,28 +81,6 @@ def check_bounds(bounds: NDArray[np.intp], units: int, frames: int) -> None:
         raise InputError(f"bounds {bounds.tolist()} of {units} units; required one more than units, from 0 to {frames}")
 
 
-def measure_durations(
-    hmm: JointHmm, utterances: Iterable[tuple[StreamObservations, Sequence[str]]]
-) -> NDArray[np.float64]:
-    """Return mean and variance of the duration of each state without context, in frames [shape=(R, 2)]."""
-    sums = np.zeros((len(hmm.log_stay), 3))
-    for observed, units in utterances:
-        active = set(hmm.config.training.active) & set(observed.streams) & set(hmm.models)
-        if not active or len(expand_triphones(hmm.inventory, units).monophones) > observed.frames:
-            continue
-        path = align(hmm, observed, units, weights=hmm.config.training)
-        frames = np.bincount(path.frames, minlength=len(path.states.monophones)).astype(float)
-        np.add.at(sums, path.states.monophones, np.stack([np.ones(len(frames)), frames, frames * frames], axis=1))
-    leave = np.exp(hmm.log_move)
-    geometric = np.stack([1 / leave, (1 - leave) / leave**2], axis=1)
-    count = np.maximum(sums[:, 0], 1)
-    mean = sums[:, 1] / count
-    measured = np.stack([mean, sums[:, 2] / count - mean * mean], axis=1)
-    durations = np.where(sums[:, :1] > 0, measured, geometric)
-    durations[:, 1] = np.maximum(durations[:, 1], MIN_VARIANCE)
-    return durations
-
-
 Grid = NDArray[np.intp]
 
 
@@ -119,8 +97,7 @@ class ContextLoop:
     monophones: NDArray[np.intp]
 
 
-@dataclass(frozen=True, eq=False)
-class _StateNodes:
+class _StateNodes(NamedTuple):
     """The nodes of one state of a unit: one for each class of left and each of right neighbours that it tells apart.
 
     left, right : [shape=(N,)], the class of every neighbour
@@ -133,14 +110,6 @@ class _StateNodes:
     left: NDArray[np.intp]
     right: NDArray[np.intp]
     numbers: Grid
-
-    def after(self, neighbour: int) -> list[int]:
-        """Return the nodes that have this left neighbour."""
-        return [int(number) for number in self.numbers[self.left[neighbour], :]]
-
-    def before(self, neighbour: int) -> list[int]:
-        """Return the nodes that have this right neighbour."""
-        return [int(number) for number in self.numbers[:, self.right[neighbour]]]
 
 
 def build_context_loop(hmm: JointHmm) -> ContextLoop:
@@ -182,12 +151,12 @@ def _join_units(
         leave = float(hmm.log_move[hmm.inventory.monophones[unit, hmm.inventory.count(unit) - 1]])
         for following in units:
             entered, score = nodes[following][0], leave + _language_score(hmm, unit, following)
-            for source in last.before(place[following]):
-                for target in entered.after(place[unit]):
+            for source in last.numbers[:, last.right[place[following]]].tolist():
+                for target in entered.numbers[entered.left[place[unit]]].tolist():
                     builder.arc(source, target, score)
-        for node in first.after(place[silence]):
+        for node in first.numbers[first.left[place[silence]]].tolist():
             builder.initial(node, hmm.config.insertion if unit == silence else _language_score(hmm, silence, unit))
-        for node in last.before(place[silence]):
+        for node in last.numbers[:, last.right[place[silence]]].tolist():
             builder.final(node, leave + (0.0 if unit == silence else _language_score(hmm, unit, silence)))
 
 
@@ -241,11 +210,6 @@ class JointRecogniser:
         if MOTION in self._weights.active:
             raise InputError("recognition uses no motion: give the stream motion the weight 0")
 
-    def recognise(self, observed: StreamObservations, beam: float | None = None) -> list[RecognisedUnit]:
-        """Return the likeliest units. Raises InputError: no active stream. Raises AlignmentError: too few frames."""
-        units, starts = decode_units(self._loop.network, self._log_likelihoods(observed), beam)
-        return [RecognisedUnit(unit, int(first)) for unit, first in zip(units, starts[:-1], strict=True)]
-
     @property
     def _weights(self) -> StreamWeights:
         return self.weights or self.hmm.config.recognition
@@ -254,18 +218,103 @@ class JointRecogniser:
     def _loop(self) -> ContextLoop:
         return build_context_loop(self.hmm)
 
-    def _log_likelihoods(self, observed: StreamObservations) -> LogLikelihoods:
+    def recognise(self, observed: StreamObservations) -> list[RecognisedUnit]:
+        """Return the likeliest units. Raises InputError: no active stream. Raises AlignmentError: too few frames."""
         streams = self.hmm.standardise(observed, self._weights)
 
-        def log_density(first: int, end: int, chosen: NDArray[np.intp] | None) -> NDArray[np.float32]:
+        def log_density(first: int, end: int, _: NDArray[np.intp] | None) -> NDArray[np.float32]:
             rows = {name: stream[first:end] for name, stream in streams.items()}
-            values = self.hmm.log_density(rows, self._loop.leaves, self._weights).astype(np.float32)
-            return values if chosen is None else values[:, chosen]
+            return self.hmm.log_density(rows, self._loop.leaves, self._weights).astype(np.float32)
 
-        return LogLikelihoods(observed.frames, log_density)
+        loop = self._loop.network
+        units, starts = decode_path(loop, loop.network.best_path(LogLikelihoods(observed.frames, log_density)))
+        return [RecognisedUnit(unit, int(first)) for unit, first in zip(units, starts[:-1], strict=True)]
 
 
 @lru_cache(maxsize=4)
 def build_recogniser(hmm: JointHmm) -> JointRecogniser:
     """Return the recogniser of a model; the last few recognisers, with their networks, are cached."""
     return JointRecogniser(hmm)
+
+
+Array = NDArray[np.float64]
+ITERATIONS = 20
+"""Largest number of steps of EM; a dozen are enough nearly always."""
+MIN_GAIN = 1e-4
+"""EM ends when a step raises the log likelihood per frame by less."""
+LOG_2PI = float(np.log(2 * np.pi))
+
+
+@dataclass(frozen=True, eq=False)
+class FrameDensities:
+    """A mixture of M diagonal Gaussians for every frame, of static values, Δ and Δ².
+
+    log_weights : [shape=(T, M)]
+    means, precisions : [shape=(T, M, 3, Q)], in units of the motion
+    Δ and Δ² of the first and last frame, which need frames outside, have precision 0.
+    """
+
+    log_weights: Array
+    means: Array
+    precisions: Array
+
+    def log_components(self, trajectory: Array) -> Array:
+        """Return log weight + log density of a trajectory [shape=(T, Q)] and its dynamics [shape=(T, M)]."""
+        off = with_dynamics(trajectory)[:, None] - self.means
+        used = self.precisions > 0
+        scale = np.log(np.where(used, self.precisions, 1)) - LOG_2PI * used
+        return self.log_weights + 0.5 * (scale - self.precisions * off * off).sum(axis=(2, 3))
+
+
+def select_densities(hmm: JointHmm, path: StatePath) -> FrameDensities:
+    """Return the densities of motion along a path of states. Raises InputError: no motion, or its weight is 0."""
+    weight = hmm.config.synthesis.motion
+    if MOTION not in hmm.models or not weight:
+        raise InputError("the model has no motion, or it is switched off in synthesis; train on recordings with a face")
+    model = hmm.models[MOTION]
+    mixtures, deviation = model.tied.mixtures, model.scale.deviation
+    G, M, D = mixtures.size
+    means = (mixtures.means * deviation + model.scale.mean).reshape(G, M, 3, D // 3)
+    precisions = (weight / (mixtures.variances * deviation**2)).reshape(G, M, 3, D // 3)
+    chosen = model.forest.leaves(path.states.triphones)[path.frames]
+    precisions = precisions[chosen]
+    precisions[[0, -1], :, 1:] = 0  # Δ and Δ² of the first and last frame count for nothing
+    return FrameDensities(mixtures.log_weights[chosen].astype(float), means[chosen], precisions)
+
+
+def solve_trajectory(densities: FrameDensities, iterations: int = ITERATIONS) -> tuple[Array, tuple[float, ...]]:
+    """Return the trajectory that is most probable together with its dynamics, and its log likelihood by step.
+
+    iterations : most steps of EM over the Gaussians of mixtures; for single ones there is a closed form
+    Source: Hofer 2008, Eqs. 6–11, with Δ²x_t = x_{t−1} − 2x_t + x_{t+1} (the print lost the minus sign); for mixtures,
+    EM over the components as in Tokuda et al. 2000, case 3 with one state path.
+    Cost: O(T·M·Q) a step.
+    """
+    values, _ = solve_mlpg(*_merge(densities, np.exp(densities.log_weights)))
+    log_likelihoods: list[float] = []
+    for _ in range(iterations):
+        components = densities.log_components(values)
+        best = components.max(axis=1, keepdims=True)
+        share = np.exp(components - best)
+        log_likelihoods.append(float((best[:, 0] + np.log(share.sum(axis=1))).sum()))
+        gain = np.diff(log_likelihoods[-2:])
+        if share.shape[1] == 1 or len(log_likelihoods) == iterations or (gain < MIN_GAIN * len(values)).any():
+            break
+        values, _ = solve_mlpg(*_merge(densities, share / share.sum(axis=1, keepdims=True)))
+    return values, tuple(log_likelihoods)
+
+
+def merge_gaussians(densities: FrameDensities) -> tuple[Array, Array]:
+    """Return one Gaussian for every frame: mean and precision [each shape=(T, 3, Q)]."""
+    if densities.log_weights.shape[1] == 1:
+        return densities.means[:, 0], densities.precisions[:, 0]
+    components = densities.log_components(solve_trajectory(densities)[0])
+    share = np.exp(components - components.max(axis=1, keepdims=True))
+    return _merge(densities, share / share.sum(axis=1, keepdims=True))
+
+
+def _merge(densities: FrameDensities, share: Array) -> tuple[Array, Array]:
+    """Return mean and precision of every frame [each shape=(T, 3, Q)], given posteriors of the Gaussians (T, M)."""
+    shared = densities.precisions * share[:, :, None, None]
+    precision = shared.sum(axis=1)
+    return (shared * densities.means).sum(axis=1) / np.maximum(precision, np.finfo(float).tiny), precision

@@ -70,14 +70,6 @@ class Inventory:
         middle = 2 * state + 1 - self.count(unit)
         return 0 if unit in self.free else (middle > 0) - (middle < 0)
 
-    def contexts(self, units: Sequence[str]) -> list[Context]:
-        """Return each unit of a sequence in context (left, unit, right), silence at its ends. Raises InputError."""
-        unknown = sorted(set(units) - set(self.names))
-        if unknown:
-            raise InputError(f"unknown unit {unknown[0]!r}; the model's units: {' '.join(self.names)}")
-        neighbours = [self.silence, *(self.silence if unit in self.free else unit for unit in units), self.silence]
-        return list(zip(neighbours, units, neighbours[2:], strict=False))
-
 
 @dataclass(frozen=True, eq=False)
 class TriphoneStates:
@@ -93,8 +85,13 @@ class TriphoneStates:
 
 
 def expand_triphones(inventory: Inventory, units: Sequence[str]) -> TriphoneStates:
-    """Return the states of a sequence of units. Raises InputError: an unknown unit."""
-    contexts = inventory.contexts(units)
+    """Return the states of a sequence of units, with silence at its ends. Raises InputError: an unknown unit."""
+    unknown = sorted(set(units) - set(inventory.names))
+    if unknown:
+        raise InputError(f"unknown unit {unknown[0]!r}; the model's units: {' '.join(inventory.names)}")
+    silence, free = inventory.silence, inventory.free
+    neighbours = [silence, *(silence if unit in free else unit for unit in units), silence]
+    contexts = zip(neighbours, units, neighbours[2:], strict=False)
     counts = [inventory.count(unit) for unit in units]
     triphones = tuple(
         (context, state) for context, count in zip(contexts, counts, strict=True) for state in range(count)

@@ -36,14 +36,10 @@ from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Motion, Timeline, Uni
 Array = NDArray[np.float64]
 Real = NDArray[np.floating[Any]] | float
 
-HINGE = (-0.45, -0.75)
-"""The axis of the jaw: height and depth behind the eyes, in eye distances."""
-JAW_ANGLE_RAD = 0.44
-"""How far ``jawOpen`` turns the jaw: the lower lip goes down by about half an eye distance."""
-UPPER_PART = 0.08
-"""The share of the gap that the upper lip closes in ``mouthClose``; the lower lip closes the rest."""
-MIN_OPENING = 0.05
-"""A blendshape that parts the lips by more, in eye distances, opens the mouth."""
+HINGE = (-0.45, -0.75)  # the axis of the jaw: height and depth behind the eyes, in eye distances
+JAW_ANGLE_RAD = 0.44  # how far ``jawOpen`` turns the jaw: the lower lip goes down by about half an eye distance
+UPPER_PART = 0.08  # the share of the gap that the upper lip closes in ``mouthClose``; the lower lip closes the rest
+MIN_OPENING = 0.05  # a blendshape that parts the lips by more, in eye distances, opens the mouth
 ARTICULATORY = {
     "tongue": {"tongueOut": 3.0},
     "lip_tuck": {"mouthRollLower": 1.8},
@@ -231,8 +227,7 @@ def find_own_weights(motion: Motion, shapes: FaceShapes) -> Motion | None:
     return Motion(values, motion.rate_hz, tuple(Channel(name, WEIGHT) for name in shapes.names))
 
 
-MIN_PROTRUSION = 0.03
-"""Protruded lips are at least so far in front of their rest pose, in eye distances."""
+MIN_PROTRUSION = 0.03  # protruded lips are at least so far in front of their rest pose, in eye distances
 CORNER_RISE, CORNER_FALL = 0.1, 0.07
 """How far points of the corners rise in a full smile, and fall where a mood pulls them down, in eye distances."""
 KNOWN_GAP = 0.02
@@ -320,8 +315,7 @@ def _separate_lips(heights: Array, across: Array, gap: Array) -> Array:
 def _invent_points(motion: Motion, rest: NDArray[np.bool_], mouth: SpokenMouth) -> Array:
     """Return displacements of the points from distances alone [shape=(T, 52, 3)]."""
     template = build_mouth()
-    across = np.clip(template.places[:, 0] / (template.width / 2), -1, 1)
-    middle = np.sqrt(1 - across**2)
+    middle = np.sqrt(1 - np.clip(template.places[:, 0] / (template.width / 2), -1, 1) ** 2)
     rise = weigh_upper(mouth.gap)
     drop = mouth.gap - rise
     moved = np.zeros((len(mouth.gap), len(template.points), 3))

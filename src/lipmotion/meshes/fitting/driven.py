@@ -31,27 +31,6 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 
-def skin_vertices(weights: csr_array, matrices: Array, vertices: Array) -> Array:
-    """Return the vertices under the blended transformations of the control points [shape=(N, 3)].
-
-    weights  : of each control point on each vertex [shape=(N, C), sparse rows]; a row of sum below 1 leaves the rest of
-               its vertex where it is
-    matrices : rotation, scale and shift of each control point [shape=(C, 3, 4)]
-    vertices : at rest [shape=(N, 3)]
-    v′ = Σ wᵢ Mᵢ v + (1 − Σ wᵢ) v: the matrices are blended, then applied, which is the same and costs less.
-    Source: Hofer 2008, Eq. 12.  Deviation: a fixed control point has what the weights leave of 1, so that the face
-    beyond the mouth stands still.
-    Cost: O(12 · (number of weights) + 12 N).
-    """
-    blended = (weights @ (matrices - np.eye(3, 4)).reshape(len(matrices), 12)).reshape(-1, 3, 4)
-    moved: Array = blended[:, :, 0] * vertices[:, :1]
-    moved += blended[:, :, 1] * vertices[:, 1:2]
-    moved += blended[:, :, 2] * vertices[:, 2:]
-    moved += blended[:, :, 3]
-    moved += vertices
-    return moved
-
-
 @dataclass(frozen=True, eq=False)
 class ControlBinding:
     """Weights of control points on the vertices of a mesh.
@@ -73,8 +52,7 @@ class ControlBinding:
         """The weights as sparse rows [shape=(N, C)]."""
         from scipy.sparse import csr_array
 
-        count = self.controls.shape[1]
-        starts = np.arange(0, self.controls.size + 1, count)
+        starts = np.arange(0, self.controls.size + 1, self.controls.shape[1])
         shape = (len(self.rows), len(self.placement.points))
         return csr_array((self.weights.reshape(-1), self.controls.reshape(-1), starts), shape=shape)
 
@@ -85,11 +63,20 @@ class ControlBinding:
         return self.transformed(mesh, matrices)
 
     def transformed(self, mesh: Mesh, matrices: Array) -> Array:
-        """Return the vertices [shape=(V, 3)] under transformations of the control points [shape=(C, 3, 4)] (Hofer 2008,
-        Eq. 12).
+        """Return the vertices [shape=(V, 3)] under transformations of the control points [shape=(C, 3, 4)].
+
+        v′ = Σ wᵢ Mᵢ v + (1 − Σ wᵢ) v: the matrices are blended, then applied, which is the same and costs less.
+        Source: Hofer 2008, Eq. 12.  Deviation: a fixed control point has what the weights leave of 1, so that the face
+        beyond the mouth stands still.
+        Cost: O(12 · (number of weights) + 12 N).
         """
-        vertices = mesh.vertices.copy()
-        vertices[self.rows] = skin_vertices(self.matrix, matrices, mesh.vertices[self.rows])
+        vertices, at_rest = mesh.vertices.copy(), mesh.vertices[self.rows]
+        blended = (self.matrix @ (matrices - np.eye(3, 4)).reshape(len(matrices), 12)).reshape(-1, 3, 4)
+        moved: Array = blended[:, :, 0] * at_rest[:, :1]
+        moved += blended[:, :, 1] * at_rest[:, 1:2]
+        moved += blended[:, :, 2] * at_rest[:, 2:]
+        moved += blended[:, :, 3]
+        vertices[self.rows] = moved + at_rest
         return vertices
 
 
@@ -113,9 +100,8 @@ def _solve_with_table(
     if stated:
         others = [name for name in motion.names if name not in {*stated, *(row.control for row in rows)}]
         values = np.stack([*(motion[name] for name in others), *stated.values()], axis=1)
-        channels = [motion.channels[motion.column(name)] for name in others] + [
-            Channel(name, WEIGHT) for name in stated
-        ]
+        channels = [motion.channels[motion.column(name)] for name in others]
+        channels += [Channel(name, WEIGHT) for name in stated]
         solved = solve_shape_weights(Motion(values, motion.rate_hz, tuple(channels)), units, scaled)
     else:
         solved = solve_shape_weights(motion, units, shapes)
@@ -178,10 +164,7 @@ class DrivenCharacter:
     table: Mapping[str, RigRow] = field(default_factory=dict)
 
     def weights(self, motion: Motion, units: Timeline[Unit]) -> Motion:
-        """Return the weights of the blendshapes over time, channels by the names of the mesh, 0 to 1.
-
-        Raises InputError: the character has no blendshapes of the mouth, or as ``solve_shape_weights``.
-        """
+        """Return blendshapes' weights over time, by the mesh's names. Raises InputError: it has none of the mouth."""
         if self.shapes is None:
             raise InputError(
                 "the character is moved by control points and has no weights of blendshapes; write a video, or the "

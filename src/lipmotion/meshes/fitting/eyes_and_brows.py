@@ -22,18 +22,13 @@ from lipmotion.types.motion import RADIAN, WEIGHT
 
 Array = NDArray[np.float64]
 
-FULL_LOOK_RAD = 0.55
-"""ARKit's blendshapes of looking turn the eyes so far at weight 1, in radians."""
-FULL_BROW_RISE = 0.08
-"""Brows are raised so far at weight 1, in eye distances."""
-CHEEK_SQUINT = 0.6
-"""Raised cheeks narrow the eyes by this part of their weight."""
-OUTER_BROW_SHARE = 0.6
-"""The outer ends of the brows rise by this part of the weight of the inner ends."""
+FULL_LOOK_RAD = 0.55  # ARKit's blendshapes of looking turn the eyes so far at weight 1, in radians
+FULL_BROW_RISE = 0.08  # brows are raised so far at weight 1, in eye distances
+CHEEK_SQUINT = 0.6  # raised cheeks narrow the eyes by this part of their weight
+OUTER_BROW_SHARE = 0.6  # the outer ends of the brows rise by this part of the weight of the inner ends
 LOOKS = tuple(f"{way}{side}" for side in SIDES for way in ("Out", "In", "Up", "Down"))
 """The ways that ARKit's blendshapes turn each eye."""
-LARGEST_COUNTER_RAD = 0.4
-"""The eyes turn at most so far against a head whose angles are given."""
+LARGEST_COUNTER_RAD = 0.4  # the eyes turn at most so far against a head whose angles are given
 MOVED_BY = {
     "blinks": ("eyeBlinkLeft", "eyeBlinkRight"),
     "gaze": tuple(f"eyeLook{name}" for name in LOOKS),
@@ -51,22 +46,6 @@ GIVEN_UNITS = {4: "browDown", 5: "eyeWide", 6: "cheekSquint", 7: "eyeSquint", 9:
 SPOKEN_SMILE, FULL_SMILE = 0.3, 0.75
 """Lips spread by speech smile up to the first weight; the corners rise from it to the second."""
 CORNERS = tuple(f"{name}{side}" for name in ("mouthSmile", "mouthFrown") for side in SIDES)
-
-
-def find_movements(motion: Motion, time_s: Array) -> dict[str, Array]:
-    """Return what a motion says of eyes, brows, cheeks, nose, head and corners of the lips [each shape=(len(time_s),)].
-
-    Blendshapes have ARKit's names, 0 to 1; angles of the head those of ``ANGLES``, in radians. Groups that never move
-    are left out: exporters write curves that nothing was captured for as 0.
-    """
-    curves = {name: curve for name, curve in arkit_weights(motion).items() if name in (*ARKIT_OTHERS, *CORNERS)}
-    curves |= {name: motion[name].astype(np.float64) for name in ANGLES if name in motion.names}
-    for group in GROUPS:
-        if any(curves[name].any() for name in group if name in curves):
-            curves |= {name: np.zeros(len(motion.values)) for name in group if name not in curves}
-        else:
-            curves = {name: curve for name, curve in curves.items() if name not in group}
-    return {name: np.interp(time_s, motion.time_s, curve) for name, curve in curves.items()}
 
 
 def moves_by_itself(part: str, curves: Mapping[str, Array]) -> bool:
@@ -173,8 +152,17 @@ def stage_liveliness(
     """Return what moves beside the mouth at some times, as a staging asks for it; None: everything moves.
 
     motion, units, prosody : as of ``articulation.liveliness``; blinks, gaze, brows and angles of the head that the
-                             motion itself has take the place of what would move on its own
+                             motion itself has take the place of what would move on its own. Groups of them that
+                             never move do not count: exporters write curves that nothing was captured for as 0
     """
-    chosen, curves = staging or Staging(), find_movements(motion, time_s)
+    chosen = staging or Staging()
+    curves = {name: curve for name, curve in arkit_weights(motion).items() if name in (*ARKIT_OTHERS, *CORNERS)}
+    curves |= {name: motion[name].astype(np.float64) for name in ANGLES if name in motion.names}
+    for group in GROUPS:
+        if any(curves[name].any() for name in group if name in curves):
+            curves |= {name: np.zeros(len(motion.values)) for name in group if name not in curves}
+        else:
+            curves = {name: curve for name, curve in curves.items() if name not in group}
+    curves = {name: np.interp(time_s, motion.time_s, curve) for name, curve in curves.items()}
     moving = {part: getattr(chosen, part) and moves_by_itself(part, curves) for part in MOVED_BY}
     return with_movements(compute_liveliness(time_s, motion, units, prosody, seed=chosen.seed, **moving), curves)

@@ -52,12 +52,9 @@ VISEME_POSES = {
     **{"ih": (0.14, 0.0), "oh": (0.15, 0.75), "ou": (0.1, 1.0)},
 }
 """The gap, in eye distances, and the protrusion of each open viseme at weight 1: about those of distinct speech."""
-LARGEST_ADDED = 0.4
-"""A viseme gives up at most this share to ``aa`` where the lips are further apart."""
-LAX = "E"
-"""The viseme of parted lips in a pause."""
-MAX_CLOSED_WEIGHT = 0.85
-"""Largest sum of the visemes of closed lips where the lips are parted."""
+LARGEST_ADDED = 0.4  # a viseme gives up at most this share to ``aa`` where the lips are further apart
+LAX = "E"  # the viseme of parted lips in a pause
+MAX_CLOSED_WEIGHT = 0.85  # largest sum of the visemes of closed lips where the lips are parted
 CLOSED_GAPS, PARTED_GAPS = (0.0, 0.04), (0.06, 0.16)
 """Gaps between which the least, and the largest, sum of the visemes of closed lips falls to 0, in eye distances."""
 MIN_WEIGHT = 1e-6
@@ -110,17 +107,13 @@ def blend_visemes(held: Array, gap: Array, protrusion: Array) -> Array:
 
 
 def viseme_curves(units: Timeline[Unit], time_s: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-    """Return how far each of the 15 visemes is being said at some times, 0 to 1 [each shape=(len(time_s),)].
-
-    Pauses in which the mouth goes on (``articulation.pauses``) belong to the phones beside them.
-    """
+    """Return how far each of 15 visemes is said, 0 to 1 [each shape=(T,)]; short pauses belong to the phones beside."""
     weights = crossfade_phones(share_short_pauses(units), time_s, lambda phone: VISEME_OF_PHONE.get(phone, "sil"))
     return {name: np.clip(weights.get(name, np.zeros(len(time_s))), 0.0, 1.0) for name in VISEMES_15}
 
 
 Limits = tuple[Array | float, Array | float]
-LARGEST_EIGENVALUE = 16.0
-"""The largest eigenvalue of the squared second difference."""
+LARGEST_EIGENVALUE = 16.0  # the largest eigenvalue of the squared second difference
 MAX_STEPS, TOLERANCE = 2000, 1e-5
 """Iteration stops after so many steps, or when no weight changes by more than the second number in one."""
 SIDED_SHAPES = {
@@ -145,12 +138,10 @@ EXPRESSIONS: Mapping[str, tuple[tuple[str, float], ...]] = {
     "tired": (("sad", 0.3), ("relaxed", 0.4)),
 }
 """The expressions of VRM that stand for a mood, with their weights, on characters without finer shapes."""
-ROUNDING = {"mouthPucker": 0.5, "mouthFunnel": 0.3}
-"""Least weights in a phone of roundness 1."""
+ROUNDING = {"mouthPucker": 0.5, "mouthFunnel": 0.3}  # least weights in a phone of roundness 1
 NARROWING = 0.11
 """Both together make the mouth narrower by this, in eye distances; there is less, or more, of them for it."""
-SHARES = (0.6, 1.4)
-"""The least and the largest share of them that there is then."""
+SHARES = (0.6, 1.4)  # the least and the largest share of them that there is then
 SPREADING = tuple(f"{name}{side}" for name in ("mouthSmile", "mouthStretch", "mouthDimple") for side in SIDES)
 """Shapes that draw the corners apart: they vanish in round phones."""
 DEPTH_WEIGHT, JAW_WEIGHT, CORNER_WEIGHT, GAP_WEIGHT = 0.4, 0.5, 4.0, 2.0
@@ -163,12 +154,9 @@ OPPOSED = (
 """Shapes of which each on one side undoes those on the other: a face has one side at a time."""
 OPPOSITION = 1.5
 """Cost of the product of two such weights, where that of the square of either is 1: both at once are never best."""
-NEARNESS = 0.1
-"""Weight of the distance from the weights that are separated."""
-PAIR_WEIGHT = 0.15
-"""Weight of the difference between the left and the right of a pair."""
-VISEME_WEIGHT = 0.2
-"""Weight of the visemes that the phones say, beside what the points say."""
+NEARNESS = 0.1  # weight of the distance from the weights that are separated
+PAIR_WEIGHT = 0.15  # weight of the difference between the left and the right of a pair
+VISEME_WEIGHT = 0.2  # weight of the visemes that the phones say, beside what the points say
 PRESS_DEPTH = 0.01
 """In p, b and m the lips are closed this much further than to touch, in eye distances: no light between them."""
 MIN_PARTING = 0.004
@@ -353,9 +341,7 @@ def _find_opposed(known: tuple[str, ...]) -> list[list[NDArray[np.bool_]]]:
 
 
 def cancel_opposed(weights: Array, known: Sequence[str]) -> Array:
-    """Return the weights of one frame, of shapes that undo each other only the larger side, as far as it is larger
-    [shape=(S,)]. ``separate_opposed`` keeps the look better, but needs many frames and some time.
-    """
+    """Return the weights of one frame [shape=(S,)]; of shapes that undo each other, the larger less the smaller."""
     left = weights.copy()
     for one, other in _find_opposed(tuple(known)):
         strong, weak = (weights[each].max(initial=0.0) for each in (one, other))
@@ -379,11 +365,7 @@ def round_lips(weights: Array, shapes: FaceShapes, protrusion: Array) -> Array:
 
 
 def weigh_moods(mouth: SpokenMouth, shapes: FaceShapes) -> Array | None:
-    """Return the weights of ARKit's blendshapes of the mouth in a mood, 0 to 1 [shape=(T, S)]; None: in none.
-
-    They leave the lips as free as the phones need (``articulation.mouth``); the distance between the lips is set
-    afterwards (``with_gap``).
-    """
+    """Return the weights of ARKit's blendshapes of the mouth in a mood, 0 to 1 [shape=(T, S)]; None: in none."""
     weights = np.zeros((len(mouth.gap), len(shapes.names)))
     for name, (curve, full) in MOOD_SHAPES.items():
         if (row := shapes.row(name)) is not None:

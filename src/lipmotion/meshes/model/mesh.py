@@ -58,9 +58,7 @@ OPAQUE, MASK, BLEND = "OPAQUE", "MASK", "BLEND"
 
 @dataclass(frozen=True, eq=False)
 class Texture:
-    """A picture on a surface: sRGB and opacity, 0 to 255, from the top [shape=(H, W, 4)]. Raises InputError: another
-    shape.
-    """
+    """A picture: sRGB and opacity, 0 to 255, from the top [shape=(H, W, 4)]. Raises InputError: another shape."""
 
     pixels: NDArray[np.uint8]
 
@@ -152,9 +150,7 @@ class Blendshape:
         return self.name if self.source is None else self.source
 
     @classmethod
-    def between(
-        cls, name: str, neutral: NDArray[np.float64], shape: NDArray[np.float64], *, smallest: float = 0.0
-    ) -> Blendshape:
+    def between(cls, name: str, neutral: Array, shape: Array, *, smallest: float = 0.0) -> Blendshape:
         """Return the blendshape that moves the vertices ``neutral`` to ``shape`` [shape=(V, 3), both]."""
         moved = shape - neutral
         rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > smallest)

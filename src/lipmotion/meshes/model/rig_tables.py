@@ -24,8 +24,7 @@ from lipmotion.types import Channel, Motion
 from lipmotion.types.values import parse_number
 
 COLUMNS = ("control", "source", "gain", "offset", "low", "high")
-CONTROL = "control"
-"""The unit of controls of a user's rig."""
+CONTROL = "control"  # the unit of controls of a user's rig
 LARGEST_TABLE_BYTES, MAX_CONTROLS = 1 << 20, 2000
 LARGEST_NUMBER = 1e6
 SOURCES = (*ARKIT_52, *(f"viseme_{name}" for name in VISEMES_15), *VRM_VOWELS, CLOSED, *VRM_EMOTIONS)
@@ -50,10 +49,7 @@ class RigRow:
 
 
 def read_rig_table(path: Path) -> tuple[RigRow, ...]:
-    """Return the rows of a table ``control,source,gain,offset,low,high`` (CSV); empty fields have their usual value.
-
-    Raises InputError: no such file, other columns, no rows, or a row that is damaged.
-    """
+    """Return the rows of a CSV of ``COLUMNS``; empty fields have their usual value. Raises InputError: damaged."""
     names, lines = read_whole_table(path, "rig table", LARGEST_TABLE_BYTES, COLUMNS)
     if names[:2] != list(COLUMNS[:2]) or not set(names) <= set(COLUMNS):
         raise InputError(f"{path}: the columns are {shorten(','.join(names))!r}, required {','.join(COLUMNS)}")
@@ -70,9 +66,7 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
                 for name, default in (("gain", 1.0), ("offset", 0.0), ("low", -np.inf), ("high", np.inf))
             }
             if numbers["low"] > numbers["high"]:
-                raise ValueError(
-                    f"the control {texts['control']!r} goes from {numbers['low']:g} to {numbers['high']:g}"
-                )
+                raise ValueError(f"{texts['control']!r} goes from {numbers['low']:g} to {numbers['high']:g}")
             rows.append(RigRow(texts["control"], texts["source"], **numbers))
         except ValueError as error:
             raise InputError(f"{path}: line {line}: {shorten(str(error))}") from error
@@ -88,9 +82,8 @@ def write_rig_table(path: Path, rows: Iterable[RigRow]) -> None:
         table.writerow(COLUMNS)
         for row in rows:
             limits = [f"{limit:g}" if np.isfinite(limit) else "" for limit in (row.low, row.high)]
-            table.writerow(
-                [as_field(row.control), as_field(row.source), f"{row.gain:.4g}", f"{row.offset:.4g}", *limits]
-            )
+            names = (as_field(row.control), as_field(row.source))
+            table.writerow([*names, f"{row.gain:.4g}", f"{row.offset:.4g}", *limits])
 
 
 def suggest_names(name: str, names: Iterable[str]) -> str:
@@ -145,9 +138,8 @@ def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
             near = suggest_names(row.control, mesh.shape_names)
             raise InputError(f"{path}: there is no blendshape {control!r}; {near}")
         if row.source not in {"", row.control, *SOURCES}:
-            raise InputError(
-                f"{path}: {control!r} follows {source!r}, which is no curve; {suggest_names(row.source, SOURCES)}"
-            )
+            near = suggest_names(row.source, SOURCES)
+            raise InputError(f"{path}: {control!r} follows {source!r}, which is no curve; {near}")
         if row.control in table:
             raise InputError(f"{path}: the blendshape {control!r} occurs twice; leave one row")
         table[row.control] = replace(row, low=max(row.low, 0.0), high=min(row.high, 1.0))

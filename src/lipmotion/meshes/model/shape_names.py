@@ -33,10 +33,8 @@ ARKIT_52 = (*ARKIT_OTHERS[:14], *ARKIT_MOUTH[:-1], *ARKIT_OTHERS[14:], ARKIT_MOU
 """All of them, in the order of ARKit's documentation: eyes, jaw and mouth, brows, cheeks, nose, tongue."""
 VISEMES_15 = ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "ih", "oh", "ou")
 """The visemes of Oculus and OpenXR, in their order."""
-VRM_VOWELS = ("aa", "ih", "ou", "ee", "oh")
-"""The mouth shapes of VRM."""
-VRM_EMOTIONS = ("angry", "happy", "relaxed", "sad", "surprised")
-"""The expressions of VRM that moods use."""
+VRM_VOWELS = ("aa", "ih", "ou", "ee", "oh")  # the mouth shapes of VRM
+VRM_EMOTIONS = ("angry", "happy", "relaxed", "sad", "surprised")  # the expressions of VRM that moods use
 _VISEME_SPELLINGS = {"i": "ih", "o": "oh", "u": "ou"} | {name.lower(): name for name in VISEMES_15}
 _VOWEL_SPELLINGS = {"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh"} | {name: name for name in VRM_VOWELS}
 _VOWEL_SPELLINGS |= dict(zip("あいうえお", VRM_VOWELS, strict=True))
@@ -44,15 +42,11 @@ _ARKIT = {name.lower(): name for name in (*ARKIT_MOUTH, *ARKIT_OTHERS)}
 _SIDES = {"l": "left", "r": "right", "left": "left", "right": "right"}
 
 
-_COPY = re.compile(r"[._ ]\d{1,4}$")
-"""What programs add to a name that is there already: ``jawOpen.001``."""
+_COPY = re.compile(r"[._ ]\d{1,4}$")  # what programs add to a name that is there already: ``jawOpen.001``
 
 
 def to_arkit(name: str) -> str | None:
-    """Return ARKit's name of a blendshape as files spell it, or None.
-
-    ``head.mouthSmile_L``, ``Face_mouthSmileL`` and ``mouth_smile_left.001`` are ``mouthSmileLeft``.
-    """
+    """Return ARKit's name of a blendshape as files spell it, or None: ``head.mouthSmile_L`` is ``mouthSmileLeft``."""
     text = re.sub(r"(?<=[a-z])([LR])$", r"_\1", re.split(r"[.:|]", _COPY.sub("", name))[-1])
     words = [word for word in re.split(r"[\s_\-]+", text) if word]
     for first in range(len(words)):
@@ -76,9 +70,7 @@ def find_vowel(name: str) -> str | None:
 
 
 def find_spoken_name(name: str) -> str | None:
-    """Return the viseme or vowel (``viseme_ih``, ``vowel_aa``) of a blendshape as files spell it, or None; silence is
-    none.
-    """
+    """Return the viseme or vowel (``viseme_ih``, ``vowel_aa``) of a blendshape as files spell it; None: no speech."""
     viseme, vowel = find_viseme(name), find_vowel(name)
     if viseme is not None:
         return None if viseme == "sil" else f"viseme_{viseme}"
@@ -91,8 +83,7 @@ def is_known(name: str) -> bool:
 
 
 Array = NDArray[np.float64]
-Sources = Mapping[str, tuple[tuple[str, float], ...]]
-"""The sources and gains of blendshapes, by ARKit's names."""
+Sources = Mapping[str, tuple[tuple[str, float], ...]]  # the sources and gains of blendshapes, by ARKit's names
 SIDES = ("Left", "Right")
 OPENS = "jawOpen"
 
@@ -109,8 +100,7 @@ def _invert(forms: Mapping[str, str]) -> Sources:
 
 
 PAIRED = frozenset(("mouthSmile", "mouthStretch", "mouthPress", "mouthLowerDown", "mouthUpperUp"))
-CLOSED = "closed"
-"""The name of lips that are pressed together, beside the vowels of VRM."""
+CLOSED = "closed"  # the name of lips that are pressed together, beside the vowels of VRM
 VOWEL_FORMS = {
     "aa": "jawOpen 0.5",
     "ih": "jawOpen 0.15 mouthStretch 0.5 mouthSmile 0.3",

@@ -107,15 +107,15 @@ def detect_english(audio: Audio) -> bool | None:
     return is_english(tuple(phone for phone, _ in read_tokens(word)) for word in words)
 
 
-def weigh_words(found: Recognition) -> float:
+def weigh_words(recognition: Recognition) -> float:
     """Return the confidence of recognised words times their share of the speech, 0 to 1."""
-    return (found.confidence or 0.0) * found.word_s / max(found.word_s + found.phone_s, 1e-9)
+    return (recognition.confidence or 0.0) * recognition.word_s / max(recognition.word_s + recognition.phone_s, 1e-9)
 
 
-def warn_of_another_language(found: Recognition) -> None:
+def warn_of_another_language(recognition: Recognition) -> None:
     """Log a warning where English words were recognised in what is hardly English."""
-    confidence = weigh_words(found)
-    if found.word_s >= MIN_TOLD_S and confidence < MIN_CONFIDENCE:
+    confidence = weigh_words(recognition)
+    if recognition.word_s >= MIN_TOLD_S and confidence < MIN_CONFIDENCE:
         LOG.warning(
             "the words are hardly understood (confidence %.2f, required %.1f): the speech may not be English, then "
             "give its language (--language es, fr, de, ...); or it is noisy, then give its words (--transcript)",

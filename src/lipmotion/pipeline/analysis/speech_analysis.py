@@ -109,23 +109,19 @@ class SpeechAnalysis:
     events: tuple[VoiceEvent, ...] = ()
 
     @property
-    def speech_s(self) -> float:
-        """Seconds of speech, by the phones in time."""
-        return sum(span.duration_s for span in self.speech.units if not is_silent(span.label.phone))
-
-    @property
     def is_without_speech(self) -> bool:
         """Whether no speech was recognised."""
-        return not self.speech.units_known and self.speech_s < MIN_SPEECH_S
+        spoken_s = sum(span.duration_s for span in self.speech.units if not is_silent(span.label.phone))
+        return not self.speech.units_known and spoken_s < MIN_SPEECH_S
 
 
-def analyse(model: Model, request: Request, each: ParallelMap = map) -> Speech:
+def analyse(model: Model, request: Request) -> Speech:
     """Return the speech of a request as input of a model's engine: features, phones in time, and what else it needs.
 
     Raises InputError: the recording, the transcript or the units are not usable, or there is no such recogniser.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     """
-    return analyse_speech(model, request, each).speech.with_arrays()
+    return analyse_speech(model, request).speech.with_arrays()
 
 
 def analyse_speech(
@@ -154,8 +150,8 @@ def analyse_speech(
         LOG.warning("a steady tone covers what is said at %s: the mouth rests there", format_places(tones))
     if recognition is not None and request.language == ENGLISH:
         warn_of_another_language(recognition)
-    given = request.units is not None or analysis.fit is not None
-    speech = with_voice(model.phones, audio, speech, recognition, given=given)
+    is_given = request.units is not None or analysis.fit is not None
+    speech = with_voice(model.phones, audio, speech, recognition, given=is_given)
     return replace(analysis, speech=with_prior(model.prior, speech))
 
 
@@ -169,19 +165,15 @@ def with_voice(
     given       : whether the phones in time were given
     It is 1 where the engine recognised the speaker, and for silence.
     """
-
-    def knowledge_of(sound: Audio) -> float:
-        return rate_knowledge(phones, analysed(sound))
-
     by_engine, parts = recognition is None and not given and not speech.units_known, speech.parts
-    voice = 1.0 if by_engine or not speech.features.values.any() else knowledge_of(audio)
+    voice = 1.0 if by_engine or not speech.features.values.any() else rate_knowledge(phones, analysed(audio))
     if parts is not None:
-        sounds = {passage.first: passage.audio for passage in analysed(audio).passages}
+        sounds = {passage.first: analysed(passage.audio) for passage in analysed(audio).passages}
         is_recognised = not given and not speech.units_known
         parts = tuple(
             part
             if is_recognised and part.speech.voice == 1
-            else part._replace(speech=replace(part.speech, voice=knowledge_of(sounds[part.first])))
+            else part._replace(speech=replace(part.speech, voice=rate_knowledge(phones, sounds[part.first])))
             for part in parts
         )
     return replace(speech, voice=voice, parts=parts)
@@ -218,16 +210,15 @@ def align_between(
     if stop > len(audio.samples) // HOP:
         raise AlignmentError(f"the recording ends at {audio.duration_s:.2f} s")
     segment = audio.stretch(first, stop)
-    spans = list(_recogniser(model, request).align(segment, segment.mfcc(), words, lexicon).shifted(start_s))
-    while not pauses and len(spans) > 1 and is_silent(spans[0].label.phone):
-        del spans[0]
-    while not pauses and len(spans) > 1 and is_silent(spans[-1].label.phone):
-        del spans[-1]
+    spans = list(_open_recogniser(model, request).align(segment, segment.mfcc(), words, lexicon).shifted(start_s))
+    for place in () if pauses else (0, -1):
+        while len(spans) > 1 and is_silent(spans[place].label.phone):
+            del spans[place]
     spans[0], spans[-1] = replace(spans[0], start_s=start_s), replace(spans[-1], end_s=end_s)
     return spans
 
 
-def _recogniser(model: Model, request: Request) -> Recogniser:
+def _open_recogniser(model: Model, request: Request) -> Recogniser:
     kind = "auto" if request.recogniser in INSTALLED_RECOGNISERS else request.recogniser
     return open_recogniser(model.phones, kind, model.adaptation)
 
@@ -258,7 +249,7 @@ def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: Par
     if request.recogniser not in kinds:
         raise InputError(f"unknown recogniser {request.recogniser!r}; required one of: {', '.join(kinds)}")
     range_db = measure_level_range(audio.log_energy)
-    phones, features, fit = _recogniser(model, request), audio.joined_mfcc(), None
+    phones, features, fit = _open_recogniser(model, request), audio.joined_mfcc(), None
     results: list[Recognition] = []
 
     def recognise() -> Recognition:
@@ -318,9 +309,8 @@ def build_speech(
             SpeechPart(first, own, build_speech(engine, sound, sound.mfcc(), Timeline(()), kind, each))
             for first, own, sound in audio.passages
         )
-    speech = Speech(
-        features, Timeline(()), f0, spectrum=spectrum, posteriors=posteriors, encoding=encoding, parts=parts
-    )
+    none = Timeline[Unit](())
+    speech = Speech(features, none, f0, spectrum=spectrum, posteriors=posteriors, encoding=encoding, parts=parts)
     return with_units(speech, units) if len(units) else speech
 
 
@@ -356,12 +346,12 @@ def _place_in_parts(parts: tuple[SpeechPart, ...], units: Timeline[Unit]) -> tup
     spoken = []
     for part in parts:
         within = list(part.between(units))
-        said = [span.label for span in within if not is_silent(span.label.phone)] or [span.label for span in within]
+        labels = [span.label for span in within if not is_silent(span.label.phone)] or [span.label for span in within]
         for place in (0, -1) if within else ():  # silence between passages is as sure as the phones beside it
             if is_silent(within[place].label.phone):
-                label = replace(within[place].label, confidence=said[place].confidence)
+                label = replace(within[place].label, confidence=labels[place].confidence)
                 within[place] = replace(within[place], label=label)
-        silent = Unit(SILENCE, confidence=said[0].confidence if said else None)
+        silent = Unit(SILENCE, confidence=labels[0].confidence if labels else None)
         joined = join_units([Timeline(tuple(within))], silent, part.speech.features.duration_s)
         spoken.append(part._replace(speech=with_units(part.speech, joined)))
     return tuple(spoken)
@@ -385,7 +375,7 @@ def recognise_speech(
     audio = analysed(audio, features)
     speech = build_speech(engine, audio, features, Timeline(()), phones.kind, each)
     passages = (SpeechPart(0, slice(0, len(features.values)), speech),) if speech.parts is None else speech.parts
-    units, spoken, found = list[Timeline[Unit]](), list[SpeechPart](), None
+    units, spoken, recognition = list[Timeline[Unit]](), list[SpeechPart](), None
     for part, (_, _, sound) in zip(passages, audio.passages, strict=True):
         within = None
         if phones.kind not in ("general", "words") and rate_knowledge(phones.own, sound):
@@ -397,15 +387,15 @@ def recognise_speech(
                 within = None
         knows_voice = within is not None
         if within is None:
-            found = found or recognise()
-            within = part.between(select_reliable(found.units, found.reliability))
+            recognition = recognition or recognise()
+            within = part.between(select_reliable(recognition.units, recognition.reliability))
         if sum(span.duration_s for span in within if not is_silent(span.label.phone)) < MIN_SPEECH_S:
             continue  # a click, a knock
         spoken.append(part._replace(speech=replace(part.speech, voice=float(knows_voice))))  # else ``with_voice`` says
         units.append(place_units(within, part.first, part.own))
     if speech.parts is not None:
         speech = replace(speech, parts=tuple(spoken))
-    confidence = found.reliability if found is not None else 0.0
+    confidence = recognition.reliability if recognition is not None else 0.0
     return with_units(speech, join_units(units, Unit(SILENCE, confidence=confidence), features.duration_s))
 
 
@@ -523,9 +513,7 @@ def _check_units(units: Timeline[Unit], duration_s: float) -> None:
     if duration_s + LATE_S < end_s < np.inf:
         unit = next((name for name, ratio in TIME_UNITS.items() if 0.3 < end_s / duration_s / ratio < 1.3), "")
         guess = f"their times in {unit}, where seconds are required" if unit else "they those of another recording"
-        LOG.warning(
-            "the units go on to %.2f s, the recording ends at %.2f s: are %s?", units[-1].end_s, duration_s, guess
-        )
+        LOG.warning("the units go on to %.2f s, the recording ends at %.2f s: are %s?", end_s, duration_s, guess)
     elif len(spoken_s) >= MIN_TIMED and spoken_s[len(spoken_s) // 2] < SHORTEST_PHONE_S:
         LOG.warning(
             "the units last %.1f ms each and end at %.2f s of %.2f s, faster than anybody speaks: are their times in "

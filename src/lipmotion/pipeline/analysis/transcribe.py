@@ -142,7 +142,7 @@ def transcribe(
 def compute_phone_posteriors(name: str, audio: AnalysedAudio) -> tuple[NDArray[np.float64], float]:
     """Return the log posteriors of a phone recogniser, and how sure it is of what is said, or of nothing, 0 to 1."""
     posteriors = read_posteriors(name, audio)
-    hears = any(found.token != WORD_BOUNDARY for found in posteriors.best_tokens)
+    hears = any(stretch.token != WORD_BOUNDARY for stretch in posteriors.best_tokens)
     sure = mean_posterior(find_stretches(name, audio)) if hears else 1.0
     return posteriors.of_phones.astype(float), sure
 
@@ -160,9 +160,9 @@ def _compare(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> Transc
     others_said = [span for place, span in enumerate(spans) if place not in taken]
     middles_s = [(span.start_s + span.end_s) / 2 for span in others_said]
     known = {(other.first, other.stop) for other in evidence.others}
-    said = [-1, *(number for number, word in enumerate(words) if word.is_said), len(words)]
+    spoken = [-1, *(number for number, word in enumerate(words) if word.is_said), len(words)]
     others = []
-    for before, after in pairwise(said):
+    for before, after in pairwise(spoken):
         before_s = words[before].end_s if before >= 0 else 0.0
         after_s = words[after].start_s if after < len(words) else np.inf
         between = others_said[bisect_left(middles_s, before_s) : bisect_left(middles_s, after_s)]
@@ -194,13 +194,13 @@ def _match_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> t
     taken, end = set[int](), 0
     for number, word in enumerate(words):
         stop = next((matched[later][0] for later in range(number + 1, len(words)) if later in matched), len(spans))
-        most = ALIKE_SHARE * len(word.phones)
+        limit = ALIKE_SHARE * len(word.phones)
         if number in doubted:
             continue
         lengths = range(max(len(word.phones) - 1, 1), len(word.phones) + 2)
         runs = [range(first, first + length) for length in lengths for first in range(end, stop - length + 1)]
         edits = [(count_phone_edits(word.phones, phones[run.start : run.stop]), run.start, run.stop) for run in runs]
-        if edits and min(edits)[0] <= most:
+        if edits and min(edits)[0] <= limit:
             _, first, end = min(edits)
             words[number] = word._replace(start_s=spans[first].start_s, end_s=spans[end - 1].end_s, is_said=True)
             taken.update(range(first, end))
@@ -294,8 +294,8 @@ def warn_of_misfit(fit: TranscriptFit, corrected: bool = False) -> None:
     if fit.is_doubtful:
         why = f"its phones agree with the sound at {fit.score:.1f}, required {DOUBTFUL_SCORE} or more"
         if fit.evidence is not None:
-            said = sum(word.is_said for word in fit.evidence.words)
-            why = f"{said} of its {len(fit.evidence.words)} words are heard"
+            count = sum(word.is_said for word in fit.evidence.words)
+            why = f"{count} of its {len(fit.evidence.words)} words are heard"
         LOG.warning(
             "the transcript seems not to be what is said (%s)%s; %scheck it, or leave it out",
             *(why, f" or to leave out words {places}" if fit.missing else ""),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -147,9 +147,7 @@ class CheckSummary:
     @property
     def text(self) -> str:
         """The summary in one line."""
-        counts: dict[str, int] = defaultdict(int)
-        for finding in self.findings:
-            counts[finding.kind] += 1
+        counts = Counter(finding.kind for finding in self.findings)
         return f"{self.lines} lines: " + (", ".join(f"{n} {kind}" for kind, n in counts.items()) or "nothing found")
 
     @property

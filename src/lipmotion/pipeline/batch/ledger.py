@@ -40,11 +40,19 @@ CUES = SHEET.removeprefix(".")
 
 
 def check_job(job: Job) -> None:
-    """Raise ExportError for kinds of outputs that a batch cannot write.
+    """Raise ExportError for a kind of output that a batch cannot write, one that is given twice, or none at all.
 
     Raises InputError: the job names what belongs to one recording.
     """
-    check_kinds(job.outputs.kinds)
+    kinds = job.outputs.kinds
+    plain = (*list_suffixes(), *LABEL_SUFFIXES, *load_provided("video_suffixes"), *load_provided("scene_suffixes"))
+    known = (*(suffix.removeprefix(".") for suffix in plain), *(f"{CUES}{name}" for name in CUE_FORMATS))
+    unknown = [kind for kind in kinds if kind not in known]
+    if unknown or not kinds:
+        kind = repr(unknown[0]) if unknown else "nothing"
+        raise ExportError(f"the outputs are to be {kind}; required some of: {', '.join(known)}, with commas")
+    if len(set(kinds)) < len(kinds):
+        raise ExportError(f"the outputs are {', '.join(kinds)}: one is given twice; give every kind once")
     alone = {name: getattr(job.request, name) for name in ("recording", "transcript", "units", "edits")}
     alone |= {name: getattr(job.outputs, name) for name in ("files", "overlay", "posteriors")}
     if used := next((name for name, value in alone.items() if value), None):
@@ -54,18 +62,6 @@ def check_job(job: Job) -> None:
             raise InputError(
                 f"the job of a batch has a value as {name!r}, required a file, whose content can be compared"
             )
-
-
-def check_kinds(kinds: Sequence[str]) -> None:
-    """Raise ExportError for a kind of output that a batch cannot write, one that is given twice, or none at all."""
-    plain = (*list_suffixes(), *LABEL_SUFFIXES, *load_provided("video_suffixes"), *load_provided("scene_suffixes"))
-    known = (*(suffix.removeprefix(".") for suffix in plain), *(f"{CUES}{name}" for name in CUE_FORMATS))
-    unknown = [kind for kind in kinds if kind not in known]
-    if unknown or not kinds:
-        given = repr(unknown[0]) if unknown else "nothing"
-        raise ExportError(f"the outputs are to be {given}; required some of: {', '.join(known)}, with commas")
-    if len(set(kinds)) < len(kinds):
-        raise ExportError(f"the outputs are {', '.join(kinds)}: one is given twice; give every kind once")
 
 
 def fingerprint_job(job: Job) -> str:
@@ -109,17 +105,17 @@ class InputFile:
     def is_unchanged(self) -> bool:
         """Return whether the file has the same content: by size and time of change, else by its digest."""
         try:
-            status = Path(self.path).stat()
-            if (status.st_size, _read_change_time(status)) == (self.size, self.changed_ns):
-                return True
-            return status.st_size == self.size and hash_file(Path(self.path)) == self.sha256
+            size, changed_ns = _read_status(Path(self.path))
+            is_same = size == self.size and changed_ns == self.changed_ns
+            return is_same or (size == self.size and hash_file(Path(self.path)) == self.sha256)
         except (OSError, InputError):
             return False
 
 
-def _read_change_time(status: os.stat_result) -> int:
-    """Return when a file was changed: copying another file to its place may keep the time of its content."""
-    return max(status.st_mtime_ns, status.st_ctime_ns)
+def _read_status(path: Path) -> tuple[int, int]:
+    """Return size and time of change of a file: copying another one to its place may keep the time of its content."""
+    status = path.stat()
+    return status.st_size, max(status.st_mtime_ns, status.st_ctime_ns)
 
 
 def list_input_paths(line: BatchLine) -> list[Path]:
@@ -134,8 +130,7 @@ def list_input_files(line: BatchLine) -> list[InputFile]:
     Raises InputError: the recording is missing, empty, a folder, a pipe or a device. OSError: one cannot be read.
     """
     check_source(Path(line.recording), "recording")
-    status = [(path, path.stat()) for path in list_input_paths(line)]
-    return [InputFile(str(path), each.st_size, _read_change_time(each), hash_file(path)) for path, each in status]
+    return [InputFile(str(path), *_read_status(path), hash_file(path)) for path in list_input_paths(line)]
 
 
 Record = dict[str, Any]
@@ -322,8 +317,7 @@ class Ledger:
 
         It need not if it was done with the same settings from the same files, and all its outputs exist.
         """
-        fingerprint = fingerprint_line(line, of_settings)
-        if self._last.get(_key(line.name), ("", 0))[0] != fingerprint:
+        if self._last.get(_key(line.name), ("", 0))[0] != fingerprint_line(line, of_settings):
             return None
         record = self.finished(line, out)
         return record if record is not None and are_same_inputs(line, record) else None
@@ -348,7 +342,6 @@ def open_ledger(place: Place, lines: Sequence[BatchLine]) -> Iterator[Ledger]:
     """Open the ledger of a folder of outputs for a new run, and end what an earlier one left undone.
 
     lines : those of the batch: what earlier runs did of others stays in the ledger and is not looked at
-
     Receipts whose outputs are in place are entered into the ledger; other unfinished work is deleted.
     The folder is confined, as it is in workers. Raises ExportError: another process is at work on it, or it cannot be
     written.

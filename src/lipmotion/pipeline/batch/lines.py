@@ -62,14 +62,14 @@ def read_lines(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
     """
     if source.is_dir():
         check_listable(source)
-        found = []
+        lines = []
         for root, folders, names in os.walk(source):
-            folders[:] = sorted(name for name in folders if not name.startswith("."))
+            folders[:] = (name for name in folders if not name.startswith("."))
             for path in (Path(root) / name for name in sorted(names) if not name.startswith(".")):
                 if is_recording(path) and path.is_file():
                     inner = path.relative_to(source).with_suffix("").as_posix()
-                    found.append(BatchLine(inner, os.path.abspath(path)))  # noqa: PTH100 # links are not followed
-        lines = sorted(found, key=lambda line: line.name)
+                    lines.append(BatchLine(inner, os.path.abspath(path)))  # noqa: PTH100 # links are not followed
+        lines.sort(key=lambda line: line.name)
     elif source.exists():
         lines = _read_list(source, kinds)
     else:

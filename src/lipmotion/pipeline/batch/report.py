@@ -74,11 +74,6 @@ def write_marks(path: Path, marks: Mapping[str, Mark]) -> None:
         rows.writerows([as_field(text) for text in (name, mark.kind, mark.when)] for name, mark in marks.items())
 
 
-def merge_marks(kept: Mapping[str, Mark], given: Mapping[str, Mark]) -> dict[str, Mark]:
-    """Return marks with later ones in their place; of lines whose mark was taken back, none."""
-    return {name: mark for name, mark in {**kept, **given}.items() if mark.kind}
-
-
 def is_due(mark: Mark, record: Record | None) -> bool:
     """Return whether a line must be done again because of its mark: not where it was done because of the same one."""
     return mark.kind == REDO and (record is None or record.get("redone") != mark.when)
@@ -145,8 +140,8 @@ def rate_doubt(record: Record) -> float:
     doubt += 10 * len(record.get("warnings", ()))
     doubt += 5 * (record.get("range_db", NOISY_DB) < NOISY_DB)
     if words in ("words", "phones"):
-        most = UNSURE_WORDS if words == "words" else UNSURE_PHONES
-        doubt += most * max(SURE_CONFIDENCE - record["confidence"], 0) / SURE_CONFIDENCE
+        weight = UNSURE_WORDS if words == "words" else UNSURE_PHONES
+        doubt += weight * max(SURE_CONFIDENCE - record["confidence"], 0) / SURE_CONFIDENCE
     if words in ("transcript", "mapped transcript", "given units") and record["confidence"] < FULL_FIT_SHARE:
         doubt += UNSURE_WORDS * (1 - record["confidence"])
     if (motion := record.get("motion")) is not None:
@@ -166,18 +161,13 @@ def _field(value: Any) -> str:
 
 def _show_on_page(record: Record, values: Sequence[Any], out: Path, mark: Mark | None) -> str:
     """Return a row of the page: its values, the addresses of outputs and recording, and when it was marked."""
-    links = [quote(as_text(name)) for name in record["outputs"]]
-    sound = _address(record["recording"], out) if "recording" in record else None
-    row = [*map(_visible, values), links, sound, mark.when if mark else None]
+    links, address = [quote(as_text(name)) for name in record["outputs"]], None
+    with suppress(KeyError, ValueError):  # a recording on another drive has no address
+        recording = os.fsencode(os.path.relpath(record["recording"], out))
+        address = quote(recording.replace(os.sep.encode(), b"/"))
+    row = [*map(_visible, values), links, address, mark.when if mark else None]
     text = json.dumps(row, ensure_ascii=True, separators=(",", ":"))
     return text.replace("<", "\\u003c")  # nothing that a name says ends the script
-
-
-def _address(recording: str, out: Path) -> str | None:
-    """Return the address of a recording, relative to a page in a folder; None: it has none, as on another drive."""
-    with suppress(ValueError):
-        return quote(os.fsencode(os.path.relpath(recording, out)).replace(os.sep.encode(), b"/"))
-    return None
 
 
 def _visible(value: Any) -> Any:

@@ -46,17 +46,7 @@ from lipmotion.pipeline.batch.ledger import (
     write_receipt,
 )
 from lipmotion.pipeline.batch.lines import MAX_NAMED_LINES, BatchLine, check_names, read_lines
-from lipmotion.pipeline.batch.report import (
-    APPROVE,
-    MARKS,
-    REDO,
-    Mark,
-    is_due,
-    merge_marks,
-    read_marks,
-    write_marks,
-    write_reports,
-)
+from lipmotion.pipeline.batch.report import APPROVE, MARKS, REDO, Mark, is_due, read_marks, write_marks, write_reports
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.job import Job, check_outputs, open_face, run, write_outputs
 from lipmotion.pipeline.model import Model, load_model
@@ -89,6 +79,18 @@ class LineWork:
     of_settings: str
     place: Place
 
+    def record(self, outcome: str) -> Record:
+        """Return the record of the line with an outcome, and without inputs and outputs."""
+        return {
+            "name": self.line.name,
+            "recording": self.line.recording,
+            "run": self.place.run,
+            "fingerprint": fingerprint_line(self.line, self.of_settings),
+            "outcome": outcome,
+            "inputs": [],
+            "outputs": {},
+        }
+
 
 class RunReplacedError(ExportError):
     """A later run has begun in the same folder."""
@@ -117,16 +119,7 @@ def finish_line(work: LineWork) -> Record:
 
 def _animate_line(work: LineWork) -> Record:
     start_s = time.perf_counter()
-    line, place, kinds = work.line, work.place, work.job.outputs.kinds
-    record: Record = {
-        "name": line.name,
-        "recording": line.recording,
-        "run": place.run,
-        "fingerprint": fingerprint_line(line, work.of_settings),
-        "outcome": DONE,
-        "inputs": [],
-        "outputs": {},
-    }
+    line, place, kinds, record = work.line, work.place, work.job.outputs.kinds, work.record(DONE)
     with _capture_warnings() as warnings:
         try:
             record["inputs"] = [asdict(each) for each in list_input_files(line)]
@@ -161,16 +154,16 @@ def _describe_work(start_s: float, warnings: list[str]) -> Record:
 
 def _write_line(work: LineWork) -> Generation:
     """Write the outputs of a line under temporary names; return its motion. Raises as ``animate`` and ``write``."""
-    line, kinds, given = work.line, work.job.outputs.kinds, work.job.request
+    line, kinds, requested = work.line, work.job.outputs.kinds, work.job.request
     make_folder((Path(work.place.out) / line.name).parent)
     staged = tuple(str(work.place.staged(line.name, kind)) for kind in kinds)
     for kind in kinds:
         check_target(Path(work.place.out) / f"{line.name}.{kind}")
-    (model, face, lexicon), speaker = _share(work.job, work.place.run), line.speaker or given.speaker
-    request = replace(given, recording=Path(line.recording), speaker=speaker, lexicon=lexicon)
+    (model, face, lexicon), speaker = _share(work.job, work.place.run), line.speaker or requested.speaker
+    request = replace(requested, recording=Path(line.recording), speaker=speaker, lexicon=lexicon)
     request = read_request(request, words_beside=not line.transcript)
     request = replace(request, transcript=line.transcript or request.transcript)
-    other = face.find_other_person(model, speaker) if given.onto is None else None
+    other = face.find_other_person(model, speaker) if requested.onto is None else None
     if other is not None:
         request = replace(request, onto=_map_onto(model, other, speaker))
     job = replace(work.job.of(None, staged), request=request)
@@ -362,12 +355,18 @@ def batch(
     for line in lines:
         if os.path.realpath(line.recording).startswith(inside):  # an output could replace it
             raise ExportError(f"{place.out}: holds the recording {line.recording}; give another folder for the outputs")
-    chosen = _choose_marks(Path(place.out), marks, lines)
+    marks_file = Path(place.out) / MARKS
+    earlier = read_marks(marks_file) if marks_file.is_file() else {}
+    later = read_marks(Path(marks)) if marks is not None else {}
+    names = {line.name for line in lines}
+    if unknown := [name for name in later if name not in names]:
+        LOG.warning("%s: %d marks of lines that are not in this batch: %s", marks, len(unknown), _some(unknown))
+    chosen = {name: mark for name, mark in (earlier | later).items() if mark.kind}  # the others were taken back
     check_line_job(job, place.run)
     of_settings = fingerprint_job(job)
     with open_ledger(place, lines) as ledger:
         if marks is not None:
-            write_marks(Path(place.out) / MARKS, chosen)
+            write_marks(marks_file, chosen)
         counts = Counter[str]()
         monitor(Progress(STAGE, 0, len(lines), 0.0))
 
@@ -393,16 +392,6 @@ def batch(
                     count(record["name"], record["outcome"], record.get("error", ""))
         csv, html = write_reports(lines, ledger, Path(place.out), chosen)
     return BatchSummary(counts[DONE], counts["kept"], counts[FAILED], csv, html)
-
-
-def _choose_marks(out: Path, table: str | Path | None, lines: Sequence[BatchLine]) -> dict[str, Mark]:
-    """Return the marks in a folder of outputs, with those of a further file in their place. Raises InputError."""
-    earlier = read_marks(out / MARKS) if (out / MARKS).is_file() else {}
-    later = read_marks(Path(table)) if table is not None else {}
-    names = {line.name for line in lines}
-    if unknown := [name for name in later if name not in names]:
-        LOG.warning("%s: %d marks of lines that are not in this batch: %s", table, len(unknown), _some(unknown))
-    return merge_marks(earlier, later)
 
 
 def _find_finished(
@@ -453,14 +442,5 @@ def _finish_lines(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, 
                 try:
                     yield next(iter(each(finish_line, [work])))  # while nothing else is done
                 except WorkerDiedError:
-                    yield {
-                        "name": work.line.name,
-                        "recording": work.line.recording,
-                        "run": work.place.run,
-                        "fingerprint": fingerprint_line(work.line, work.of_settings),
-                        "outcome": FAILED,
-                        "inputs": [],
-                        "outputs": {},
-                        "error": f"{work.line.recording}: the process that worked on it died (out of memory?); is the "
-                        "recording damaged?",
-                    }
+                    died = "the process that worked on it died (out of memory?); is the recording damaged?"
+                    yield work.record(FAILED) | {"error": f"{work.line.recording}: {died}"}

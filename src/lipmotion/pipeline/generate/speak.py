@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
+from itertools import accumulate, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -23,11 +24,9 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import ASKED, Onto, Pauses, Request
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.sound.resampling import JoinedPieces, overlap_pieces, resample_speech
-from lipmotion.speech.voices.installed import choose_voice, find_voice, voice_sentences
+from lipmotion.speech.voices.installed import choose_voice, find_voice, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
-from lipmotion.storage.sources import read_text_file
-from lipmotion.types import Audio, Constraints, Generation, Span, SpokenText, Timeline, Unit
-from lipmotion.types.delivery import MoodTag
+from lipmotion.types import Audio, Constraints, Span, SpokenText, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, split_words
 from lipmotion.units.mood_tags import parse_tagged_text, time_moods
 from lipmotion.units.phones import SHORT_PAUSE_S
@@ -101,21 +100,15 @@ def speak_from_corpus(
 
 
 def _plan_phones(text: str, lexicon: Lexicon, engine: SelectsRecordings, model: Model) -> Timeline[Unit]:
-    spans: list[Span[Unit]] = []
-    now_s = 0.0
-
-    def add(phone: str, word: str, duration_s: float) -> None:
-        nonlocal now_s
-        spans.append(Span(now_s, now_s + duration_s, Unit(phone, word=word)))
-        now_s += duration_s
-
+    phones: list[tuple[Unit, float]] = []
     for number, sentence in enumerate(split_sentences(text)):
-        add(SILENCE, "", BETWEEN_S if number else REST_S)
+        phones.append((Unit(SILENCE), BETWEEN_S if number else REST_S))
         for word in split_words(sentence):
             for phone in lexicon.pronunciations(word)[0]:
-                add(phone, word, engine.typical_duration_s(model.learned, phone))
-    add(SILENCE, "", REST_S)
-    return Timeline(tuple(spans))
+                phones.append((Unit(phone, word=word), engine.typical_duration_s(model.learned, phone)))
+    phones.append((Unit(SILENCE), REST_S))
+    edges_s = accumulate((duration_s for _, duration_s in phones), initial=0.0)
+    return Timeline(tuple(Span(*times_s, unit) for times_s, (unit, _) in zip(pairwise(edges_s), phones, strict=True)))
 
 
 def _find_starts(count: int, pieces: Sequence[SourcePiece], joined: JoinedPieces, rate_hz: int) -> NDArray[np.float64]:
@@ -202,26 +195,18 @@ def speak(  # noqa: PLR0913
         if onto is not None:
             raise InputError("a corpus speaks with the motion that was recorded; it is not mapped onto another person")
         loaded = model if isinstance(model, Model) else load_model(model)
-        spoken = speak_from_corpus(text, corpus, loaded, replace(request, onto_speaker=""), constraints)
-        return spoken._replace(generation=_with_moods(spoken.generation, tags))
-    sentences = split_sentences(text)
-    chosen = find_voice(voice) if isinstance(voice, str) else voice or choose_voice()
-    loaded = model if isinstance(model, Model) else load_model(model)
-    find_speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
-    sound, units = _speak_sentences(sentences, chosen, lexicon)
-    sound = quantise(sound)
-    spoken_so = {"recording": resample_speech(sound), "units": units, "manner": ASKED, "spoken_so": True}
-    request = replace(request, lexicon=None, **spoken_so)
-    return SpokenText(sound, _with_moods(animate(request, model=loaded, constraints=constraints), tags))
-
-
-def _with_moods(generation: Generation, tags: Sequence[MoodTag]) -> Generation:
-    return replace(generation, moods=time_moods(tags, generation.units))
-
-
-def read_text(path: Path) -> str:
-    """Return the text of a UTF-8 file. Raises InputError: no such file, too large, or not UTF-8."""
-    return read_text_file(path, "text", LARGEST_TEXT_BYTES)
+        sound, generation = speak_from_corpus(text, corpus, loaded, replace(request, onto_speaker=""), constraints)
+    else:
+        sentences = split_sentences(text)
+        chosen = find_voice(voice) if isinstance(voice, str) else voice or choose_voice()
+        loaded = model if isinstance(model, Model) else load_model(model)
+        find_speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
+        sound, units = _speak_sentences(sentences, chosen, lexicon)
+        sound = quantise(sound)
+        spoken_so = {"recording": resample_speech(sound), "units": units, "manner": ASKED, "spoken_so": True}
+        request = replace(request, lexicon=None, **spoken_so)
+        generation = animate(request, model=loaded, constraints=constraints)
+    return SpokenText(sound, replace(generation, moods=time_moods(tags, generation.units)))
 
 
 def _speak_sentences(
@@ -232,7 +217,7 @@ def _speak_sentences(
     spans: list[Span[Unit]] = []
     rate_hz, at = SPEECH_RATE_HZ, 0
     for start in range(0, len(sentences), SENTENCES_PER_RUN):
-        with closing(voice_sentences(sentences[start : start + SENTENCES_PER_RUN], voice, lexicon)) as voiced:
+        with closing(speak_sentences(sentences[start : start + SENTENCES_PER_RUN], voice, lexicon)) as voiced:
             for sentence in voiced:
                 sound = sentence.own_sound()
                 sound = sentence.audio if sound.rate_hz < SPEECH_RATE_HZ else sound

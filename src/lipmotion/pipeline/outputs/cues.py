@@ -90,14 +90,6 @@ def write_cues(
         write_cue_file(path, sheet, as_text(speech), form or format_of(path))
 
 
-def format_cues(sheet: CueSheet, *, speech: str | Path = "", form: str = "tsv") -> str:
-    """Return the text of the file that ``write_cues`` would write.
-
-    speech : the recording that was animated;  form : as of ``write_cues``
-    """
-    return CUE_FORMATS[form].text(sheet, as_text(speech))
-
-
 def check_cue_options(fps: float, hold_frames: int | None, shapes: str) -> None:
     """Raise InputError if an argument of ``cues`` is out of its range."""
     if not 1 <= fps <= FASTEST_FPS:
@@ -127,14 +119,10 @@ class CueOutput(Output):
         return tuple(f"{SHEET}{form}" for form in CUE_FORMATS)
 
     def check(self) -> None:  # noqa: D102
-        check_cue_options(self._fps, None, OPTIONAL)
+        check_cue_options(self.settings.outputs.fps or CUES_FPS, None, OPTIONAL)
 
     def prepare(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
-        sheet = cues(performance.generation, fps=self._fps, delivery=self.settings.delivery)
-        recording = self.settings.recording
-        said = "" if recording is None else as_text(recording)
-        return partial(write_cue_file, self.path, sheet, said, format_of(self.path))
-
-    @property
-    def _fps(self) -> float:
-        return self.settings.outputs.fps or CUES_FPS
+        fps, recording = self.settings.outputs.fps or CUES_FPS, self.settings.recording
+        sheet = cues(performance.generation, fps=fps, delivery=self.settings.delivery)
+        speech = "" if recording is None else as_text(recording)
+        return partial(write_cue_file, self.path, sheet, speech, format_of(self.path))

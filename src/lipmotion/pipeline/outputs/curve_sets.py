@@ -108,8 +108,8 @@ def make_curves(
         return edit_face_curves(_make_set(motion, units, str(curves), staging, prosody), units, edits)
     rows = read_rig_table(Path(curves))
     sources = make_rig_sources(motion, units, rows, staging=staging, prosody=prosody, edits=edits)
-    own = [edit for edit in edits if edit.channel not in sources]
-    return apply_curve_edits(apply_rig(rows, sources, motion.rate_hz), units, own)
+    of_rig = [edit for edit in edits if edit.channel not in sources]
+    return apply_curve_edits(apply_rig(rows, sources, motion.rate_hz), units, of_rig)
 
 
 def make_rig_sources(
@@ -152,15 +152,13 @@ def apply_weight_edits(
 
 def rename_edits(edits: Sequence[CurveEdit], named: Mapping[str, str]) -> tuple[CurveEdit, ...]:
     """Return edits of curves by other names: those of ``named`` by their values."""
-    renamed: list[CurveEdit] = []
-    for edit in edits:
+
+    def rename(edit: CurveEdit) -> CurveEdit:
         if isinstance(edit, Locked):
-            renamed.append(replace(edit, edits=rename_edits(edit.edits, named)))
-        else:
-            renamed.append(
-                edit if isinstance(edit, Hold) else replace(edit, channel=named.get(edit.channel, edit.channel))
-            )
-    return tuple(renamed)
+            return replace(edit, edits=rename_edits(edit.edits, named))
+        return edit if isinstance(edit, Hold) else replace(edit, channel=named.get(edit.channel, edit.channel))
+
+    return tuple(map(rename, edits))
 
 
 def check_edit(edit: CurveEdit, motion: Motion, others: Collection[str] = ()) -> None:
@@ -168,16 +166,17 @@ def check_edit(edit: CurveEdit, motion: Motion, others: Collection[str] = ()) ->
 
     others : names of curves that outputs will have besides
     """
-    own = dict.fromkeys(name for name in (*motion.names, *GESTURES) if name not in EDITED.values())
-    known = (*own, *KNOWN_CURVES, *others)
+    names = dict.fromkeys(name for name in (*motion.names, *GESTURES) if name not in EDITED.values())
+    known = (*names, *KNOWN_CURVES, *others)
     if edit.channel and edit.channel not in known:
         verb = {Pin: "pin", DrawnCurve: "draw"}.get(type(edit), "change")
         lower = {name.lower(): name for name in known}
         near = get_close_matches(edit.channel.lower(), lower, 1)
         name = shorten(repr(edit.channel)) + (f" (is it {lower[near[0]]}?)" if near else "")
+        of_mouth = ", ".join(each for each in names if not LIP_POINT.match(each))
         raise InputError(
-            f"cannot {verb} {name}; channels that can be pinned: {', '.join(n for n in own if not LIP_POINT.match(n))}"
-            "; lip points, as y_14; curves, as jawOpen, viseme_PP, open_jaw"
+            f"cannot {verb} {name}; channels that can be pinned: {of_mouth}; lip points, as y_14; curves, as jawOpen, "
+            "viseme_PP, open_jaw"
         )
     last_s = (len(motion.values) - 1) / motion.rate_hz
     if isinstance(edit, Pin):
@@ -211,9 +210,8 @@ def _make_set(
     if name == VOWELS:  # with how far the lips are pressed together, and VRM's expressions of moods
         lips, moods = find_mouth(motion, units), weigh_expressions(read_moods(motion))
         curves = {CLOSED: lips.closing if CLOSED not in motion.names else motion[CLOSED]}
-        curves |= {
-            mood: curve * lips.free for mood, curve in moods.items()
-        }  # only the model knows which parts the lips
+        # only the model knows which parts the lips
+        curves |= {mood: curve * lips.free for mood, curve in moods.items()}
         channels = tuple(Channel(curve, WEIGHT) for curve in curves)
         pressed = Motion(np.stack(list(curves.values()), axis=1), motion.rate_hz, channels)
         vowels = join_channels(solve_shape_weights(motion, units, vowel_mouth()), pressed)
@@ -242,9 +240,9 @@ def show_edited_curves(
         edited = edit_face_curves(plain, generation.units, edits)
         if mouth and names & {*SETS_OF[name]} - {*ARKIT_OTHERS}:
             motion = _move_mouth(motion, calm, generation.units, (plain, edited), edits)
-        given = [each for group in GROUPS if names & {*group} for each in group if each in edited.names]
-        if name == WHOLE_FACE and given:
-            motion = join_channels(motion, edited.selected([each for each in given if each not in motion.names]))
+        living = [each for group in GROUPS if names & {*group} for each in group if each in edited.names]
+        if name == WHOLE_FACE and living:
+            motion = join_channels(motion, edited.selected([each for each in living if each not in motion.names]))
     return generation if motion is generation.motion else generation.with_motion(motion)
 
 
@@ -295,7 +293,7 @@ def with_curves(
     """
     edits = generation.curve_edits
     added = make_curves(generation.motion, generation.units, curves, staging=staging, prosody=prosody, edits=edits)
-    kept = [name for name in generation.motion.names if name not in added.names]
-    if len(kept) < len(generation.motion.names):
-        generation = generation.selected(kept)
+    others = [name for name in generation.motion.names if name not in added.names]
+    if len(others) < len(generation.motion.names):
+        generation = generation.selected(others)
     return generation.with_motion(join_channels(generation.motion, added)), added.names

@@ -103,19 +103,19 @@ def deliver_to_face(
     character : whose weights are shown, where the face is a character with blendshapes
     staging, prosody : as of ``show_edited_curves``, which all other edits of curves go through
     """
-    moved = with_drawn_channels(deliver(generation, delivery))
+    shown = with_drawn_channels(deliver(generation, delivery))
     solved = character if character is not None and character.shapes is not None else None
-    moved = show_edited_curves(moved, staging, prosody, mouth=solved is None)
-    if moved.curve_edits and solved is not None:
-        moved = with_curves(moved, solved)[0]
+    shown = show_edited_curves(shown, staging, prosody, mouth=solved is None)
+    if shown.curve_edits and solved is not None:
+        shown = with_curves(shown, solved)[0]
     frames = delivery.hold_frames(fps)
     if not frames:
-        return moved
-    moved = moved.with_motion(with_gestures(moved.motion, moved.units))
-    closed_s, moved = find_closed_times(moved), close_on_frame_grid(moved, fps)
+        return shown
+    shown = shown.with_motion(with_gestures(shown.motion, shown.units))
+    closed_s, shown = find_closed_times(shown), close_on_frame_grid(shown, fps)
     if solved is not None:
-        moved = with_curves(moved, solved)[0]
-    return hold_mouth(moved.resampled(fps), frames, closed_s)
+        shown = with_curves(shown, solved)[0]
+    return hold_mouth(shown.resampled(fps), frames, closed_s)
 
 
 def with_drawn_channels(generation: Generation) -> Generation:

@@ -17,6 +17,7 @@ from lipmotion.articulation.mouth import find_mouth
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats.base import (
+    Thinning,
     check_motion,
     find_motion_format,
     find_suffix,
@@ -26,7 +27,6 @@ from lipmotion.formats.base import (
 )
 from lipmotion.formats.cues import read_cue_motion
 from lipmotion.formats.fap import FAP
-from lipmotion.formats.keys import Thinning
 from lipmotion.formats.steady_rate import match_sound_rate
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
@@ -71,7 +71,10 @@ class MotionOutput(Output):
         return bool(find_suffix(path))
 
     def check(self) -> None:  # noqa: D102
-        check_rate(self.path, self.settings.outputs.rate_hz)
+        form, rate_hz = find_motion_format(self.path), self.settings.outputs.rate_hz
+        if form.fixed_rate and rate_hz is not None and rate_hz != form.rate_hz:
+            required = f"required {form.rate_hz:g}: leave --rate out"
+            raise ExportError(f"{self.path}: {rate_hz:g} frames a second in {find_suffix(self.path)}, {required}")
 
     def prepare(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         settings, form = self.settings, find_motion_format(self.path)
@@ -83,10 +86,8 @@ class MotionOutput(Output):
         names = held.motion.names
         is_replaced = form.mouth and OPENING in names and OPENING not in requested
         if requested and (is_replaced or not {*requested} & {*names}):
-            suffix = find_suffix(self.path)
-            LOG.warning(
-                "%s: %s holds channels of its own, none of those that were asked for", *(self.path.name, suffix)
-            )
+            file = f"{self.path.name}: {find_suffix(self.path)}"
+            LOG.warning("%s holds channels of its own, none of those that were asked for", file)
         frames = settings.delivery.hold_frames(held.motion.rate_hz)
         held = hold_mouth(held, frames, performance.cached(_find_closed_s))
         if form.keyed and settings.delivery.key_tolerance:
@@ -113,16 +114,16 @@ def thin_keys(held: Generation, thinning: Thinning) -> Generation:
 
     Weights that never exceed the tolerance are left out, and held poses stay as they are.
     """
-    motion, kept = held.motion, []
+    motion, moving = held.motion, []
     values = motion.values.astype(np.float64)
     for column, channel in enumerate(motion.channels):
         curve = values[:, column]
         if channel.unit != WEIGHT or np.abs(curve).max(initial=0.0) > thinning.tolerance:
-            kept.append(channel.name)
+            moving.append(channel.name)
         if channel.unit == WEIGHT and channel.name not in held.stepped:
             keys = thinning.choose(motion.time_s, curve[:, None])
             values[:, column] = np.interp(motion.time_s, motion.time_s[keys], curve[keys])
-    return replace(held, motion=replace(motion, values=values)).selected(kept)
+    return replace(held, motion=replace(motion, values=values)).selected(moving)
 
 
 def _deliver(performance: Performance) -> Generation:
@@ -144,17 +145,16 @@ def _choose(performance: Performance) -> tuple[Generation, Generation, Sequence[
     rate_hz, curves, channels = settings.outputs.rate_hz, settings.curves, settings.outputs.channels or None
     if rate_hz is not None and (performance.cached(_find_closed_s) or rate_hz < spoken.motion.rate_hz):
         spoken = close_on_frame_grid(spoken, rate_hz)
-    asked: Sequence[str] = channels or ()
-    names: Sequence[str] | None = channels
+    names, requested = channels, channels or ()
     if curves is not None:
         prosody = performance.cached(measure_recorded_prosody) if curves in LIVING_SETS else None
-        spoken, found = with_curves(spoken, curves, staging=settings.staging, prosody=prosody)
-        asked = asked if channels or isinstance(curves, DrivenCharacter) else found
-        names = found if channels is None else channels
+        spoken, curve_names = with_curves(spoken, curves, staging=settings.staging, prosody=prosody)
+        names = channels or curve_names
+        requested = requested if isinstance(curves, DrivenCharacter) else names
     chosen = spoken.selected(names) if names is not None else spoken
     if rate_hz is not None:
         chosen = chosen.resampled(rate_hz) if curves is None else resample_curves(chosen, spoken, rate_hz)
-    return spoken, chosen, asked
+    return spoken, chosen, requested
 
 
 def with_articulation(generation: Generation, channels: Sequence[str] = GESTURES) -> Generation:
@@ -211,20 +211,12 @@ def resample_curves(held: Generation, generation: Generation, rate_hz: float) ->
 
     held       : the curves;  generation : the motion that they are of, with as many frames
     """
-    resampled, shown = held.resampled(rate_hz), with_mouth(generation.motion)
-    if OPENING not in shown.names or len(held.motion.values) != len(shown.values):
+    resampled, mouth = held.resampled(rate_hz), with_mouth(generation.motion)
+    if OPENING not in mouth.names or len(held.motion.values) != len(mouth.values):
         return resampled
-    contact = find_mouth(shown, generation.units).contact
+    contact = find_mouth(mouth, generation.units).contact
     rows = sample_pictures(held.motion.values.astype(np.float64), contact, held.motion.rate_hz, resampled.motion.time_s)
     return replace(resampled, motion=replace(resampled.motion, values=rows))
-
-
-def check_rate(path: Path, rate_hz: float | None) -> None:
-    """Raise ExportError if a motion file cannot have a rate that the user asks for."""
-    form = find_motion_format(path)
-    if form.fixed_rate and rate_hz is not None and rate_hz != form.rate_hz:
-        required = f"required {form.rate_hz:g}: leave --rate out"
-        raise ExportError(f"{path}: {rate_hz:g} frames a second in {find_suffix(path)}, {required}")
 
 
 def _make_curves(generation: Generation, name: str, staging: Staging | None, prosody: Prosody | None) -> Motion:
@@ -285,9 +277,9 @@ def read_generation(
     Raises InputError: a file that cannot be read, motion without frames, of an unlikely rate, or of more than a day.
     """
     if rate_hz is not None and Path(path).suffix.lower() in CUE_SUFFIXES:
-        motion, found = read_cue_motion(Path(path), rate_hz)
+        motion, stated = read_cue_motion(Path(path), rate_hz)
     else:
-        motion, found = read_motion(path)
+        motion, stated = read_motion(path)
         motion = motion if rate_hz is None else replace(motion, rate_hz=rate_hz)
     if not len(motion.values):
         raise InputError(f"{path}: the motion has no frames; export it again")
@@ -297,7 +289,7 @@ def read_generation(
     lasts_s = (len(motion.values) - 1) / motion.rate_hz
     if lasts_s > LONGEST_S:
         raise InputError(f"{path}: the motion lasts {lasts_s:.0f} s, required at most {LONGEST_S:.0f}; cut it")
-    phones = found if units is None else read_units(units) if isinstance(units, str | Path) else units
+    phones = stated if units is None else read_units(units) if isinstance(units, str | Path) else units
     channels = tuple(
         Channel(each.name, WEIGHT)
         if each.unit == EYE_DISTANCE and (is_known(each.name) or is_mood(each.name))
@@ -318,9 +310,8 @@ def correct_rate(motion: Motion, duration_s: float, advice: str = "") -> Motion:
     rate_hz = match_sound_rate(motion.rate_hz, len(motion.values), duration_s)
     if rate_hz != motion.rate_hz:
         lasts_s = len(motion.values) / motion.rate_hz
-        what = (
-            f"the motion lasts {lasts_s:.2f} s, the sound {duration_s:.2f} s, {duration_s / lasts_s:.4f} times as long"
-        )
+        ratio = duration_s / lasts_s
+        what = f"the motion lasts {lasts_s:.2f} s, the sound {duration_s:.2f} s, {ratio:.4f} times as long"
         LOG.warning("%s: read at %.3f frames a second, not at %.3f%s", what, rate_hz, motion.rate_hz, advice)
     return replace(motion, rate_hz=rate_hz)
 

@@ -333,23 +333,22 @@ def write(  # noqa: PLR0913
     time_s,opening,width
     """
     sound = speech if isinstance(speech, Audio) else None
-    how = replace(film or Outputs(), channels=tuple(channels or ()), rate_hz=rate_hz, fps=fps)
     settings = OutputSettings(
         load_provided("shown_face")(face),
         None if speech is None or sound is not None else Path(str(speech)),
         sound is not None,
-        how,
+        replace(film or Outputs(), channels=tuple(channels or ()), rate_hz=rate_hz, fps=fps),
         curves,
         staging or Staging(),
         delivery or Delivery(),
     )
-    planned = create_outputs([outputs] if isinstance(outputs, str | Path) else outputs, settings)
     performance = Performance(generation, settings, sound, settings.recording, model, monitor)
-    write_planned(performance, planned, temporary=temporary)
+    write_files(performance, [outputs] if isinstance(outputs, str | Path) else outputs, temporary=temporary)
 
 
-def write_planned(performance: Performance, planned: Sequence[Output], *, temporary: bool = False) -> None:
-    """Write what is performed to the outputs of ``create_outputs``; ``temporary``: as of ``write``. Raises as that."""
+def write_files(performance: Performance, outputs: Sequence[str | Path], *, temporary: bool = False) -> None:
+    """Write what is performed to files; ``temporary``: as of ``write``. Raises as that."""
+    planned = create_outputs(outputs, performance.settings)
     if performance.sound_file is None or temporary:
         written = (output.path for output in planned if isinstance(output, SoundOutput))
         performance = replace(performance, sound_file=next(written, None))

@@ -112,13 +112,13 @@ def with_common_channels(utterances: Sequence[Utterance]) -> list[Utterance]:
         "%d kinds of motion: training on the %d channels that all have (%s); left out: %s",
         *(len(kinds), len(common), names_of(common), printable(shorten(", ".join(left_out)))),
     )
-    reduced = []
-    for utterance in utterances:
+    reduced = list(utterances)
+    for number, utterance in enumerate(utterances):
         motion = utterance.track.motion
-        columns = [motion.channels.index(channel) for channel in common]
-        chosen = Motion(np.asarray(motion.values)[:, columns], motion.rate_hz, common)
-        same = motion.channels == common
-        reduced.append(utterance if same else replace(utterance, track=replace(utterance.track, motion=chosen)))
+        if motion.channels != common:
+            columns = [motion.channels.index(channel) for channel in common]
+            chosen = Motion(np.asarray(motion.values)[:, columns], motion.rate_hz, common)
+            reduced[number] = replace(utterance, track=replace(utterance.track, motion=chosen))
     return reduced
 
 

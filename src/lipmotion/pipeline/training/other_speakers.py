@@ -79,9 +79,20 @@ def synthesise_sentences(
     if not chosen:
         packages = " ".join(synthesiser.package for synthesiser in SYNTHESISERS.values())
         raise MissingDependencyError(f"no speech synthesiser is installed; install one or more: apt install {packages}")
-    spoken = [prompt.text for prompt in prompts(count=SENTENCES).chosen] if texts is None else list(texts)
+    texts = [prompt.text for prompt in prompts(count=SENTENCES).chosen] if texts is None else texts
     for voice in chosen:
-        yield from _synthesise_voice(voice, spoken, lexicon)
+        for number, (audio, units, _) in enumerate(speak_sentences(texts, voice, lexicon), start=1):
+            pause = np.zeros(round(PAUSE_S * audio.rate_hz), np.float32)
+            longer = Audio(np.concatenate([pause, audio.samples, pause]), audio.rate_hz)
+            spoken = list(units.shifted(PAUSE_S))
+            for place in (0, -1):
+                if is_silent(spoken[place].label.phone):
+                    del spoken[place]
+            before = Span(0.0, spoken[0].start_s, Unit(SILENCE))
+            after = Span(spoken[-1].end_s, longer.duration_s, Unit(SILENCE))
+            noisy = mix_noise(longer, "white", FLOOR_DB, seed=number)
+            name = f"{voice.synthesiser}-{voice.name}-{number:03d}"
+            yield SpokenSentence(name, voice.speaker, noisy, Timeline((before, *spoken, after)))
 
 
 def align_recordings(
@@ -158,20 +169,3 @@ def synthesise_others(
     if synthetic:
         chosen = [voice for voice in list_installed() if not is_held_out_speaker(voice.speaker)]
         yield from synthesise_sentences(voices=chosen, lexicon=lexicon)
-
-
-def _synthesise_voice(voice: SyntheticVoice, texts: Sequence[str], lexicon: Lexicon | None) -> Iterator[SpokenSentence]:
-    """Yield texts in a voice, with silence before and after each of them, and with white noise."""
-    for number, (audio, units) in enumerate(speak_sentences(texts, voice, lexicon), start=1):
-        pause = np.zeros(round(PAUSE_S * audio.rate_hz), np.float32)
-        longer = Audio(np.concatenate([pause, audio.samples, pause]), audio.rate_hz)
-        spoken = list(units.shifted(PAUSE_S))
-        if is_silent(spoken[0].label.phone):
-            del spoken[0]
-        if is_silent(spoken[-1].label.phone):
-            del spoken[-1]
-        before = Span(0.0, spoken[0].start_s, Unit(SILENCE))
-        after = Span(spoken[-1].end_s, longer.duration_s, Unit(SILENCE))
-        noisy = mix_noise(longer, "white", FLOOR_DB, seed=number)
-        name = f"{voice.synthesiser}-{voice.name}-{number:03d}"
-        yield SpokenSentence(name, voice.speaker, noisy, Timeline((before, *spoken, after)))

@@ -91,8 +91,8 @@ def find_units(phones: Sequence[str]) -> set[UnitName]:
     sequence = [SILENCE, *phones, SILENCE]
     units: set[UnitName] = {(DIPHONE, left, right) for left, right in pairwise(sequence)}
     for left, phone, right in zip(sequence, phones, sequence[2:], strict=False):
-        contexts = (f"[{VISEME_OF[left]}]-{phone}", f"{phone}+[{VISEME_OF[right]}]")
-        units |= {(PHONE, phone), *((CONTEXT, context) for context in contexts)}
+        before, after = f"[{VISEME_OF[left]}]-{phone}", f"{phone}+[{VISEME_OF[right]}]"
+        units |= {(PHONE, phone), (CONTEXT, before), (CONTEXT, after)}
     return units
 
 

@@ -47,7 +47,7 @@ from lipmotion.speech.features.speaker_similarity import JUDGED_RECORDINGS, aver
 from lipmotion.speech.recognition.adaptation_estimation import estimate_adaptation
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import (
     FRAME_RATE_HZ,
@@ -70,29 +70,6 @@ WARP_CYCLE = (1.0, 0.88, 1.0, 0.94, 1.12, 1.06)
 """Warps of the frequencies, of one recording after the other."""
 MIN_WARPED_RECORDINGS = 60
 """Fewer recordings than this are not warped: they are too few to train models of one speaker on, let alone several."""
-
-
-def train_phone_models(
-    spoken: Sequence[tuple[Audio, tuple[str, ...]]],
-    lexicon: Lexicon,
-    config: HmmConfig,
-    monitor: Monitor,
-    checkpoint: Checkpoint = NO_CHECKPOINT,
-) -> UnitHmm:
-    """Return phone models trained on recordings and their words.
-
-    spoken : recordings, each with its words, lower case
-    The frequencies of many recordings are warped as by vocal tracts of other lengths (``WARP_CYCLE``), so that the
-    models also fit other speakers.
-    Raises CorpusError: no transcript fits into its recording.
-    Source: Jaitly & Hinton 2013 (vocal tract length perturbation), without random draws or more data.
-    """
-    turns = WARP_CYCLE if len(spoken) >= MIN_WARPED_RECORDINGS else (1.0,)
-    utterances = [
-        TranscribedUtterance(analysed(audio).mfcc(warp).values, tuple(lexicon.pronunciations(word) for word in words))
-        for (audio, words), warp in zip(spoken, cycle(turns), strict=False)
-    ]
-    return train_hmm(utterances, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor, checkpoint)
 
 
 LOG = logging.getLogger("lipmotion")
@@ -283,7 +260,12 @@ def label_phones(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> 
 def _train_phone_models(
     utterances: Sequence[Utterance], lexicon: Lexicon, config: HmmConfig, monitor: Monitor, checkpoint: Checkpoint
 ) -> UnitHmm:
-    """Return phone models of all transcribed or labelled utterances, or those of the shipped model."""
+    """Return phone models of all transcribed or labelled utterances, or those of the shipped model.
+
+    The frequencies of many recordings are warped as by vocal tracts of other lengths (``WARP_CYCLE``), so that the
+    models also fit other speakers. Raises CorpusError: no transcript fits into its recording.
+    Source: Jaitly & Hinton 2013 (vocal tract length perturbation), without random draws or more data.
+    """
     transcribed: list[tuple[Audio, tuple[str, ...]]] = []
     labelled: list[tuple[Audio, tuple[str, ...]]] = []
     pronunciations: dict[str, tuple[tuple[str, ...], ...]] = {}
@@ -310,7 +292,13 @@ def _train_phone_models(
     vocabulary = dict.fromkeys(word for _, words in transcribed for word in words)
     warn_of_guesses(tuple(vocabulary), lexicon)
     lexicon = Lexicon(lexicon.user | pronunciations)
-    return train_phone_models([*transcribed, *labelled], lexicon, config, monitor, checkpoint)
+    spoken = [*transcribed, *labelled]
+    turns = WARP_CYCLE if len(spoken) >= MIN_WARPED_RECORDINGS else (1.0,)
+    examples = [
+        TranscribedUtterance(analysed(audio).mfcc(warp).values, tuple(lexicon.pronunciations(word) for word in words))
+        for (audio, words), warp in zip(spoken, cycle(turns), strict=False)
+    ]
+    return train_hmm(examples, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor, checkpoint)
 
 
 def describe_training(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar
 
@@ -164,10 +164,8 @@ class AnalysedAudio(Audio):
         for (first, own, _), part in zip(self.passages, parts, strict=True):
             between = np.asarray(part[-1] if silence is None else silence, part.dtype)
             start, stop = max(first, own.start), min(first + len(part), own.stop)
-            before, after = (
-                np.broadcast_to(between, (n, *part.shape[1:])) for n in (start - own.start, own.stop - stop)
-            )
-            rows += [before, part[start - first : stop - first], after]
+            silent = np.broadcast_to(between, (len(range(own.start, own.stop)), *part.shape[1:]))
+            rows += [silent[: start - own.start], part[start - first : stop - first], silent[: own.stop - stop]]
         return JoinedRows(rows)
 
     def mfcc(self, warp: float = 1.0) -> Features:
@@ -176,7 +174,7 @@ class AnalysedAudio(Audio):
 
     def joined_mfcc(self) -> Features:
         """Return ``mfcc`` with values that are ``JoinedRows``."""
-        values: Any = self.joined_rows(partial(_compute_mfcc, warp=1.0))
+        values: Any = self.joined_rows(lambda audio: audio.mfcc().values)
         return Features(values, self.duration_s)
 
     def mfcc_of_warps(self, warps: Sequence[float]) -> list[Features]:
@@ -193,7 +191,10 @@ class AnalysedAudio(Audio):
                 del audio._mfcc[warp]
 
     def _new_mfcc(self, warps: Sequence[float]) -> list[Features]:
-        return [Features(self.joined(partial(_compute_mfcc, warp=warp)), self.duration_s) for warp in warps]
+        def join(warp: float) -> Features:
+            return Features(self.joined(lambda audio: audio.mfcc(warp).values), self.duration_s)
+
+        return list(map(join, warps))
 
     @cached_property
     def log_energy(self) -> NDArray[np.float32]:
@@ -220,10 +221,6 @@ class AnalysedAudio(Audio):
         return _Stretch(self.samples[first * HOP : stop * HOP], self.rate_hz, whole=self, first=first)
 
 
-def _compute_mfcc(audio: AnalysedAudio, warp: float) -> NDArray[np.float32]:
-    return audio.mfcc(warp).values
-
-
 class Passage(NamedTuple):
     """A passage of a recording.
 
@@ -238,12 +235,7 @@ class Passage(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """The sound between two digital silences, without what is before and after it.
-
-    frame    : of the recording, in which it begins
-    energy   : the log energy of its frames [shape=(T,)]
-    passages : what is said in it, in its frames;  tones : where it is a steady tone
-    """
+    """The sound between two digital silences, from a frame of the recording on; the rest is in frames of its own."""
 
     frame: int
     samples: NDArray[np.float32]
@@ -387,10 +379,7 @@ def analysed(audio: Audio, features: Features | None = None) -> AnalysedAudio:
 
 
 def _without_offset(samples: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return samples without a constant offset, which would make pauses as loud as speech; digital silence stays.
-
-    It is that of the quietest sound between digital silences, and taken off where it is most of what is heard there.
-    """
+    """Return samples without constant offsets that are most of the quietest sound between digital silences."""
     count = len(samples) // HOP if samples.ndim == 1 else 0
     sound, result = np.flatnonzero(samples[: count * HOP].reshape(count, HOP).any(axis=1)), samples
     for part in np.split(sound, np.flatnonzero(np.diff(sound) > SILENT_FRAMES) + 1) if len(sound) else ():

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import cache
 from importlib import resources
-from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -103,14 +102,14 @@ def encode_window(log_mel: Array, encoder: Encoder) -> Array:
         columns = [padded[first : first + len(x) : stride] for first in range(3)]
         x = _gelu(np.concatenate(columns, axis=1) @ kernel + bias)
     x += _positions(x.shape[1])
-    for layer in encoder.layers:
-        queries, keys, values = np.split(_standardise(x) @ layer.attend + layer.attend_bias, 3, axis=1)
+    for (attend, attend_bias), (merge, merge_bias), (widen, widen_bias), (narrow, narrow_bias) in encoder.layers:
+        queries, keys, values = np.split(_standardise(x) @ attend + attend_bias, 3, axis=1)
         q, k, v = (part.reshape(len(x), HEADS, -1).swapaxes(0, 1) for part in (queries, keys, values))
         scores = q @ k.swapaxes(1, 2)
         scores = np.exp(scores - scores.max(axis=2, keepdims=True))
         attended = (scores / scores.sum(axis=2, keepdims=True)) @ v
-        x += attended.swapaxes(0, 1).reshape(x.shape) @ layer.join + layer.join_bias
-        x += _gelu(_standardise(x) @ layer.widen + layer.widen_bias) @ layer.narrow + layer.narrow_bias
+        x += attended.swapaxes(0, 1).reshape(x.shape) @ merge + merge_bias
+        x += _gelu(_standardise(x) @ widen + widen_bias) @ narrow + narrow_bias
     components: Array = _standardise(x) @ encoder.basis + encoder.shift
     return components
 
@@ -142,28 +141,20 @@ def _positions(size: int) -> Array:
     return np.concatenate([np.sin(angles), np.cos(angles)], axis=1).astype(np.float32)
 
 
-class EncoderLayer(NamedTuple):
-    """Weights of a layer of N values, each a matrix and a bias: of queries, keys and values, and of what follows."""
-
-    attend: Array
-    attend_bias: Array
-    join: Array
-    join_bias: Array
-    widen: Array
-    widen_bias: Array
-    narrow: Array
-    narrow_bias: Array
+Linear = tuple[Array, Array]
+"""A matrix and a bias."""
 
 
 class Encoder(NamedTuple):
     """Weights of the network; gains of layer normalisation are in the matrices that follow them.
 
     convolutions : of three taps each, the second one with stride 2: kernels [shape=(3·inputs, N)] and biases
+    layers       : of queries, keys and values; of what is attended to; and of the two that follow
     basis, shift : from the normalised output of the last layer to the features [shape=(N, D)], [shape=(D,)]
     """
 
-    convolutions: tuple[tuple[Array, Array], ...]
-    layers: tuple[EncoderLayer, ...]
+    convolutions: tuple[Linear, ...]
+    layers: tuple[tuple[Linear, ...], ...]
     basis: Array
     shift: Array
 
@@ -194,16 +185,14 @@ def _read_arrays() -> dict[str, NDArray[Any]]:
 def find_encoder(arrays: Mapping[str, NDArray[Any]]) -> Encoder:
     """Return the network of stored arrays: matrices in eight bits, with a scale for each row and each column."""
 
-    def linear(name: str) -> tuple[Array, Array]:
+    def linear(name: str) -> Linear:
         rows, columns, bias = (arrays[f"{name}_{kind}"] for kind in ("rows", "columns", "bias"))
         return rows[:, None] * arrays[name].astype(np.float32) * columns, bias
 
-    layers = [
-        EncoderLayer(*chain.from_iterable(linear(f"{name}_{number}") for name in ("attend", "join", "widen", "narrow")))
-        for number in range(LAYERS)
-    ]
+    names = ("attend", "join", "widen", "narrow")
+    layers = tuple(tuple(linear(f"{name}_{number}") for name in names) for number in range(LAYERS))
     convolutions = tuple(linear(f"convolution_{number}") for number in range(2))
-    return Encoder(convolutions, tuple(layers), arrays["basis"], arrays["shift"])
+    return Encoder(convolutions, layers, arrays["basis"], arrays["shift"])
 
 
 @cache

@@ -1,8 +1,7 @@
 """The fundamental frequency (F0) of voiced speech, frame by frame.
 
 Three steps: the signal is low-passed and sampled at 4 kHz; around every frame its autocorrelation is computed at all
-lags of the range; dynamic programming chooses one of the few best lags of every frame, or unvoiced, so that the
-sequence costs least.
+lags of the range; dynamic programming finds the cheapest sequence of one of the few best lags, or unvoiced, a frame.
 Source: the candidates, costs and search of D. Talkin, "A robust algorithm for pitch tracking (RAPT)", in Kleijn and
 Paliwal (eds.), Speech Coding and Synthesis, 1995. Deviations: one correlation, weighted around the centre of the frame
 and computed from its power spectrum, at half samples; silence is relative to the recording; no cost of the spectrum.
@@ -72,8 +71,14 @@ def log_f0(audio: Audio) -> Floats:
     for start in range(0, frames, BLOCK):
         block = slice(start, min(start + BLOCK, frames))
         pitch[:-1, block], cost = candidates(correlations(samples, block, silence))
-        before = pitch[:-1, max(start - 1, 0)]  # the first frame continues what it is
-        arrival, pointers[block] = find_cheapest(arrival - arrival.min(), _steps(before, pitch[:-1, block], cost))
+        # from every candidate, the last being unvoiced, to those of the next frame; the first frame continues itself
+        earlier = np.concatenate([pitch[:-1, max(start - 1, 0), None], pitch[:-1, block][:, :-1]], axis=1)
+        steps = np.full((CANDIDATES + 1, CANDIDATES + 1, cost.shape[1]), VOICING_CHANGE_COST)
+        steps[:-1, :-1] = JUMP_COST * np.abs(pitch[:-1, block] - earlier[:, None])
+        steps[-1, -1] = 0
+        steps[:, :-1] += cost
+        steps[:, -1] += UNVOICED_COST
+        arrival, pointers[block] = find_cheapest(arrival - arrival.min(), steps)
     return pitch[trace_back(pointers, int(arrival.argmin())), np.arange(frames)]
 
 
@@ -81,7 +86,7 @@ def correlations(samples: Floats, block: slice, silence: float) -> Floats:
     """Return the normalised autocorrelation around every frame of a block, at the lags of ``lags()`` [shape=(n, L)].
 
     silence : power below which correlations become smaller
-    With x the low-passed signal, w the window, both around the frame, and s = ``silence`` + the frame's ``_frication``:
+    With x the low-passed signal, w the window, both around the frame, and s = ``silence`` + the frame's frication:
     Σ w(t) x(t) w(t+k) x(t+k) / (√(Σ w(t) w(t+k) x²(t) · Σ w(t) w(t+k) x²(t+k)) + s · Σ w(t) w(t+k)), at most 1.
     """
     tables = _tables()
@@ -93,7 +98,11 @@ def correlations(samples: Floats, block: slice, silence: float) -> Floats:
     np.square(x, out=x)
     energy = np.sqrt(x @ tables.early)
     energy *= np.sqrt(x @ tables.late)
-    energy += tables.mass * (_frication(samples, block) + np.float32(silence))[:, None] + np.finfo(np.float32).tiny
+    slope = np.diff(_reflect(samples, (block.start - 1) * HOP - 1, block.stop * HOP))
+    np.square(slope, out=slope)
+    power = slope.reshape(-1, HOP).mean(axis=1)
+    frication = np.float32(FRICATION_SHARE / 2) * (power[1:] + power[:-1])
+    energy += tables.mass * (frication + np.float32(silence))[:, None] + np.finfo(np.float32).tiny
     correlation /= energy
     return correlation
 
@@ -114,16 +123,10 @@ def candidates(correlation: Floats) -> tuple[Floats, Floats]:
         weighted.argmax(axis=1, out=peak)
         np.greater(weighted[rows, peak], 0, out=exists)
         weighted[rows, peak] = 0
-    return _refine(correlation, peaks + 1, is_peak)
-
-
-def _refine(correlation: Floats, peaks: NDArray[np.intp], is_peak: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """Return log F0 and cost at the tops of parabolas through three correlations [shapes=(CANDIDATES, n)]."""
-    rows = np.arange(len(correlation))
-    left, top, right = (correlation[rows, peaks + side] for side in (-1, 0, 1))
+    left, top, right = (correlation[rows, peaks + side] for side in (0, 1, 2))
     bend = np.where(is_peak, 2 * top - left - right, 1)
-    offset = np.where(is_peak, (right - left) / (2 * bend), 0)
-    lag = np.clip(lags()[peaks] + 0.5 * offset, _RATE_HZ / HIGHEST_HZ, _RATE_HZ / LOWEST_HZ)
+    offset = np.where(is_peak, (right - left) / (2 * bend), 0)  # of the top of the parabola through the three
+    lag = np.clip(lags()[peaks + 1] + 0.5 * offset, _RATE_HZ / HIGHEST_HZ, _RATE_HZ / LOWEST_HZ)
     height = (top + (right - left) * offset / 4) * _weigh_lag(lag)
     return np.log(_RATE_HZ / lag).astype(np.float32), np.where(is_peak, 1 - height, np.inf).astype(np.float32)
 
@@ -131,25 +134,6 @@ def _refine(correlation: Floats, peaks: NDArray[np.intp], is_peak: NDArray[np.bo
 def _weigh_lag(lag: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the weight of the correlation at a lag (``LONG_LAG_SHARE``)."""
     return 1 - LONG_LAG_SHARE * lag * LOWEST_HZ / _RATE_HZ
-
-
-def _steps(before: Floats, pitch: Floats, cost: Floats) -> NDArray[np.float64]:
-    """Return the costs from every candidate, the last being unvoiced, to those of the next frame [shape=(C, C, n)]."""
-    earlier = np.concatenate([before[:, None], pitch[:, :-1]], axis=1)
-    steps = np.full((CANDIDATES + 1, CANDIDATES + 1, pitch.shape[1]), VOICING_CHANGE_COST)
-    steps[:-1, :-1] = JUMP_COST * np.abs(pitch - earlier[:, None])
-    steps[-1, -1] = 0
-    steps[:, :-1] += cost
-    steps[:, -1] += UNVOICED_COST
-    return steps
-
-
-def _frication(samples: Floats, block: slice) -> Floats:
-    """Return the power to add for the frequencies above the low-passed signal, around every frame [shape=(n,)]."""
-    slope = np.diff(_reflect(samples, (block.start - 1) * HOP - 1, block.stop * HOP))
-    np.square(slope, out=slope)
-    power = slope.reshape(-1, HOP).mean(axis=1)
-    return np.float32(FRICATION_SHARE / 2) * (power[1:] + power[:-1])
 
 
 def _loudness(samples: Floats) -> float:
@@ -193,8 +177,7 @@ def lags() -> NDArray[np.float64]:
 class _Tables(NamedTuple):
     """Matrices that signals are multiplied by.
 
-    low_pass    : 10 ms → what they add to the same 10 ms at 4 kHz, and to those one and two before
-                  [shape=(160, 3 · 40)]
+    low_pass    : 10 ms → what they add to the same 10 ms at 4 kHz, and to the two before [shape=(160, 3 · 40)]
     fourier     : a frame → its windowed spectrum, real parts and then imaginary ones [shape=(_WINDOW, 2 · bins)]
     inverse     : powers of the spectrum → Σ w(t) x(t) w(t+k) x(t+k) [shape=(bins, L)]
     early, late : squares of a frame → Σ w(t) w(t+k) x²(t), and of x²(t+k) [shape=(_WINDOW, L)]

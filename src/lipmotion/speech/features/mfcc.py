@@ -44,8 +44,7 @@ def mfcc(audio: Audio, warp: float = 1.0) -> Features:
     warp : factor by which frequencies are stretched before the filters, to make vocal tracts of other lengths alike
     Frame n is centred at n · 10 ms, the signal reflected at both ends: T = floor(duration · 100) + 1.
     Mean and variance are normalised over the recording.
-    Raises InputError: the rate is not 16 kHz, the recording is shorter than one window, or not one channel of
-    finite samples.
+    Raises InputError: not 16 kHz, shorter than one window, or not one channel of finite samples.
     Source: Xie & Liu 2007, §5.1; details in the project's conventions.
     """
     (features,) = mfcc_of_warps(audio, (warp,), log_energy(check_samples(audio)))
@@ -175,9 +174,14 @@ def _log_power(power: NDArray[np.float32]) -> NDArray[np.float32]:
 def mel_filters(
     warp: float, count: int = FILTERS, lowest_hz: float = 0.0, highest_hz: float = SPEECH_RATE_HZ / 2
 ) -> NDArray[np.float32]:
-    """Return triangular filters, equally spaced in mel, of warped frequencies [shape=(257, count)]."""
-    bins = mel(warp_frequencies(np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE, warp))
-    return make_triangles(bins, _edges(count, lowest_hz, highest_hz)).astype(np.float32)
+    """Return triangular filters, equally spaced in mel, of warped frequencies [shape=(257, count)].
+
+    Frequencies are stretched by ``warp`` up to a knee, then along a straight line to 8 kHz, which stays.
+    """
+    hertz = np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE
+    knee, top = KNEE_HZ * min(1.0, 1 / warp), SPEECH_RATE_HZ / 2
+    warped = np.where(hertz <= knee, hertz * warp, warp * knee + (top - warp * knee) * (hertz - knee) / (top - knee))
+    return make_triangles(mel(warped), _edges(count, lowest_hz, highest_hz)).astype(np.float32)
 
 
 def _edges(count: int, lowest_hz: float, highest_hz: float) -> NDArray[np.float64]:
@@ -190,12 +194,6 @@ def make_triangles(bins: NDArray[np.floating[Any]], edges: NDArray[np.floating[A
     rising = (bins[:, None] - edges[:-2]) / (edges[1:-1] - edges[:-2])
     falling = (edges[2:] - bins[:, None]) / (edges[2:] - edges[1:-1])
     return np.maximum(0, np.minimum(rising, falling))
-
-
-def warp_frequencies(hertz: NDArray[np.float64], warp: float) -> NDArray[np.float64]:
-    """Return stretched frequencies: by ``warp`` up to a knee, then a straight line to 8 kHz, which stays."""
-    knee, top = KNEE_HZ * min(1.0, 1 / warp), SPEECH_RATE_HZ / 2
-    return np.where(hertz <= knee, hertz * warp, warp * knee + (top - warp * knee) * (hertz - knee) / (top - knee))
 
 
 def mel(hertz: NDArray[np.float64]) -> NDArray[np.float64]:

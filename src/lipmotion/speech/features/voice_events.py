@@ -1,15 +1,13 @@
 """Voice events: what a sound says beside words: laughter, breaths in pauses, phrases that are whispered or shouted.
 
-Everything but where phones are follows from the sound. Each rule is strict: an event that is not there is worse than
-one that is missed.
+Everything but where phones are follows from the sound. Rules are strict: a false event is worse than a missed one.
 
 Sources: whispering, which has no voice, R. W. Morris and M. A. Clements, "Reconstruction of speech from whispers",
 Medical Engineering & Physics 24, 2002; shouting, which is louder, higher, and has more energy at high frequencies, H.
 Traunmueller and A. Eriksson, "Acoustic effects of variation in vocal effort by men, women, and children", Journal of
 the Acoustical Society of America 107, 2000; breaths, D. Ruinskiy and Y. Lavner, "An effective algorithm for automatic
 detection and exact demarcation of breath sounds in speech and song signals", IEEE Transactions on Audio, Speech and
-Language Processing 15, 2007; laughter as ``features.laughter`` says. The limits are ours, chosen on recordings
-(docs/expression.md).
+Language Processing 15, 2007. The limits are ours, chosen on recordings (docs/expression.md).
 """
 
 from __future__ import annotations
@@ -17,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -44,47 +41,8 @@ WEIGHTS = (14.8, 0.122, -7.09, -2.93, 3.85, -16.5)
 MIN_PROBABILITY = 0.7
 
 
-class Bout(NamedTuple):
-    """A run of calls.
-
-    first, end  : frames
-    calls       : their loudest frames
-    levels_db   : the levels there
-    probability : that it is laughter, 0 to 1
-    """
-
-    first: int
-    end: int
-    calls: tuple[int, ...]
-    levels_db: tuple[float, ...]
-    probability: float
-
-
-def find_laughter(samples: NDArray[np.float32], level_db: Curve, voiced: NDArray[np.bool_]) -> Iterator[Bout]:
-    """Yield the bouts of a recording at 16 kHz that are probably laughter, in order.
-
-    level_db : smoothed level of every frame of 10 ms [shape=(T,)]
-    voiced   : whether it is voiced [shape=(T,)]
-    """
-    for calls in find_calls(level_db):
-        figures = measure_bout(samples, level_db, voiced, calls)
-        if figures is None:
-            continue
-        probability = float(1 / (1 + np.exp(-np.dot(WEIGHTS, [*figures, 1.0]))))
-        if probability >= MIN_PROBABILITY:
-            first, end = max(calls[0] - EDGE_FRAMES, 0), min(calls[-1] + EDGE_FRAMES + 1, len(level_db))
-            yield Bout(first, end, calls, tuple(level_db[[*calls]].tolist()), probability)
-
-
-def find_calls(level_db: Curve) -> Iterator[tuple[int, ...]]:
-    """Yield the loudest frames of successive calls that are near enough to be of one bout."""
-    peaks = find_risen_peaks(level_db, RISE_DB)
-    peaks = peaks[level_db[peaks] >= level_db.max() + LOWEST_DB]
-    gaps = np.diff(peaks)
-    breaks = np.flatnonzero((gaps < APART_FRAMES[0]) | (gaps > APART_FRAMES[1])) + 1
-    for run in np.split(peaks, breaks):
-        if len(run) >= MIN_CALLS:
-            yield tuple(run.tolist())
+Curve = NDArray[np.float64]
+Voiced = NDArray[np.bool_]
 
 
 def find_risen_peaks(curve: Curve, prominence: float) -> NDArray[np.intp]:
@@ -104,41 +62,35 @@ def find_risen_peaks(curve: Curve, prominence: float) -> NDArray[np.intp]:
 
 def _find_fall(heights: Curve, lowest: Curve) -> Curve:
     """Return how low the curve falls before each peak, back to the one before it that is higher [shape=(P,)]."""
-    found, higher = [], list[tuple[float, float]]()
-    for height, least in zip(heights.tolist(), lowest.tolist(), strict=True):
-        value = least
+    falls, higher = [], list[tuple[float, float]]()
+    for height, value in zip(heights.tolist(), lowest.tolist(), strict=True):
+        fall = value
         while higher and higher[-1][0] <= height:
-            value = min(value, higher.pop()[1])
-        found.append(value)
-        higher.append((height, value))
-    return np.array(found)
+            fall = min(fall, higher.pop()[1])
+        falls.append(fall)
+        higher.append((height, fall))
+    return np.array(falls)
 
 
-def measure_bout(
-    samples: NDArray[np.float32], level_db: Curve, voiced: NDArray[np.bool_], calls: tuple[int, ...]
-) -> tuple[float, ...] | None:
-    """Return the figures of a run that ``WEIGHTS`` weigh; None: its voiced share is not that of laughter.
+def _rate_laughter(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, calls: list[int], run: slice) -> float:
+    """Return the probability that a run of calls is laughter; 0: its voiced share is not that of laughter.
 
-    They are the mean correlation of the spectra of successive calls; how far the level falls between them, in decibels;
-    the voiced share; the share of the gaps that are voiced where they are quietest; the log number of calls.
+    ``WEIGHTS`` weigh the mean correlation of the spectra of successive calls; how far the level falls between them, in
+    decibels; the voiced share; that of the gaps where they are quietest; the log number of calls.
     """
-    first, end = max(calls[0] - EDGE_FRAMES, 0), min(calls[-1] + EDGE_FRAMES + 1, len(level_db))
-    share = float(voiced[first:end].mean())
+    share = float(voiced[run].mean())
     if not VOICED_SHARES[0] <= share <= VOICED_SHARES[1]:
-        return None
+        return 0.0
     quietest = [before + int(level_db[before:after].argmin()) for before, after in pairwise(calls)]
-    peaks = level_db[[*calls]]
-    depth = float(np.mean(np.minimum(peaks[1:], peaks[:-1]) - level_db[quietest]))
-    bands = log_bands(samples[first * HOP : (end - 1) * HOP])
-    spectra = bands[np.array(calls) - first].astype(np.float64)
+    peaks = level_db[calls]
+    depth = np.mean(np.minimum(peaks[1:], peaks[:-1]) - level_db[quietest])
+    spectra = _bands(audio, run)[np.array(calls) - run.start].astype(np.float64)
     spectra -= spectra.mean(axis=1, keepdims=True)
     spectra /= np.maximum(np.linalg.norm(spectra, axis=1, keepdims=True), 1e-9)
-    likeness = float((spectra[1:] * spectra[:-1]).sum(axis=1).mean())
-    return likeness, depth, share, float(voiced[quietest].mean()), float(np.log(len(calls)))
+    likeness = (spectra[1:] * spectra[:-1]).sum(axis=1).mean()
+    figures = [likeness, depth, share, voiced[quietest].mean(), np.log(len(calls)), 1.0]
+    return float(1 / (1 + np.exp(-np.dot(WEIGHTS, figures))))
 
-
-Curve = NDArray[np.float64]
-Voiced = NDArray[np.bool_]
 
 SMOOTHING_FRAMES = 2.0
 """Standard deviation of the window that levels are smoothed with."""
@@ -227,7 +179,7 @@ DB = 10 / np.log(10)
 """Decibels of a natural logarithm of power."""
 
 
-def _heard(level_db: Curve) -> Curve:
+def _select_heard(level_db: Curve) -> Curve:
     """Return the levels within passages, over which levels are compared; all, where there is none."""
     heard = level_db[level_db > (SILENT_ENERGY + 1) * DB]
     return heard if len(heard) else level_db
@@ -237,13 +189,21 @@ def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeli
     """Yield laughter where hardly any words are known or confirmed."""
     sure = (span for span in units if span.label.confidence is None or span.label.confidence >= WORD_CONFIDENCE)
     words = [span for span in sure if not is_silent(span.label.phone)]
-    for bout in find_laughter(audio.samples, level_db, voiced):
-        start_s, end_s = bout.first / FRAME_RATE_HZ, bout.end / FRAME_RATE_HZ
-        said_s = sum(_find_overlap((span.start_s, span.end_s), (start_s, end_s)) for span in words)
-        if said_s <= MAX_WORD_SHARE * (end_s - start_s):
-            loudness = 2 ** ((np.array(bout.levels_db) - max(bout.levels_db)) / 10)
-            calls = zip((np.array(bout.calls) / FRAME_RATE_HZ).tolist(), loudness.tolist(), strict=True)
-            yield VoiceEvent(start_s, end_s, LAUGHTER, bout.probability, tuple(calls))
+    peaks = find_risen_peaks(level_db, RISE_DB)
+    peaks = peaks[level_db[peaks] >= level_db.max() + LOWEST_DB]
+    gaps = np.diff(peaks)
+    breaks = np.flatnonzero((gaps < APART_FRAMES[0]) | (gaps > APART_FRAMES[1])) + 1
+    for calls in np.split(peaks, breaks):
+        if len(calls) < MIN_CALLS:
+            continue
+        first, end = max(int(calls[0]) - EDGE_FRAMES, 0), min(int(calls[-1]) + EDGE_FRAMES + 1, len(level_db))
+        probability = _rate_laughter(audio, level_db, voiced, calls.tolist(), slice(first, end))
+        start_s, end_s = first / FRAME_RATE_HZ, end / FRAME_RATE_HZ
+        word_s = sum(_find_overlap((span.start_s, span.end_s), (start_s, end_s)) for span in words)
+        if probability >= MIN_PROBABILITY and word_s <= MAX_WORD_SHARE * (end_s - start_s):
+            loudness = 2 ** ((level_db[calls] - level_db[calls].max()) / 10)
+            timed_calls = zip((calls / FRAME_RATE_HZ).tolist(), loudness.tolist(), strict=True)
+            yield VoiceEvent(start_s, end_s, LAUGHTER, probability, tuple(timed_calls))
 
 
 def _phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
@@ -262,7 +222,7 @@ def _phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
 
 
 def _whispers(level_db: Curve, voiced: Voiced, phrases: Sequence[tuple[float, float]]) -> Iterator[VoiceEvent]:
-    quiet_db, most_db = np.percentile(_heard(level_db), (10, 99))
+    quiet_db, most_db = np.percentile(_select_heard(level_db), (10, 99))
     for start_s, end_s in phrases:
         frames = _frames(start_s, end_s)
         middle_db, loudest_db = np.percentile(level_db[frames], (50, 95)) if len(level_db[frames]) else (quiet_db,) * 2
@@ -305,7 +265,7 @@ def _shouts(judged: Sequence[tuple[float, float, tuple[float, float, float]]]) -
 
 
 def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:
-    loud_db, spoken = float(np.percentile(_heard(level_db), 95)), np.flatnonzero(voiced)
+    loud_db, spoken = float(np.percentile(_select_heard(level_db), 95)), np.flatnonzero(voiced)
     ends_s = [0.0, *(span.end_s for span in units if not is_silent(span.label.phone))]
     starts_s = [*(span.start_s for span in units if not is_silent(span.label.phone))]
     starts_s.append(max((span.end_s for span in units), default=0.0))

@@ -13,7 +13,7 @@ from lipmotion.errors import InputError
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import FEATURES
-from lipmotion.speech.features.speaker_similarity import WARPS, SpeakerSimilarity, find_warp
+from lipmotion.speech.features.speaker_similarity import WARPS, find_warp
 from lipmotion.speech.recognition.adaptation import Adaptation, create_adaptation
 from lipmotion.speech.recognition.general import NOISES, STREAMS, load_general
 from lipmotion.speech.recognition.recogniser import Recogniser, weigh_own_model
@@ -61,15 +61,14 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
         warp: own.fit(np.concatenate([audio.mfcc(warp).values for audio in audios])) - own.typical_fit for warp in WARPS
     }
     warp = find_warp(scores)
-    similarity = SpeakerSimilarity(warp, scores[warp])
-    own_features = np.concatenate([audio.mfcc(similarity.warp).values for audio in audios])
+    own_features = np.concatenate([audio.mfcc(warp).values for audio in audios])
     general_features = np.concatenate([audio.general_features for audio in audios])
-    adaptation, speech_s = create_adaptation(similarity.warp, weigh_own_model(similarity.score)), 0.0
+    adaptation, speech_s = create_adaptation(warp, weigh_own_model(scores[warp])), 0.0
     for _ in range(PASSES):
         recogniser = Recogniser(own, adaptation=adaptation)
         densities = np.concatenate([recogniser.best_path_densities(audio, audio.mfcc()) for audio in audios])
         combined = recogniser.combined
-        units = [name.partition(".")[0] for name in combined.hmm.table.names]
+        units = (name.partition(".")[0] for name in combined.hmm.table.names)
         silent = np.array([is_silent(unit) or unit in NOISES for unit in units])
         speech_s = float((~silent[densities]).sum() / FRAME_RATE_HZ)
         if not speech_s:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +32,8 @@ MIN_FITTING_SHARE = 0.9
 """A transcript that fits less of the speech is worth a remark."""
 JOINED_S = 0.5
 """Places nearer than this are one stretch."""
+Place = tuple[float, float]
+"""Start and end in seconds."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +48,11 @@ class TranscriptFit:
     """
 
     score: float
-    missing: tuple[tuple[float, float], ...]
+    missing: tuple[Place, ...]
     speech_s: float
     evidence: TranscriptEvidence | None = None
-    idle: tuple[tuple[float, float], ...] = ()
-    wrong: tuple[tuple[float, float], ...] = ()
+    idle: tuple[Place, ...] = ()
+    wrong: tuple[Place, ...] = ()
 
     @property
     def is_doubtful(self) -> bool:
@@ -98,7 +99,7 @@ def measure_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
     Raises MissingDependencyError: pocketsphinx is not installed.
     """
     analysis = analysed(audio)
-    scored = _score_frames(analysis, units)
+    frames, scores, mean = _score_frames(analysis, units)
     loud = find_loud_frames(analysis.log_energy)
     missing, speech_s = [], 0.0
     for span in units:
@@ -110,10 +111,10 @@ def measure_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
         else:
             speech_s += span.duration_s
             if span.duration_s >= LONG_PHONE_S and len(loud_s) >= MIN_LOUD_S * FRAME_RATE_HZ:
-                inside = slice(*np.searchsorted(scored.frames, [_first_frame(span.start_s), _first_frame(span.end_s)]))
-                if float(scored.scores[inside].mean()) < LONG_PHONE_SCORE:
+                inside = slice(*np.searchsorted(frames, [_first_frame(span.start_s), _first_frame(span.end_s)]))
+                if float(scores[inside].mean()) < LONG_PHONE_SCORE:
                     missing.append((span.start_s, span.end_s))
-    return TranscriptFit(scored.mean(), _joined(missing), speech_s)
+    return TranscriptFit(mean, _join(missing), speech_s)
 
 
 def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArray[np.float64] | None) -> TranscriptFit:
@@ -125,24 +126,20 @@ def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArr
     """
     spoken = [span for span in units if not is_silent(span.label.phone)]
     if log_posteriors is not None:
-        found = label_evidence(log_posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units)
-        idle, wrong = found.idle, found.wrong
-        loud = _joined(
-            [(at, at + 1 / FRAME_RATE_HZ) for at in np.flatnonzero(find_loud_frames(audio.log_energy)) / FRAME_RATE_HZ]
-        )
-        missing = tuple(_find_unlabelled(stretch, spoken, loud) for stretch in found.missing)
+        heard, idle, wrong = label_evidence(log_posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units)
+        loud_s = np.flatnonzero(find_loud_frames(audio.log_energy)) / FRAME_RATE_HZ
+        loud = _join([(at_s, at_s + 1 / FRAME_RATE_HZ) for at_s in loud_s])
+        missing = tuple(_find_unlabelled(stretch, spoken, loud) for stretch in heard)
     else:
         quiet = find_quiet_frames(audio.log_energy)
-        silent = _joined([(span.start_s, span.end_s) for span in spoken if quiet[_frames_of(span)].all()])
+        silent = _join([(span.start_s, span.end_s) for span in spoken if quiet[_frames_of(span)].all()])
         idle = tuple((start_s, end_s) for start_s, end_s in silent if end_s - start_s >= MIN_IDLE_S)
         missing, wrong = measure_fit(audio, units).missing, ()
-    fit = TranscriptFit(0.0, missing, sum(span.duration_s for span in spoken), None, idle, wrong)
-    return replace(fit, speech_s=fit.speech_s + fit.missing_s)
+    speech_s = sum(span.duration_s for span in spoken) + sum(end_s - start_s for start_s, end_s in missing)
+    return TranscriptFit(0.0, missing, speech_s, None, idle, wrong)
 
 
-def _find_unlabelled(
-    stretch: tuple[float, float], spoken: list[Span[Unit]], loud: tuple[tuple[float, float], ...]
-) -> tuple[float, float]:
+def _find_unlabelled(stretch: Place, spoken: list[Span[Unit]], loud: tuple[Place, ...]) -> Place:
     """Return all the sound around a stretch in which phones are heard, as far as no phone is given."""
     start_s, end_s = stretch
     before_s = max((span.end_s for span in spoken if span.end_s <= start_s), default=0.0)
@@ -151,9 +148,9 @@ def _find_unlabelled(
     return max(min(around[0][0], start_s), before_s), min(max(around[-1][1], end_s), after_s)
 
 
-def _joined(places: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+def _join(places: list[Place]) -> tuple[Place, ...]:
     """Return places in time, those near one another as one."""
-    joined: list[tuple[float, float]] = []
+    joined: list[Place] = []
     for start_s, end_s in places:
         if joined and start_s - joined[-1][1] <= JOINED_S:
             joined[-1] = (joined[-1][0], end_s)
@@ -171,31 +168,11 @@ def score_agreement(audio: Audio, units: Timeline[Unit]) -> float:
     phone (at least ``WORST_SCORE``): 0 where no other phone is more probable, or nothing is spoken.
     Raises MissingDependencyError: pocketsphinx is not installed.
     """
-    return _score_frames(analysed(audio), units).mean()
+    return _score_frames(analysed(audio), units)[2]
 
 
-class _ScoredFrames(NamedTuple):
-    """Every fourth frame of speech.
-
-    frames : their numbers [shape=(S,)]
-    phones : the number of the phone in each, among those that are no silence [shape=(S,)]
-    scores : how well the phone agrees with the sound there [shape=(S,)]
-    """
-
-    frames: NDArray[np.intp]
-    phones: NDArray[np.intp]
-    scores: NDArray[np.float32]
-
-    def mean(self) -> float:
-        """Return the agreement score: every phone counts the same."""
-        if not len(self.frames):
-            return 0.0
-        counts = np.bincount(self.phones)
-        sums = np.bincount(self.phones, np.maximum(self.scores, WORST_SCORE))
-        return float((sums[counts > 0] / counts[counts > 0]).mean())
-
-
-def _score_frames(audio: AnalysedAudio, units: Timeline[Unit]) -> _ScoredFrames:
+def _score_frames(audio: AnalysedAudio, units: Timeline[Unit]) -> tuple[NDArray[np.intp], NDArray[np.float32], float]:
+    """Return every fourth frame of speech, how well its phone agrees with the sound there, and the agreement score."""
     spoken = [span for span in units if not is_silent(span.label.phone)]
     each = [np.arange(of_span.start, of_span.stop) for of_span in map(_frames_of, spoken)]
     phones = np.repeat(np.arange(len(spoken)), [len(of_span) for of_span in each])
@@ -203,10 +180,12 @@ def _score_frames(audio: AnalysedAudio, units: Timeline[Unit]) -> _ScoredFrames:
     frames = np.concatenate([np.zeros(0, np.intp), *each])
     frames, phones, states = (rows[::FRAME_STEP] for rows in (frames, phones, first))
     if not len(frames):
-        return _ScoredFrames(frames, phones, np.zeros(0, np.float32))
+        return frames, np.zeros(0, np.float32), 0.0
     log_densities = load_general().log_density(audio.general_features[frames])
     of_phone = np.take_along_axis(log_densities, states[:, None] + np.arange(STATES), axis=1)
-    return _ScoredFrames(frames, phones, of_phone.max(axis=1))
+    scores, counts = of_phone.max(axis=1), np.bincount(phones)
+    sums = np.bincount(phones, np.maximum(scores, WORST_SCORE))
+    return frames, scores, float((sums[counts > 0] / counts[counts > 0]).mean())  # every phone counts the same
 
 
 def _first_frame(time_s: float) -> int:

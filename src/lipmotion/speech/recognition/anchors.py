@@ -53,7 +53,7 @@ def find_anchors(transcript: TimedTranscript) -> Anchors:
 
     Words have the times of their line; if some words of a line have times of their own, the others lie between these.
     """
-    rows: list[tuple[float, float, float]] = []
+    rows: list[tuple[float | None, float | None, float]] = []
     for line in transcript.lines:
         own = any(word.start_s is not None or word.end_s is not None for word in line.words)
         for place, word in enumerate(line.words):
@@ -61,23 +61,17 @@ def find_anchors(transcript: TimedTranscript) -> Anchors:
             start_s = line.start_s if word.start_s is None and (not own or place == 0) else word.start_s
             last = place == len(line.words) - 1
             end_s = line.end_s if word.end_s is None and (not own or last) else word.end_s
-            tolerance_s = WORD_TOLERANCE_S if timed else LINE_TOLERANCE_S
-            rows.append((_read_score(start_s), _read_score(end_s), tolerance_s))
-    table = np.array(rows, float).reshape(-1, 3)
+            rows.append((start_s, end_s, WORD_TOLERANCE_S if timed else LINE_TOLERANCE_S))
+    table = np.array(rows, float).reshape(-1, 3)  # None becomes NaN
     differs = ~np.isclose(table[1:, :2], table[:-1, :2], equal_nan=True).all(axis=1)
     return Anchors(table[:, 0], table[:, 1], table[:, 2], np.append(0, np.cumsum(differs)))
-
-
-def _read_score(time_s: float | None) -> float:
-    return np.nan if time_s is None else time_s
 
 
 def fit_transcript(transcript: TimedTranscript, loud: NDArray[np.bool_], duration_s: float) -> TimedTranscript:
     """Return a transcript whose times fit a recording as a whole.
 
-    If all are late or early they are corrected; lines that begin after the end of the recording are left out. Both are
-    logged as warnings.
-    loud       : which frames are loud [shape=(T,)]
+    loud : which frames are loud [shape=(T,)]
+    If all are late or early they are corrected; lines that begin after the end are left out. Warnings say so.
     Raises InputError: all lines begin after the end.
     """
     late_s = measure_lateness(transcript, loud)
@@ -85,25 +79,16 @@ def fit_transcript(transcript: TimedTranscript, loud: NDArray[np.bool_], duratio
         which = "late" if late_s > 0 else "early"
         LOG.warning("the times of the transcript are %.1f s %s; corrected", abs(late_s), which)
         transcript = transcript.shifted(-late_s)
-    return _drop_late_lines(transcript, duration_s)
-
-
-def _drop_late_lines(transcript: TimedTranscript, duration_s: float) -> TimedTranscript:
-    """Return the lines of a transcript that begin within a recording. Raises InputError: none does."""
     latest_s = duration_s + LINE_TOLERANCE_S
     lines = [line for line in transcript.lines if line.start_s is None or line.start_s <= latest_s]
-    left_out = len(transcript.lines) - len(lines)
     if not lines:
         raise InputError(
             f"the transcript begins at {transcript.lines[0].start_s:.2f} s, the recording ends at {duration_s:.2f} s; "
             "give the transcript of this recording"
         )
-    if left_out:
-        LOG.warning(
-            "the transcript goes on after the recording ends at %.2f s; its last %d lines are left out",
-            duration_s,
-            left_out,
-        )
+    if left_out := len(transcript.lines) - len(lines):
+        what = "the transcript goes on after the recording ends at %.2f s; its last %d lines are left out"
+        LOG.warning(what, duration_s, left_out)
     return TimedTranscript(tuple(lines))
 
 
@@ -111,9 +96,8 @@ def measure_lateness(transcript: TimedTranscript, loud: NDArray[np.bool_]) -> fl
     """Return by how many seconds all times of a transcript are late, as of subtitles for another cut; 0: unclear.
 
     loud : which frames are loud [shape=(T,)]
-    It is the shift at which the spans of the times and the loud frames correlate best, up to ``MAX_SHIFT_S``, if it is
-    larger than the tolerance of lines, and the correlation at least ``MIN_CORRELATION``, and by ``MIN_GAIN`` better
-    than without a shift.
+    It is the shift up to ``MAX_SHIFT_S`` at which the spans of the times and the loud frames correlate best: by at
+    least ``MIN_CORRELATION``, and ``MIN_GAIN`` better than without; 0 within the tolerance of lines.
     """
     anchors = find_anchors(transcript)
     known = ~np.isnan(anchors.start_s) & ~np.isnan(anchors.end_s)
@@ -124,8 +108,7 @@ def measure_lateness(transcript: TimedTranscript, loud: NDArray[np.bool_]) -> fl
     edges = np.round(np.stack([anchors.start_s, anchors.end_s])[:, known] * FRAME_RATE_HZ) + max_shift
     for first, end in np.unique(np.clip(edges, 0, len(spoken)).astype(np.intp), axis=1).T:
         spoken[first:end] = 1
-    loudness = loud.astype(float)
-    count = len(loudness)
+    loudness, count = loud.astype(float), len(loud)
     deviation = loudness - loudness.mean()
     size = 1 << (len(spoken) + count - 1).bit_length()
     product = np.fft.irfft(np.fft.rfft(spoken, size) * np.conj(np.fft.rfft(deviation, size)), size)
@@ -181,10 +164,9 @@ def find_windows(
             earliest = min(begin + count, max(end, first))  # the words after it are judged as if it had room
         if not crowded.any():
             return windows, tolerance_s
-        near = (
-            np.convolve(crowded, np.ones(2 * NEIGHBOURS + 1), "same") > 0 if len(crowded) > 2 * NEIGHBOURS else crowded
-        )
-        near = near | np.isin(anchors.groups, anchors.groups[crowded])
+        near = np.isin(anchors.groups, anchors.groups[crowded])
+        if len(crowded) > 2 * NEIGHBOURS:
+            near |= np.convolve(crowded, np.ones(2 * NEIGHBOURS + 1), "same") > 0
         tolerance_s = np.where(near, 2 * tolerance_s, tolerance_s)
     tolerance_s = np.full(len(min_frames), np.inf)
     return make_windows(anchors, tolerance_s, frames), tolerance_s
@@ -246,8 +228,8 @@ def align_within(
         if (better == doubted).all():
             placed, windows, tolerance_s = wide
         elif better.any():
-            kept_s = np.where(better[anchors.groups], wider_s, tolerance_s)
-            placed, windows, tolerance_s = _place_words(anchors, kept_s, min_frames, edge, frames, search)
+            mixed_s = np.where(better[anchors.groups], wider_s, tolerance_s)
+            placed, windows, tolerance_s = _place_words(anchors, mixed_s, min_frames, edge, frames, search)
     free = _align_freely(placed, anchors, frames, search)
     if free is not None:
         return free

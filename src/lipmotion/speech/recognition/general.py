@@ -98,9 +98,8 @@ def find_density(phone: str, state: int, states: int) -> int:
     state  : from 0
     states : how many states our model of the phone has; where it is not 3, the general state at the same share is used
     """
-    return PHONES.index(GENERAL_PHONE_NAMES.get(phone, phone.upper())) * STATES + (2 * state + 1) * STATES // (
-        2 * states
-    )
+    first = PHONES.index(GENERAL_PHONE_NAMES.get(phone, phone.upper())) * STATES
+    return first + (2 * state + 1) * STATES // (2 * states)
 
 
 GENERAL_PHONE_NAMES = {"ax": "AH", "axr": "ER", "ix": "IH", "el": "L", "em": "M", "en": "N", "sp": "SIL"}
@@ -120,15 +119,11 @@ def load_general() -> GeneralModel:
     forms, constants = [], []
     for stream in STREAMS:
         mean, precision = means[:, stream], 1 / np.maximum(variances[:, stream], MIN_VARIANCE)
-        forms.append(np.concatenate([mean * precision, precision / -2], axis=1).transpose(1, 0, 2))
-        size = stream.stop - stream.start
-        log_norm = size * np.log(2 * np.pi) - np.log(precision).sum(axis=1) + (mean * mean * precision).sum(axis=1)
-        constants.append(log_norm / -2)
-    return GeneralModel(
-        tuple(np.ascontiguousarray(form.reshape(len(form), -1), np.float32) for form in forms),
-        tuple(constant.reshape(-1).astype(np.float32) for constant in constants),
-        tuple(np.ascontiguousarray(weight, np.float32) for weight in weights),
-    )
+        form = np.concatenate([mean * precision, precision / -2], axis=1).transpose(1, 0, 2)
+        forms.append(np.ascontiguousarray(form.reshape(len(form), -1), np.float32))
+        log_norm = mean.shape[1] * np.log(2 * np.pi) - np.log(precision).sum(axis=1) + (mean**2 * precision).sum(axis=1)
+        constants.append((log_norm / -2).reshape(-1).astype(np.float32))
+    return GeneralModel(tuple(forms), tuple(constants), weights)
 
 
 def _gaussians(content: bytes) -> NDArray[np.float64]:
@@ -142,7 +137,7 @@ def _gaussians(content: bytes) -> NDArray[np.float64]:
     return by_phone.transpose(0, 1, 3, 2).reshape(len(PHONES), 39, GAUSSIANS)
 
 
-def _weights(content: bytes) -> list[NDArray[np.float64]]:
+def _weights(content: bytes) -> tuple[NDArray[np.float32], ...]:
     """Return the mixture weights of the states without context, which come first [each shape=(phones, 128, 3)]."""
     position = 0
     while length := int.from_bytes(content[position : position + 4], "little"):
@@ -151,9 +146,9 @@ def _weights(content: bytes) -> list[NDArray[np.float64]]:
     steps = np.frombuffer(content, np.uint8, offset=position + 12)
     if gaussians != GAUSSIANS or len(steps) != len(STREAMS) * gaussians * states:
         raise ValueError("unexpected weights")
-    kept = steps.reshape(len(STREAMS), gaussians, states)[:, :, : len(PHONES) * STATES]
-    weights = np.exp(kept.astype(float) * -WEIGHT_STEP).reshape(len(STREAMS), gaussians, len(PHONES), STATES)
-    return list(weights.transpose(0, 2, 1, 3))
+    first = steps.reshape(len(STREAMS), gaussians, states)[:, :, : len(PHONES) * STATES]
+    weights = np.exp(first.astype(float) * -WEIGHT_STEP).reshape(len(STREAMS), gaussians, len(PHONES), STATES)
+    return tuple(np.ascontiguousarray(weights.transpose(0, 2, 1, 3), np.float32))
 
 
 FILTERS = 25
@@ -207,30 +202,24 @@ def load_bigram(units: Sequence[str]) -> NDArray[np.float64]:
 
     Raises MissingDependencyError: pocketsphinx is not installed.
     """
-    kinds = _phones()
     spelt = ["SIL" if unit.startswith("+") else GENERAL_PHONE_NAMES.get(unit, unit.upper()) for unit in units]
-    rows = [kinds.index(name) for name in spelt]
+    rows = [PHONES[2:].index(name) for name in spelt]
     pairs = _read_bigram()[np.ix_(rows, rows)] * np.array([PROBABILITY_SHARE.get(unit, 1.0) for unit in units])
     return pairs / pairs.sum(axis=1, keepdims=True)
 
 
-def _phones() -> list[str]:
-    return [phone for phone in PHONES if not phone.startswith("+")]
-
-
 @cache
 def _read_bigram() -> NDArray[np.float64]:
-    """Return P(next | phone) of the phone language model that comes with pocketsphinx."""
+    """Return P(next | phone) of the phone language model that comes with pocketsphinx, without the noises."""
     try:
         from pocketsphinx import Config, LogMath, NGramModel
     except ImportError as error:
-        raise MissingDependencyError(
-            "the phone language model comes with pocketsphinx: pip install pocketsphinx"
-        ) from error
+        message = "the phone language model comes with pocketsphinx: pip install pocketsphinx"
+        raise MissingDependencyError(message) from error
     log_math = LogMath()
     model = NGramModel(Config(), log_math, str(find_english_data() / "en-us-phone.lm.bin"))
-    names = _phones()
-    return np.array([[log_math.exp(model.prob([following, phone])) for following in names] for phone in names])
+    pairs = [[log_math.exp(model.prob([following, phone])) for following in PHONES[2:]] for phone in PHONES[2:]]
+    return np.array(pairs)
 
 
 NOISES = ("+nsn+", "+spn+")
@@ -238,16 +227,15 @@ NOISES = ("+nsn+", "+spn+")
 ENGLISH_SHARE = 0.5
 """Weight of the English bigram; the rest is the weight of the bigram of the own corpus."""
 BIGRAM_WEIGHT, INSERTION_SCORE = 3.0, -4.0
-KEPT_FRAMES = 400_000
-"""The general log densities of a recording of up to so many frames, about an hour, are kept: they are asked for twice
+MAX_CACHED_FRAMES = 400_000
+"""The general log densities of a recording of up to so many frames, about an hour, are cached: they are needed twice
 and take 500 bytes a frame. Those of a longer recording are computed twice."""
 
 
 class CombinedPhones(NamedTuple):
     """Models of every phone of the inventory and of the noises.
 
-    hmm     : the own models; a phone without an own model borrows that of the most similar phone with one
-              (``units.SIMILAR_PHONES``)
+    hmm     : the own models; a phone without one borrows that of the most similar phone (``units.SIMILAR_PHONES``)
     columns : the general density that goes with each of its densities [shape=(G,)]
     """
 
@@ -261,15 +249,15 @@ def combine_phones(own: UnitHmm) -> CombinedPhones:
     new = tuple(unit for unit in (*INVENTORY, *NOISES) if unit not in old.units)
     borrowed = [SILENCE if unit in NOISES or is_silent(unit) else find_similar_phone(unit, modelled) for unit in new]
     plain = len(own.log_stay)
-    added = [(unit, state, old.density(source, state)) for unit, source in zip(new, borrowed, strict=True)
-             for state in range(old.count(source))]  # fmt: skip
+    added = {f"{unit}.{state}": old.density(source, state) for unit, source in zip(new, borrowed, strict=True)
+             for state in range(old.count(source))}  # fmt: skip
     table = StateTable(
         units=old.units + new,
         counts=old.counts + tuple(old.count(source) for source in borrowed),
-        names=(*old.names[:plain], *(f"{unit}.{state}" for unit, state, _ in added), *old.names[plain:]),
+        names=(*old.names[:plain], *added, *old.names[plain:]),
         free=(*old.free, *(unit for unit in new if unit in NOISES or is_silent(unit))),
     )
-    sources = np.array([*range(plain), *(source for *_, source in added), *range(plain, len(old.names))], np.intp)
+    sources = np.array([*range(plain), *added.values(), *range(plain, len(old.names))], np.intp)
     english = load_bigram(table.units)
     mixed, count = english.copy(), len(own.bigram.units)
     mixed[:count] *= ENGLISH_SHARE
@@ -299,10 +287,10 @@ def combine_likelihoods(
     general      : features for the general models [shape=(T, 39)]
     """
     model = load_general()
-    kept = model.log_density(general) if len(general) <= KEPT_FRAMES else None
+    cached = model.log_density(general) if len(general) <= MAX_CACHED_FRAMES else None
 
     def log_density(first: int, end: int, chosen: DensitySelection) -> NDArray[np.float32]:
-        of_general = kept[first:end] if kept is not None else model.log_density(general[first:end])
+        of_general = cached[first:end] if cached is not None else model.log_density(general[first:end])
         values = of_general[:, combined.columns if chosen is None else combined.columns[chosen]]
         if own_weight > 0:
             values += np.float32(own_weight) * combined.hmm.mixtures.log_likelihood(own_features[first:end], chosen)

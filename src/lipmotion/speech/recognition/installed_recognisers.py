@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
@@ -31,14 +31,14 @@ class InstalledRecogniser(NamedTuple):
     extra    : of this package, that installs it
     variable : the environment variable that names the folder of its model
     parts    : files or folders of a model, one of each group
-    words    : returns the lines of a recording, given the module and the folder; None: the language is not English
+    words    : returns the lines of a recording, given the module and the folder; none in other languages than English
     """
 
     package: str
     extra: str
     variable: str
     parts: tuple[tuple[str, ...], ...]
-    words: Callable[[Any, Path, Audio], list[TranscriptLine] | None]
+    words: Callable[[Any, Path, Audio], list[TranscriptLine]]
 
 
 def recognise_words(audio: Audio, kind: str) -> TimedTranscript | None:
@@ -46,8 +46,7 @@ def recognise_words(audio: Audio, kind: str) -> TimedTranscript | None:
 
     audio : at 16 kHz
     kind  : ``whisper`` or ``vosk``, of ``INSTALLED_RECOGNISERS``
-    The model is the folder that the environment variable ``LIPMOTION_WHISPER_MODEL`` or ``LIPMOTION_VOSK_MODEL``
-    names. Nothing is ever downloaded.
+    ``LIPMOTION_WHISPER_MODEL`` and ``LIPMOTION_VOSK_MODEL`` name the folders of models. Nothing is ever downloaded.
     Raises MissingDependencyError: the package is not installed. Raises InputError: no model, or one it cannot read.
     """
     recogniser = INSTALLED_RECOGNISERS[kind]
@@ -59,16 +58,6 @@ def recognise_words(audio: Audio, kind: str) -> TimedTranscript | None:
             f"the recogniser {kind!r} needs {recogniser.package}: {install_command(recogniser.extra)}; then "
             f"set {recogniser.variable} to the folder of its model (docs/transcripts.md)"
         ) from error
-    folder = _folder(recogniser, kind)
-    lines = recogniser.words(module, folder, audio)
-    if lines is None:
-        return None
-    transcript = sort_lines(lines)
-    return transcript if transcript.lines else None
-
-
-def _folder(recogniser: InstalledRecogniser, kind: str) -> Path:
-    """Return the folder of the model. Raises InputError: none is named, or it holds no model."""
     named = os.environ.get(recogniser.variable, "")
     if not named:
         raise InputError(
@@ -81,16 +70,17 @@ def _folder(recogniser: InstalledRecogniser, kind: str) -> Path:
             f"{shorten(named)} ({recogniser.variable}): is no model of {kind}, required a folder with "
             f"{' or '.join(missing[0])}; see docs/transcripts.md"
         )
-    return folder
+    transcript = sort_lines(recogniser.words(module, folder, audio))
+    return transcript if transcript.lines else None
 
 
-def _transcribe_whisper(module: Any, folder: Path, audio: Audio) -> list[TranscriptLine] | None:
+def _transcribe_whisper(module: Any, folder: Path, audio: Audio) -> list[TranscriptLine]:
     segments, about = _load_whisper(module, str(folder)).transcribe(
         audio.samples, word_timestamps=True, vad_filter=True, condition_on_previous_text=False
     )
     if about.language != ENGLISH:
         LOG.warning("whisper recognises the language %r, not English; its words are not used", about.language)
-        return None
+        return []
     lines = []
     for segment in segments:
         words: list[TimedWord] = []
@@ -113,23 +103,19 @@ def _load_whisper(module: Any, folder: str) -> Any:
 def _transcribe_vosk(module: Any, folder: Path, audio: Audio) -> list[TranscriptLine]:
     recogniser = module.KaldiRecognizer(_load_vosk(module, str(folder)), audio.rate_hz)
     recogniser.SetWords(True)
+    results = []
+    for start in range(0, len(audio.samples), STEP):
+        samples = np.clip(audio.samples[start : start + STEP] * 32_768, -32_768, 32_767).astype("<i2")
+        if recogniser.AcceptWaveform(samples.tobytes()):
+            results.append(recogniser.Result())
     lines = []
-    for result in _read_vosk(recogniser, audio):
+    for result in [*results, recogniser.FinalResult()]:  # the JSON of every stretch of speech
         words: list[TimedWord] = []
         for item in json.loads(result).get("result", ()):
             words += time_words(extract_spoken_text(item["word"]), float(item["start"]), float(item["end"]))
         if words:
             lines.append(TranscriptLine(tuple(words), words[0].start_s, words[-1].end_s))
     return lines
-
-
-def _read_vosk(recogniser: Any, audio: Audio) -> Iterator[str]:
-    """Yield the JSON of every stretch of speech."""
-    for start in range(0, len(audio.samples), STEP):
-        samples = np.clip(audio.samples[start : start + STEP] * 32_768, -32_768, 32_767).astype("<i2")
-        if recogniser.AcceptWaveform(samples.tobytes()):
-            yield recogniser.Result()
-    yield recogniser.FinalResult()
 
 
 @lru_cache(maxsize=1)

@@ -4,26 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.errors import AlignmentError
 from lipmotion.hmm.align import align_states, choose_pronunciations
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.hmm.network import LogLikelihoods
+from lipmotion.hmm.network import penalise_silence, wrap_log_likelihoods
 from lipmotion.speech.features.analysed_audio import SILENT_ENERGY, Passage
+from lipmotion.speech.features.speaker_similarity import SpeakerSimilarity
 from lipmotion.speech.recognition.general import NOISES
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, find_similar_phone, is_silent
-from lipmotion.units.phones import FULL_FORMS
+from lipmotion.units.phones import FULL_FORMS, SHORT_PAUSE_S
 
 COMPARED_FORMS = FULL_FORMS | {PAUSE: SILENCE} | dict.fromkeys(NOISES, SILENCE)
 """Phones that count as another one when phones of words and phones without words are compared."""
-REACH_FRAMES = 2
-"""A phone of a word may be so many frames earlier or later than in its alignment; its bonus falls linearly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,21 +65,26 @@ class AlignedWords:
 
 
 def align_recognised_words(
-    hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: Sequence[str], lexicon: Lexicon
-) -> AlignedWords:
-    """Return words aligned with a stretch, as a transcript is.
+    hmm: UnitHmm, values: NDArray[np.float32], loud: NDArray[np.bool_], words: Sequence[str], lexicon: Lexicon
+) -> AlignedWords | None:
+    """Return words aligned with a stretch, as a transcript is; None: there is not room for them all.
 
-    Raises AlignmentError: the words do not fit into the stretch.
+    values : log likelihoods of the stretch [shape=(N, G)]
+    loud   : frames that are too loud for silence [shape=(N,)]
     """
+    log_likelihoods = penalise_silence(hmm, wrap_log_likelihoods(values), loud)
     modelled = [unit for unit in hmm.table.units if not is_silent(unit)]
     variants = {word: lexicon.pronunciations(word) for word in set(words)}
     units = {
         word: [tuple(find_similar_phone(phone, modelled) for phone in variant) for variant in of_word]
         for word, of_word in variants.items()
     }
-    spoken = choose_pronunciations(hmm, log_likelihoods, [units[word] for word in words], PAUSE)
-    sequence = [unit for item in spoken for unit in item.units]
-    states, path = align_states(hmm, log_likelihoods, sequence)
+    try:
+        spoken = choose_pronunciations(hmm, log_likelihoods, [units[word] for word in words], PAUSE)
+        sequence = [unit for item in spoken for unit in item.units]
+        states, path = align_states(hmm, log_likelihoods, sequence)
+    except AlignmentError:
+        return None
     phones = [(phone, item.word) for item in spoken for phone in (
         variants[words[item.word]][item.variant] if item.word >= 0 else item.units)]  # fmt: skip
     bounds = np.searchsorted(states.positions[path], np.arange(len(sequence) + 1)).astype(np.intp)
@@ -92,18 +97,6 @@ def align_recognised_words(
     )
 
 
-def weigh_phones(hmm: UnitHmm, aligned: AlignedWords, bonus: float) -> NDArray[np.float32]:
-    """Return what is added to the log densities of a stretch, so that its words' phones become more probable.
-
-    bonus : in nats, where the phone is in the alignment
-    The result has the shape (N, G).
-    """
-    present = np.zeros((len(aligned.of_frame), len(FORMS)), np.float32)
-    phone = np.array([FORMS.index(normalise_word(each)) for each in aligned.phones])[aligned.of_frame]
-    present[np.arange(len(phone)), phone] = 1
-    return weigh_densities(hmm, present, bonus, REACH_FRAMES)
-
-
 def weigh_densities(hmm: UnitHmm, present: NDArray[np.float32], bonus: float, reach: int) -> NDArray[np.float32]:
     """Return what is added to the log densities of a stretch, so that phones become more probable [shape=(N, G)].
 
@@ -113,20 +106,20 @@ def weigh_densities(hmm: UnitHmm, present: NDArray[np.float32], bonus: float, re
     """
     share = present.copy()
     for shift in range(1, min(reach, len(present) - 1) + 1):
-        least = np.float32(1 - shift / (reach + 1))
-        np.maximum(share[shift:], least * present[:-shift], out=share[shift:])
-        np.maximum(share[:-shift], least * present[shift:], out=share[:-shift])
-    columns = [FORMS.index(normalise_word(name)) for name in hmm.table.names]
+        part = np.float32(1 - shift / (reach + 1)) * present
+        np.maximum(share[shift:], part[:-shift], out=share[shift:])
+        np.maximum(share[:-shift], part[shift:], out=share[:-shift])
+    columns = [FORMS.index(find_form(name)) for name in hmm.table.names]
     return np.float32(bonus) * share[:, columns]
 
 
-def normalise_word(name: str) -> str:
+def find_form(name: str) -> str:
     """Return the general form of the phone of a density."""
     phone = name.partition(".")[0]
     return COMPARED_FORMS.get(phone, phone)
 
 
-FORMS = tuple(sorted({normalise_word(phone) for phone in PHONES}))
+FORMS = tuple(sorted({find_form(phone) for phone in PHONES}))
 """The phones that are compared."""
 
 
@@ -221,19 +214,38 @@ def measure_level_range(log_energy: NDArray[np.floating[Any]]) -> float:
     return float(np.ptp(np.percentile(heard, RANGE_PERCENTILES)) * 10 / np.log(10))
 
 
+def time_phones(labels: Sequence[tuple[str, str]], bounds: NDArray[np.intp], duration_s: float) -> Timeline[Unit]:
+    """Return phones in time, each with its word.
+
+    bounds : the first frame of each, and the frame count [shape=(len(labels) + 1,)]; frame n covers (n ± ½) · 10 ms
+    Silence at both ends stays silence however short; shorter than ``SHORT_PAUSE_S`` between words, it is a pause.
+    """
+    silent = [is_silent(phone) for phone, _ in labels]
+    first = [i for i in range(len(labels)) if i == 0 or not (silent[i] and silent[i - 1])]
+    labels, bounds = [labels[i] for i in first], np.append(bounds[first], bounds[-1])
+    edges = np.clip((bounds - 0.5) / FRAME_RATE_HZ, 0, duration_s)
+    edges[-1] = duration_s
+    spans = []
+    for i, ((phone, word), (start_s, end_s)) in enumerate(zip(labels, pairwise(edges.tolist()), strict=True)):
+        is_pause = 0 < i < len(labels) - 1 and end_s - start_s < SHORT_PAUSE_S
+        name = (PAUSE if is_pause else SILENCE) if is_silent(phone) else phone
+        spans.append(Span(start_s, end_s, Unit(name, word=word)))
+    return Timeline(tuple(spans))
+
+
 def build_recognition(
-    units: Timeline[Unit],
     labels: Sequence[LabelledFrames],
     recognised: Sequence[RecognisedWord],
-    similarity: float | None,
+    frames: int,
+    duration_s: float,
+    similarity: SpeakerSimilarity | None,
 ) -> Recognition:
-    """Return a recognition.
-
-    recognised : the words that ``labels`` number
-    similarity : as of ``Recognition``
-    """
-    ends = [label.first for label in labels[1:]] + [round(units[-1].end_s * FRAME_RATE_HZ)] if labels else []
+    """Return a recognition of labels of a recording; ``recognised`` are the words that they number."""
+    named = [(label.phone, recognised[label.word].text if label.word >= 0 else "") for label in labels]
+    firsts = [label.first for label in labels]
+    units = time_phones(named, np.array([*firsts, frames]), duration_s)
     words = []
+    ends = [*firsts[1:], round(duration_s * FRAME_RATE_HZ)]
     for number, group in groupby(zip(labels, ends, strict=True), key=lambda pair: pair[0].word):
         if number >= 0:
             phones = list(group)
@@ -241,7 +253,7 @@ def build_recognition(
     spoken = [span for span in units if not is_silent(span.label.phone)]
     word_s = sum(span.duration_s for span in spoken if span.label.word)
     phone_s = sum(span.duration_s for span in spoken) - word_s
-    return Recognition(units, Timeline(tuple(words)), word_s, phone_s, similarity)
+    return Recognition(units, Timeline(tuple(words)), word_s, phone_s, similarity.score if similarity else None)
 
 
 def place_units(units: Timeline[LabelT], first: int, own: slice) -> Timeline[LabelT]:
@@ -300,14 +312,12 @@ def join_recognition(parts: Sequence[tuple[Passage, Recognition]], duration_s: f
 
 def select_reliable(units: Timeline[Unit], confidence: float) -> Timeline[Unit]:
     """Return phones in time as recognised ones, with a confidence where they have none yet."""
-    return Timeline(
-        tuple(
-            span
-            if span.label.confidence is not None
-            else replace(span, label=replace(span.label, confidence=confidence))
-            for span in units
-        )
-    )
+
+    def rate(span: Span[Unit]) -> Span[Unit]:
+        unrated = span.label.confidence is None
+        return replace(span, label=replace(span.label, confidence=confidence)) if unrated else span
+
+    return Timeline(tuple(map(rate, units)))
 
 
 def label_words(
@@ -345,8 +355,8 @@ def splice(base: Sequence[LabelledFrames], parts: Sequence[LabelledStretch], fra
         last = int(np.searchsorted(starts, stretch.first))
         for place in range(max(0, int(np.searchsorted(ends, at, "right"))), last):
             first, end = max(at, int(starts[place])), min(stretch.first, int(ends[place]))
-            whole = first == starts[place] and end == ends[place]
-            if whole or end - first >= SLIVER_FRAMES or (first < end and not result):
+            complete = first == starts[place] and end == ends[place]
+            if complete or end - first >= SLIVER_FRAMES or (first < end and not result):
                 result.append(base[place]._replace(first=first))
         result.extend(labels)
         at = stretch.end

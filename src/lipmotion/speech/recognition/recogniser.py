@@ -47,6 +47,7 @@ from lipmotion.speech.recognition.recognised_speech import (
     build_recognition,
     join_recognition,
     splice,
+    time_phones,
 )
 from lipmotion.speech.recognition.word_search import (
     WordSearch,
@@ -55,9 +56,8 @@ from lipmotion.speech.recognition.word_search import (
     list_wordless,
     recognise_free,
 )
-from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Span, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, find_similar_phone, is_silent
-from lipmotion.units.phones import SHORT_PAUSE_S
 
 RECOGNISER_KINDS = ("auto", "words", "fast", "own", "general")
 """Phones are recognised by: ``own``: the model's own phone models alone; ``general``: those of many voices alone;
@@ -119,16 +119,13 @@ class Recogniser:
         """
         audio = analysed(audio, features)
         if not features.values.any() or not audio.passages:
-            silence = _timeline([(SILENCE, "")], np.array([0, len(features.values)]), features.duration_s)
-            return build_recognition(silence, [LabelledFrames(0, SILENCE)], (), None)
+            return build_recognition([LabelledFrames(0, SILENCE)], (), len(features.values), features.duration_s, None)
         if not audio.is_passage:
             if (network := find_network(self.kind)) is not None:
                 find_stretches(network, audio, each)  # of all passages at once: several processes work on them
-            passages = [
-                (passage, self.recognition(passage.audio, passage.audio.mfcc(), each, english=english))
-                for passage in audio.passages
-            ]
-            return join_recognition(passages, features.duration_s)
+            sounds = (passage.audio for passage in audio.passages)
+            recognitions = [self.recognition(sound, sound.mfcc(), each, english=english) for sound in sounds]
+            return join_recognition(list(zip(audio.passages, recognitions, strict=True)), features.duration_s)
         is_judged = self.adaptation is None and self.kind != "general"  # else nothing depends on it
         similarity = speaker_similarity(self.own, audio) if is_judged else None
         known = (
@@ -155,7 +152,7 @@ class Recogniser:
                 hmm, self._loop, log_likelihoods, aligning, free, loud, believing=self.kind == "words"
             ).words_of(spoken)
             labels = splice(labels if self.kind == "auto" else [LabelledFrames(0, SILENCE)], parts, len(path))
-        return _recognition(labels, recognised, len(path), features.duration_s, similarity)
+        return build_recognition(labels, recognised, len(path), features.duration_s, similarity)
 
     def _network_recognition(
         self,
@@ -174,7 +171,7 @@ class Recogniser:
         else:
             parts, recognised = list_wordless(hmm, self._loop, log_likelihoods, found), []
         labels = splice([LabelledFrames(0, SILENCE)], parts, len(loud))
-        recognition = _recognition(labels, recognised, len(loud), features.duration_s, similarity)
+        recognition = build_recognition(labels, recognised, len(loud), features.duration_s, similarity)
         return replace(recognition, posterior=mean_posterior(found))
 
     def _free_labels(self, audio: AnalysedAudio, features: Features, path: NDArray[np.intp]) -> list[LabelledFrames]:
@@ -183,7 +180,7 @@ class Recogniser:
         if self.kind not in WEIGHTED or not self._has_few_gaussians:
             return labels
         named, bounds = [(label.phone, "") for label in labels], [label.first for label in labels]
-        phones = _timeline(named, np.array([*bounds, len(path)]), features.duration_s)
+        phones = time_phones(named, np.array([*bounds, len(path)]), features.duration_s)
         try:
             aligned = self.align_phones(audio, features, phones)
         except AlignmentError:
@@ -196,9 +193,8 @@ class Recogniser:
     ) -> Timeline[Unit]:
         """Return the phones of a known transcript in time: forced alignment.
 
-        words           : of the transcript, in lower case, and written forms (``1995``), in whose place the words stand
-                          that are said
-        anchors         : times of the words, within which they are aligned (``recognition.anchors``); None: anywhere
+        words   : of the transcript, in lower case, and written forms (``1995``): the words that are said replace these
+        anchors : times of the words, within which they are aligned (``recognition.anchors``); None: anywhere
         The reading and the pronunciation of each word, and the pauses, are those with the most probable path. A phone
         without a model borrows that of the most similar phone with one (``units.SIMILAR_PHONES``).
         Raises AlignmentError: the transcript does not fit into the recording.
@@ -221,13 +217,12 @@ class Recogniser:
             for phone, word in form:
                 if phone != PAUSE or item.units[len(labels) - said] == PAUSE:  # else it was not made
                     labels.append((phone, word))
-        return _timeline(labels, bounds, features.duration_s)
+        return time_phones(labels, bounds, features.duration_s)
 
     def best_path_densities(self, audio: Audio, features: Features) -> NDArray[np.intp]:
         """Return the density of each frame's state on the most probable path [shape=(T,)].
 
-        They are numbered as in ``combined``, with the kind ``own`` as in the own models. Digital silence has that of
-        silence.
+        They are numbered as in ``combined``, with the kind ``own`` as in the own models; of digital silence as silence.
         Raises MissingDependencyError: as ``recognise``.
         """
         if not features.values.any():
@@ -267,29 +262,25 @@ class Recogniser:
         self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None = None, aligning: bool = False
     ) -> tuple[UnitHmm, LogLikelihoods]:
         """Return the models that are used, and the log likelihoods of a recording under them."""
-        if self.kind == "own":
-            hmm, warp = self.own, self._own_transform(audio, similarity)[0]
-            log_likelihoods = compute_log_likelihoods(hmm, self._own_features(audio, warp))
+        own_alone = self.kind == "own"
+        general_alone = self.kind == "general" or (aligning and self._has_few_gaussians and not own_alone)
+        warp, weight = 1.0, 0.0  # of the own models
+        if self.adaptation is not None and not general_alone:
+            weight = self.adaptation.own_weight
+        elif not general_alone:
+            similarity = similarity or speaker_similarity(self.own, audio)
+            warp, weight = similarity.warp, weigh_own_model(similarity.score)
+        if weight <= 0 and not own_alone:  # not evaluated: any features will do; those of an hour are large
+            own = audio.mfcc().values
         else:
-            hmm, general_alone = self.combined.hmm, self.kind == "general" or (aligning and self._has_few_gaussians)
-            warp, weight = (1.0, 0.0) if general_alone else self._own_transform(audio, similarity)
-            # own models without weight are not evaluated: any features will do, and those of a long one are large
-            own = self._own_features(audio, warp) if weight > 0 else audio.mfcc().values
+            own = audio.mfcc(warp).values if self.adaptation is None else self.adaptation.own_features(audio)
+        if own_alone:
+            hmm, log_likelihoods = self.own, compute_log_likelihoods(self.own, own)
+        else:
             general = audio.general_features if self.adaptation is None else self.adaptation.general_features(audio)
-            log_likelihoods = combine_likelihoods(self.combined, own, weight, general)
+            hmm, log_likelihoods = self.combined.hmm, combine_likelihoods(self.combined, own, weight, general)
         audio.forget_warps()
         return hmm, penalise_speech(hmm, log_likelihoods, find_quiet_frames(audio.log_energy))
-
-    def _own_transform(self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None) -> tuple[float, float]:
-        """Return the warp of the frequencies for the own models, and the weight of these models, 0 to 1."""
-        if self.adaptation is not None:
-            return self.adaptation.warp, self.adaptation.own_weight
-        similarity = similarity or speaker_similarity(self.own, audio)
-        return similarity.warp, weigh_own_model(similarity.score)
-
-    def _own_features(self, audio: AnalysedAudio, warp: float) -> NDArray[np.float32]:
-        """Return the features for the own models, warped and, where there is an adaptation, transformed."""
-        return audio.mfcc(warp).values if self.adaptation is None else self.adaptation.own_features(audio)
 
 
 def _aligned(
@@ -312,18 +303,6 @@ def _aligned(
     return spoken, align_units(hmm, log_likelihoods, [unit for item in spoken for unit in item.units], of_units)
 
 
-def _recognition(
-    labels: list[LabelledFrames],
-    recognised: list[RecognisedWord],
-    frames: int,
-    duration_s: float,
-    similarity: SpeakerSimilarity | None,
-) -> Recognition:
-    named = [(label.phone, recognised[label.word].text if label.word >= 0 else "") for label in labels]
-    units = _timeline(named, np.array([*(label.first for label in labels), frames]), duration_s)
-    return build_recognition(units, labels, recognised, similarity.score if similarity is not None else None)
-
-
 def find_network(kind: str) -> str | None:
     """Return the name of the phone recogniser that a kind of recogniser uses; None: none, or none is installed."""
     return find_installed_recogniser() if kind == "auto" else None
@@ -338,27 +317,3 @@ def open_recogniser(own: UnitHmm, kind: str = "auto", adaptation: Adaptation | N
 def weigh_own_model(score: float) -> float:
     """Return the weight of own models beside the general ones, 0 to 1, at a speaker similarity score."""
     return min(max((score - STRANGER_SCORE) / (FULL_WEIGHT_SCORE - STRANGER_SCORE), 0.0), 1.0)
-
-
-def _timeline(labels: list[tuple[str, str]], bounds: NDArray[np.intp], duration_s: float) -> Timeline[Unit]:
-    """Return phones in time, each with its word.
-
-    bounds : the first frame of each, and the frame count [shape=(len(labels) + 1,)]; frame n covers (n ± ½) · 10 ms
-    Silence at both ends stays silence however short; shorter than ``SHORT_PAUSE_S`` between words, it is a pause.
-    """
-    first = [
-        i for i, (phone, _) in enumerate(labels) if i == 0 or not (is_silent(phone) and is_silent(labels[i - 1][0]))
-    ]
-    labels, bounds = [labels[i] for i in first], np.append(bounds[first], bounds[-1])
-    edges = np.clip((bounds - 0.5) / FRAME_RATE_HZ, 0, duration_s)
-    edges[-1] = duration_s
-    spans = []
-    for i, ((phone, word), start_s, end_s) in enumerate(
-        zip(labels, edges[:-1].tolist(), edges[1:].tolist(), strict=True)
-    ):
-        name = phone
-        if is_silent(phone):
-            inside = 0 < i < len(labels) - 1
-            name = PAUSE if inside and end_s - start_s < SHORT_PAUSE_S else SILENCE
-        spans.append(Span(start_s, end_s, Unit(name, word=word)))
-    return Timeline(tuple(spans))

@@ -46,6 +46,8 @@ LABEL_REACH_S, COMPARED, MIN_AGREEING = 0.1, 9, 0.4
 RUN_PAUSE_S, MIN_RUN, MIN_DOUBT_S = 0.5, 3, 0.3
 """What is doubted is a stretch if it is nearer to one another, and so much and so long together."""
 
+SILENT = [*(number for number, phone in enumerate(PHONES) if is_silent(phone)), len(PHONES)]
+"""The columns of silence, of pauses and of none of the phones."""
 Array = NDArray[np.float64]
 Columns = NDArray[np.intp]
 
@@ -122,35 +124,23 @@ def find_evidence(
     log_posteriors = np.maximum(log_posteriors, MIN_LOG_POSTERIOR)
     words: list[WordEvidence] = []
     others: list[OtherSpeech] = []
-    for part in _parts(units, divided=len(log_posteriors) * len(units) > LARGEST_SEARCH):
-        at, stop = round(part.start_s / frame_s), round(part.end_s / frame_s)
-        path = _best_path(log_posteriors[at : None if part.is_last else stop], part.columns(), costs)
-        for (begin, end), (left, back) in path.free:
+    for first_s, stop_s, spans_of_words in _divide(units, divided=len(log_posteriors) * len(units) > LARGEST_SEARCH):
+        at, stop = round(first_s / frame_s), None if stop_s is None else round(stop_s / frame_s)
+        columns = [np.array([PHONES.index(span.label.phone) for span in spans]) for spans in spans_of_words]
+        frames_of_words, free = _best_path(log_posteriors[at:stop], columns, costs)
+        for (begin, end), (left, back) in free:
             start_s, end_s = (at + begin) * frame_s, (at + end) * frame_s
             others.append(OtherSpeech(start_s, end_s, len(words) + left, len(words) + back))
-        for spans, heard in zip(part.words, path.words, strict=True):
-            said, (start_s, end_s) = tuple(span.label.phone for span in spans), (spans[0].start_s, spans[-1].end_s)
+        for spans, heard in zip(spans_of_words, frames_of_words, strict=True):
+            phones, (start_s, end_s) = tuple(span.label.phone for span in spans), (spans[0].start_s, spans[-1].end_s)
             if heard is not None:
                 start_s, end_s = (at + heard[0]) * frame_s, (at + heard[1]) * frame_s
-            words.append(WordEvidence(spans[0].label.word, said, start_s, end_s, heard is not None))
+            words.append(WordEvidence(spans[0].label.word, phones, start_s, end_s, heard is not None))
     return TranscriptEvidence(tuple(words), tuple(others))
 
 
-class _Part(NamedTuple):
-    """A part of a recording, and the phones of its words in time."""
-
-    start_s: float
-    end_s: float
-    words: list[list[Span[Unit]]]
-    is_last: bool
-
-    def columns(self) -> list[Columns]:
-        """Return the columns of the phones of each word."""
-        return [np.array([PHONES.index(span.label.phone) for span in spans]) for spans in self.words]
-
-
-def _parts(units: Timeline[Unit], divided: bool) -> Iterator[_Part]:
-    """Yield a recording; ``divided``: in parts that are short enough to be searched, cut in silence if possible."""
+def _divide(units: Timeline[Unit], divided: bool) -> Iterator[tuple[float, float | None, list[list[Span[Unit]]]]]:
+    """Yield start, end (None: the last) and words of a recording, or of parts that are short enough to be searched."""
     start_s = before_s = 0.0
     words: list[list[Span[Unit]]] = []
     for (silent, _), group in groupby(units, key=lambda span: (is_silent(span.label.phone), span.label.word)):
@@ -160,39 +150,31 @@ def _parts(units: Timeline[Unit], divided: bool) -> Iterator[_Part]:
         pause_s, so_far_s = spans[0].start_s - before_s, before_s - start_s
         if divided and words and so_far_s > (MIN_STRETCH_S if pause_s > 0 else LONGEST_STRETCH_S):
             cut_s = before_s + pause_s / 2
-            yield _Part(start_s, cut_s, words, is_last=False)
+            yield start_s, cut_s, words
             start_s, words = cut_s, []
         words.append(spans)
         before_s = spans[-1].end_s
-    yield _Part(start_s, units[-1].end_s if len(units) else 0.0, words, is_last=True)
+    yield start_s, None, words
 
 
-class _Path(NamedTuple):
-    """The best path through some frames.
-
-    words : the first frame of each word and the one after its last; None: it is left out
-    free  : where anything is said: the first frame in which a phone is heard and the one after the last; the first word
-            that is left out there and the one after the last
-    """
-
-    words: list[tuple[int, int] | None]
-    free: list[tuple[tuple[int, int], tuple[int, int]]]
-
-
+Range = tuple[int, int]
+"""The first of some frames or words, and the one after the last."""
+Path = tuple[list[Range | None], list[tuple[Range, Range]]]
+"""The frames of each word, None where it is left out; and those in which anything is said, with the words left out."""
 BLANK, PHONE, FREE, INSTEAD = range(4)
 """How a path is after n phones: in a blank; in the nth of them; it says anything between words, or in place of some."""
 STAYED, BEGAN, SKIPPED = range(3)
 """How it came to say anything there: it did before; it begins; a word more is left out."""
 
 
-def _best_path(log_posteriors: Array, words: Sequence[Columns], costs: tuple[float, float] = WORD_COSTS) -> _Path:
+def _best_path(log_posteriors: Array, words: Sequence[Columns], costs: tuple[float, float] = WORD_COSTS) -> Path:
     """Return the best path that says words, leaves some of them out, and says anything between them."""
     word_cost, phone_cost = costs
     columns = np.concatenate([np.zeros(0, np.intp), *words])
     frames, count = len(log_posteriors), len(columns)
     edges = np.cumsum([0, *map(len, words)])
     spoken = np.log(np.exp(log_posteriors) @ _count_taken())[:, columns]
-    silent = np.logaddexp.reduce(log_posteriors[:, _find_silent()], axis=1)
+    silent = np.logaddexp.reduce(log_posteriors[:, SILENT], axis=1)
     anything = np.maximum(log_posteriors.max(axis=1), silent)
     same = np.concatenate([[False], columns[1:] == columns[:-1]])[:count] & ~np.isin(np.arange(count), edges)
     entered = np.zeros((frames, count), bool)
@@ -204,10 +186,8 @@ def _best_path(log_posteriors: Array, words: Sequence[Columns], costs: tuple[flo
     for t in range(frames + 1):
         arrived = np.maximum(blank, phone)
         arrivals[t] = np.where(phone >= blank, PHONE, BLANK)
-        either = np.maximum(free, instead)
-        arrivals[t, edges] = np.where(
-            either > arrived[edges], np.where(free > instead, FREE, INSTEAD), arrivals[t, edges]
-        )
+        either, way = np.maximum(free, instead), np.where(free > instead, FREE, INSTEAD)
+        arrivals[t, edges] = np.where(either > arrived[edges], way, arrivals[t, edges])
         arrived[edges] = np.maximum(arrived[edges], either)
         if t == frames:
             break
@@ -234,12 +214,12 @@ def _trace(
     same: NDArray[np.bool_],
     edges: Columns,
     heard: Array,
-) -> _Path:
-    """Return the words and free stretches of the best path, which is followed from its end."""
+) -> Path:
+    """Return the best path, which is followed from its end."""
     place, how = int(edges[-1]), int(arrivals[-1, -1])
-    words: list[tuple[int, int] | None] = [None] * (len(edges) - 1)
-    free: list[tuple[tuple[int, int], tuple[int, int]]] = []
-    last: tuple[int, int] | None = None  # the end of a free stretch: its frame, the word after it
+    words: list[Range | None] = [None] * (len(edges) - 1)
+    free: list[tuple[Range, Range]] = []
+    last: Range | None = None  # the end of a free stretch: its frame, the word after it
     for t in reversed(range(len(heard))):
         word = int(np.searchsorted(edges, place))  # the one that ends at this place is before it
         if how == BLANK:
@@ -260,7 +240,7 @@ def _trace(
                 where = (int(loud[0]), int(loud[-1]) + 1) if len(loud) else (t, t)
                 free.append((where, (word, last[1])))
                 last, how = None, int(arrivals[t, place])
-    return _Path(words, free[::-1])
+    return words, free[::-1]
 
 
 class LabelEvidence(NamedTuple):
@@ -286,7 +266,7 @@ def label_evidence(log_posteriors: Array, frame_s: float, units: Timeline[Unit])
     ends_s = np.array([span.end_s for span in spoken], float)
     phones = np.array([PHONES.index(span.label.phone) for span in spoken], np.intp)
     best = log_posteriors.argmax(axis=1)
-    heard = np.flatnonzero(~np.isin(best, _find_silent()) & (np.diff(best, prepend=-1) != 0))
+    heard = np.flatnonzero(~np.isin(best, SILENT) & (np.diff(best, prepend=-1) != 0))
     times_s: Array = ((heard + 0.5) * frame_s).astype(float)
     first = np.searchsorted(ends_s, times_s - LABEL_REACH_S)
     stop = np.searchsorted(starts_s, times_s + LABEL_REACH_S, "right")
@@ -301,26 +281,22 @@ def label_evidence(log_posteriors: Array, frame_s: float, units: Timeline[Unit])
     compared_s = np.concatenate([times_s[~alone], middles_s[is_near]])
     order = compared_s.argsort()
     right = np.concatenate([confirmed[~alone], agrees[is_near]])[order].astype(float)
-    window = np.ones(min(COMPARED, max(len(right), 1)))
-    share = (
-        np.convolve(right, window, "same") / np.convolve(np.ones(len(right)), window, "same") if len(right) else right
-    )
+    share, window = right, np.ones(min(COMPARED, max(len(right), 1)))
+    if len(right):
+        share = np.convolve(right, window, "same") / np.convolve(np.ones(len(right)), window, "same")
     doubted_s = compared_s[order][share < MIN_AGREEING]
     idle, wrong = _runs(starts_s[~is_near], ends_s[~is_near]), _runs(doubted_s, doubted_s)
     return LabelEvidence(_runs(times_s[alone], times_s[alone], MIN_GAP_S), idle, wrong)
 
 
-def _runs(starts_s: Array, ends_s: Array, least_s: float = MIN_DOUBT_S) -> tuple[tuple[float, float], ...]:
+def _runs(starts_s: Array, ends_s: Array, min_s: float = MIN_DOUBT_S) -> tuple[tuple[float, float], ...]:
     """Return stretches of at least ``MIN_RUN`` times near one another."""
     if not len(starts_s):
         return ()
     cuts = np.flatnonzero(starts_s[1:] - ends_s[:-1] > RUN_PAUSE_S) + 1
     runs = zip(np.split(starts_s, cuts), np.split(ends_s, cuts), strict=True)
-    return tuple(
-        (float(first[0]), float(last[-1]))
-        for first, last in runs
-        if len(first) >= MIN_RUN and last[-1] - first[0] >= least_s
-    )
+    spans = [(float(starts[0]), float(ends[-1])) for starts, ends in runs if len(starts) >= MIN_RUN]
+    return tuple((start_s, end_s) for start_s, end_s in spans if end_s - start_s >= min_s)
 
 
 @cache
@@ -331,7 +307,3 @@ def _count_taken() -> Array:
         for other in others:
             taken[PHONES.index(phone), PHONES.index(other)] = taken[PHONES.index(other), PHONES.index(phone)] = 1.0
     return taken
-
-
-def _find_silent() -> list[int]:
-    return [number for number, phone in enumerate(PHONES) if is_silent(phone)] + [len(PHONES)]

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import AlignmentError, MissingDependencyError
+from lipmotion.errors import MissingDependencyError
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.hmm.network import LogLikelihoods, UnitLoop, decode_path, penalise_silence, wrap_log_likelihoods
+from lipmotion.hmm.network import LogLikelihoods, UnitLoop, decode_path, wrap_log_likelihoods
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.speech.recognition.general import NOISES
 from lipmotion.speech.recognition.network.beam_search import decode_words, load_english, score_stretch
@@ -26,16 +26,14 @@ from lipmotion.speech.recognition.network.posteriors import (
 )
 from lipmotion.speech.recognition.recognised_speech import (
     FORMS,
-    AlignedWords,
     LabelledFrames,
     LabelledStretch,
     RecognisedWord,
     align_recognised_words,
+    find_form,
     label_words,
-    normalise_word,
     splice,
     weigh_densities,
-    weigh_phones,
 )
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.sound.voice_activity import Stretch, find_sound, read_stretch
@@ -79,32 +77,20 @@ def spot_words(samples: bytes) -> tuple[FoundWord, ...]:
         decoder.end_utt()
         lattice = _segments(decoder)
     words = []
-    for one in found:
-        same = (two for two in lattice if one.word == two.word and max(one.first, two.first) <= min(one.last, two.last))
-        words.append(FoundWord(one.word, max((two.posterior for two in same), default=0.0)))
+    for word, start, end, _ in found:
+        same = (each[3] for each in lattice if each[0] == word and max(start, each[1]) <= min(end, each[2]))
+        words.append(FoundWord(word, max(same, default=0.0)))
     return tuple(words)
 
 
-class _Segment(NamedTuple):
-    word: str
-    first: int
-    last: int
-    posterior: float
-
-
-def _segments(decoder: Any) -> list[_Segment]:
-    """Return the words of the decoder's present best path, and their frames."""
+def _segments(decoder: Any) -> list[tuple[str, int, int, float]]:
+    """Return the words of the decoder's present best path, their first and last frames, and their posteriors."""
     entries = decoder.seg() if decoder.hyp() is not None else ()
     return [
-        _Segment(VARIANT.sub("", entry.word), entry.start_frame, entry.end_frame, min(max(entry.prob, 0.0), 1.0))
+        (VARIANT.sub("", entry.word), entry.start_frame, entry.end_frame, min(max(entry.prob, 0.0), 1.0))
         for entry in entries
-        if not is_filler(entry.word)
+        if entry.word[:1] not in ("<", "[", "+")  # silence and noise: <sil>, [NOISE], ++UH++
     ]
-
-
-def is_filler(word: str) -> bool:
-    """Return whether an entry of pocketsphinx's dictionaries is silence or noise: ``<sil>``, ``[NOISE]``."""
-    return word[:1] in ("<", "[", "+")
 
 
 @cache
@@ -130,8 +116,9 @@ def _decoder() -> Any:
 
 WORD_FIT, STRETCH_FIT = -2.0, -1.5
 """Words are believed from the first fit on, all words of a stretch from the second one on (``AlignedWords.fits``)."""
-WORD_BONUS = 2.0
-"""Where words are not believed, their phones are still more probable than others, by so many nats a frame."""
+WORD_BONUS, WORD_REACH_FRAMES = 2.0, 2
+"""Where words are not believed, their phones are still more probable than others, by so many nats a frame, and so many
+frames earlier or later than in their alignment, linearly less."""
 FIT_WEIGHT, POSTERIOR_WEIGHT, CONSTANT = 0.62, 3.4, -1.9
 MIN_FIT, MAX_FIT = -4.0, 1.0
 """Coefficients of the confidence; fits count within these limits."""
@@ -141,18 +128,14 @@ DICTIONARY = Lexicon()
 """Words that were recognised are in the dictionary."""
 
 
-class WordsInStretches(NamedTuple):
-    """Stretches of sound, and the words that are found in each of them, as soon as they are known."""
+def begin_decoding(audio: AnalysedAudio, each: ParallelMap = map) -> Iterable[tuple[Stretch, Sequence[FoundWord]]]:
+    """Return all stretches of sound of a recording, with the words in them as soon as they are known.
 
-    stretches: Sequence[Stretch]
-    words: Iterable[Sequence[FoundWord]]
-
-
-def begin_decoding(audio: AnalysedAudio, each: ParallelMap = map) -> WordsInStretches:
-    """Return the words in all stretches of sound of a recording; where ``each`` starts processes, they begin now."""
+    Where ``each`` starts processes, they begin now. Raises MissingDependencyError: as ``spot_words``.
+    """
     stretches = find_sound(audio.log_energy)
     each = each if sum(stretch.end - stretch.first for stretch in stretches) > SHORT_FRAMES else map
-    return WordsInStretches(stretches, each(spot_words, (read_stretch(audio, stretch) for stretch in stretches)))
+    return zip(stretches, each(spot_words, (read_stretch(audio, stretch) for stretch in stretches)), strict=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,41 +158,35 @@ class WordSearch:
     loud: NDArray[np.bool_]
     believing: bool = False
 
-    def words_of(self, spoken: WordsInStretches) -> tuple[list[LabelledStretch], list[RecognisedWord]]:
+    def words_of(
+        self, spoken: Iterable[tuple[Stretch, Sequence[FoundWord]]]
+    ) -> tuple[list[LabelledStretch], list[RecognisedWord]]:
         """Return the stretches in which words were recognised, with their phones, and these words.
 
-        spoken : of ``begin_decoding``
-        Raises MissingDependencyError: as ``words_in``.
+        spoken : of ``begin_decoding``, whose errors it raises
         """
         parts, recognised = list[LabelledStretch](), list[RecognisedWord]()
-        for stretch, words in zip(spoken.stretches, spoken.words, strict=True):
-            here, fits = self._part(stretch, [word.text for word in words], len(recognised))
-            parts += here
-            recognised += [
-                RecognisedWord(word.text, score_words(fit, word.posterior))
-                for word, fit in zip(words, fits, strict=True)
-            ]
+        for stretch, words in spoken:
+            if not words:
+                continue
+            fits, texts = np.full(len(words), MIN_FIT), [word.text for word in words]
+            values = self.aligning.stretch(*stretch)
+            aligned = align_recognised_words(self.hmm, values, self.loud[slice(*stretch)], texts, DICTIONARY)
+            if aligned is not None:
+                fits, fit = aligned.fits(values, self.path[slice(*stretch)])
+                believed = np.full(len(words), self.believing or fit > STRETCH_FIT) | (fits > WORD_FIT)
+                decided = list(label_words(aligned, stretch, believed, len(recognised)))
+                if not believed.all():
+                    # phones as they are recognised if those of words in it are more probable than others
+                    forms = np.array([FORMS.index(find_form(phone)) for phone in aligned.phones])
+                    present = np.eye(len(FORMS), dtype=np.float32)[forms[aligned.of_frame]]
+                    bonus = weigh_densities(self.hmm, present, WORD_BONUS, WORD_REACH_FRAMES)
+                    path = self.loop.network.best_path(wrap_log_likelihoods(self.free.stretch(*stretch) + bonus))
+                    decided = [(stretch, splice(recognise_free(self.loop, path, stretch.first), decided, stretch.end))]
+                parts += decided
+            scores = map(score_words, fits.tolist(), (word.posterior for word in words))
+            recognised += map(RecognisedWord, texts, scores)
         return parts, recognised
-
-    def _part(
-        self, stretch: Stretch, words: Sequence[str], first_word: int
-    ) -> tuple[list[LabelledStretch], list[float]]:
-        """Return the frames of a stretch that its words decide, with their phones, and the fit of each word."""
-        if not words:
-            return [], []
-        values = self.aligning.stretch(*stretch)
-        aligned = _align(self.hmm, values, self.loud[slice(*stretch)], words, DICTIONARY)
-        if aligned is None:
-            return [], [MIN_FIT] * len(words)
-        fits, fit = aligned.fits(values, self.path[slice(*stretch)])
-        believed = np.full(len(words), self.believing or fit > STRETCH_FIT) | (fits > WORD_FIT)
-        decided = list(label_words(aligned, stretch, believed, first_word))
-        if not believed.all():
-            # phones as they are recognised if those of words in it are more probable than others
-            values = self.free.stretch(*stretch) + weigh_phones(self.hmm, aligned, WORD_BONUS)
-            path = self.loop.network.best_path(wrap_log_likelihoods(values))
-            decided = [(stretch, splice(recognise_free(self.loop, path, stretch.first), decided, stretch.end))]
-        return decided, fits.tolist()
 
 
 def score_words(fit: float, posterior: float) -> float:
@@ -237,20 +214,6 @@ POSTERIOR_BONUS, REACH_FRAMES = 30.0, 4
 """By so many nats a phone is more probable where its posterior is 1; around it, by less, to nothing further away."""
 
 
-@dataclass(frozen=True)
-class SpokenItem:
-    """A word, or phones that belong to no word, as they are aligned.
-
-    text       : of the word; empty: of no word
-    variants   : pronunciations
-    confidence : the probability that the word is right, 0 to 1
-    """
-
-    text: str
-    variants: tuple[Pronunciation, ...]
-    confidence: float
-
-
 def decode_network(
     hmm: UnitHmm, aligning: LogLikelihoods, loud: NDArray[np.bool_], found: Sequence[PosteriorStretch]
 ) -> tuple[list[LabelledStretch], list[RecognisedWord]]:
@@ -262,48 +225,37 @@ def decode_network(
     """
     parts, recognised = list[LabelledStretch](), list[RecognisedWord]()
     for stretch, posteriors in found:
-        items = list_spoken(posteriors)
-        lexicon = Lexicon({str(number): item.variants for number, item in enumerate(items)})
-        names = [str(number) for number in range(len(items))]
-        aligned = _align(hmm, aligning.stretch(*stretch), loud[slice(*stretch)], names, lexicon) if items else None
+        if not (items := list_spoken(posteriors)):
+            continue
+        lexicon = Lexicon({str(number): variants for number, (_, variants) in enumerate(items)})
+        values = aligning.stretch(*stretch)
+        aligned = align_recognised_words(hmm, values, loud[slice(*stretch)], [*lexicon.user], lexicon)
         if aligned is not None:
-            wordless = {len(recognised) + number for number, item in enumerate(items) if not item.text}
+            wordless = {len(recognised) + number for number, (word, _) in enumerate(items) if not word.text}
             parts += [
                 (frames, [label._replace(word=-1) if label.word in wordless else label for label in labels])
                 for frames, labels in label_words(aligned, stretch, np.ones(len(items), bool), len(recognised))
             ]
-        recognised += [RecognisedWord(item.text, item.confidence) for item in items]
+        recognised += [word for word, _ in items]
     return parts, recognised
 
 
-def _align(
-    hmm: UnitHmm, values: NDArray[np.float32], loud: NDArray[np.bool_], words: Sequence[str], lexicon: Lexicon
-) -> AlignedWords | None:
-    """Return words as they are aligned with the log likelihoods of a stretch; None: there is not room for them all."""
-    try:
-        return align_recognised_words(hmm, penalise_silence(hmm, wrap_log_likelihoods(values), loud), words, lexicon)
-    except AlignmentError:
-        return None
-
-
-def list_spoken(posteriors: PhonePosteriors) -> list[SpokenItem]:
-    """Return what is said in a stretch of English, in order; nothing where the network finds no phone."""
+def list_spoken(posteriors: PhonePosteriors) -> list[tuple[RecognisedWord, tuple[Pronunciation, ...]]]:
+    """Return the words of a stretch of English with their pronunciations; phones of no word have an empty text."""
     if not _finds_phones(posteriors):
         return []
     items = []
     for word in decode_words(load_english(), score_stretch(posteriors)):
-        found = posteriors.phones_between(word.first, word.end)
-        variants = Lexicon().pronunciations(word.text) if word.text else (tuple(found),)
+        heard = posteriors.phones_between(word.first, word.end)
+        variants = DICTIONARY.pronunciations(word.text) if word.text else (tuple(heard),)
         if not variants[0]:
             continue
         confidence = 0.0
         if word.text:
-            sure = posteriors.mean_posterior(word.first, word.end)
-            agreement = max(1 - count_phone_edits(each, found) / max(len(each), len(found)) for each in variants)
-            confidence = float(
-                1 / (1 + np.exp(-(AGREEMENT_WEIGHT * agreement + NETWORK_WEIGHT * sure + NETWORK_CONSTANT)))
-            )
-        items.append(SpokenItem(word.text, variants, confidence))
+            agreement = max(1 - count_phone_edits(each, heard) / max(len(each), len(heard)) for each in variants)
+            score = AGREEMENT_WEIGHT * agreement + NETWORK_WEIGHT * posteriors.mean_posterior(word.first, word.end)
+            confidence = float(1 / (1 + np.exp(-(score + NETWORK_CONSTANT))))
+        items.append((RecognisedWord(word.text, confidence), variants))
     return items
 
 
@@ -324,7 +276,7 @@ def list_wordless(
             posterior = np.zeros((frames, len(FORMS)), np.float32)
             for column, phone in enumerate(PHONES):
                 if not is_silent(phone):
-                    posterior[:, FORMS.index(normalise_word(phone))] += np.exp(posteriors.of_phones[row, column])
+                    posterior[:, FORMS.index(find_form(phone))] += np.exp(posteriors.of_phones[row, column])
             values = free.stretch(*stretch) + weigh_densities(hmm, posterior, POSTERIOR_BONUS, REACH_FRAMES)
             path = loop.network.best_path(wrap_log_likelihoods(values))
             parts.append((stretch, recognise_free(loop, path, stretch.first)))
@@ -332,4 +284,4 @@ def list_wordless(
 
 
 def _finds_phones(posteriors: PhonePosteriors) -> bool:
-    return any(found.token != WORD_BOUNDARY for found in posteriors.best_tokens)
+    return any(each.token != WORD_BOUNDARY for each in posteriors.best_tokens)

@@ -30,8 +30,6 @@ HUM_SHARE, HUM_REST = 0.03, 1e-5
 """Hum is looked for in blocks of a second, in sound of two and more: bins of a hertz of so much more amplitude than
 those around, also where all else pauses, and this share of the loudest. Without it, this share of the power is left."""
 
-Noise = NDArray[np.float32]
-
 
 def remove_hum(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return sound at 16 kHz [shape=(N,)] without lines of its spectrum that never pause, if a voice is beside them."""
@@ -93,7 +91,7 @@ def mix_noise(audio: Audio, kind: str, snr_db: float, talkers: Sequence[Audio] =
         raise InputError(f"unknown noise {kind!r}; required one of: {', '.join(NOISE_KINDS)}")
     count = len(check_samples(audio))
     if kind == "white":
-        return add_noise(audio, make_hiss(count, seed), snr_db)
+        return add_noise(audio, np.random.default_rng(seed).standard_normal(count, np.float32), snr_db)
     if any(np.array_equal(talker.samples, audio.samples) for talker in talkers):
         raise InputError("the recording is one of the talkers of its own babble; leave its speaker out of the talkers")
     return add_noise(audio, make_babble(talkers, count, seed), snr_db)
@@ -106,8 +104,7 @@ def add_noise(audio: Audio, noise: NDArray[np.floating], snr_db: float) -> Audio
     snr_db : 10 · log10 of the mean power of the recording over that of the noise, both over the samples of speech
              (``mark_spoken``); noise that the recording already has counts as speech there
     The samples are not clipped: beyond full scale they are exact for features, not for sound files of integers.
-    Raises InputError: the ratio is not finite, the lengths differ, the noise is silent or not finite, or there is no
-    speech in the recording.
+    Raises InputError: a ratio that is not finite, other lengths, noise that is silent or not finite, or no speech.
     """
     if not np.isfinite(snr_db):
         raise InputError(f"the signal-to-noise ratio is {snr_db} dB, required a finite number")
@@ -121,21 +118,13 @@ def add_noise(audio: Audio, noise: NDArray[np.floating], snr_db: float) -> Audio
     return Audio((audio.samples + gain * noise).astype(np.float32), audio.rate_hz)
 
 
-def make_hiss(samples: int, seed: int = 0) -> Noise:
-    """Return Gaussian noise of variance 1 [shape=(samples,)]. Raises InputError: fewer than 1 sample."""
-    _check_length(samples)
-    return np.random.default_rng(seed).standard_normal(samples, np.float32)
-
-
-def make_babble(voices: Sequence[Audio], samples: int, seed: int = 0) -> Noise:
+def make_babble(voices: Sequence[Audio], samples: int, seed: int = 0) -> NDArray[np.float32]:
     """Return the sum of several talkers, each with the same power [shape=(samples,)].
 
     voices : at least ``MIN_TALKERS`` recordings at 16 kHz, none of them of the speaker to whom they are added
-    Every recording begins at a random sample and is repeated from its start at its end. All have mean power 1 over
-    their samples of speech.
-    Raises InputError: too few recordings, another rate, a recording too short or silent, or fewer than 1 sample.
+    Every recording begins at a random sample, and again at its end. All have mean power 1 over their speech.
+    Raises InputError: too few recordings, another rate, or a recording too short or silent.
     """
-    _check_length(samples)
     if len(voices) < MIN_TALKERS:
         raise InputError(f"a babble of {len(voices)} talkers; required at least {MIN_TALKERS}")
     rng = np.random.default_rng(seed)
@@ -169,11 +158,6 @@ def mark_spoken(audio: Audio) -> NDArray[np.bool_]:
 
 def _power(audio: Audio, spoken: NDArray[np.bool_]) -> float:
     return float(np.square(audio.samples[spoken], dtype=float).mean())
-
-
-def _check_length(samples: int) -> None:
-    if samples < 1:
-        raise InputError(f"{samples} samples of noise asked for, required at least 1")
 
 
 LARGEST_WARP, LARGEST_TEMPO = 0.16, 0.22
@@ -227,21 +211,17 @@ def apply_condition(audio: Audio, voices: Sequence[Audio], rng: np.random.Genera
         return audio, 0.0
     added = 0.0
     if rng.random() < ROOM_PROBABILITY:
-        share = 10 ** (rng.uniform(*ROOM_DB) / 10)
         from scipy.signal import fftconvolve
 
-        duration_s = rng.uniform(*ROOM_S)
-        response = rng.standard_normal(int(duration_s * SPEECH_RATE_HZ))
+        share = 10 ** (rng.uniform(*ROOM_DB) / 10)
+        response = rng.standard_normal(int(rng.uniform(*ROOM_S) * SPEECH_RATE_HZ))
         response *= 10 ** (-3 * np.arange(len(response)) / len(response))
         response *= np.sqrt(share / np.square(response).sum())
         samples, added = samples + fftconvolve(samples, response)[: len(samples)], share
     if rng.random() < NOISE_PROBABILITY:
         share = 10 ** (-rng.uniform(*NOISE_DB) / 10)
-        noise = (
-            _babble(voices, len(samples), rng)
-            if voices and rng.random() < BABBLE_PROBABILITY
-            else _colour(len(samples), rng)
-        )
+        is_babble = voices and rng.random() < BABBLE_PROBABILITY
+        noise = _babble(voices, len(samples), rng) if is_babble else _colour(len(samples), rng)
         samples, added = samples + noise * np.sqrt(level * share), added + share
     if rng.random() < FILTER_PROBABILITY:
         samples = _filter(samples, rng)
@@ -263,9 +243,8 @@ def _babble(voices: Sequence[Audio], count: int, rng: np.random.Generator) -> Sa
     for _ in range(int(rng.integers(1, TALKERS + 1))):
         voice = _resample(voices[int(rng.integers(len(voices)))].samples, rng.uniform(0.75, 1.3))
         level = np.sqrt(np.square(voice).mean()) + 1e-9
-        total += (
-            np.resize(np.roll(voice, -int(rng.integers(len(voice)))), count) / level * 10 ** (rng.normal(0, 3) / 20)
-        )
+        begun = np.resize(np.roll(voice, -int(rng.integers(len(voice)))), count)
+        total += begun / level * 10 ** (rng.normal(0, 3) / 20)
     return total / (total.std() + 1e-9)
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import logging
 import mmap
 import struct
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,31 +28,9 @@ speech needs less than 56, digital silence in FLAC 27. A small file must not fil
 LOWEST_HZ, HIGHEST_HZ = 4000, 1_000_000
 """Lowest and highest sampling rate: below, speech is not intelligible; no recorder samples at a higher one."""
 MAX_CHANNELS = 64
+AGAIN = "export the recording again"
 PIECE_BYTES = 1 << 20
 """Sound is collected in pieces of this size, and without digital silence."""
-
-
-@dataclass(frozen=True, eq=False)
-class DecodedAudio:
-    """A decoded sound track.
-
-    samples, rate_hz : float32 array [shape=(N,)], and its sampling rate
-    energies, centre : of every channel; the number of the centre of three and more, None where there is none
-    mean_energy      : energy of the channels' mean
-    packets, damaged : how many packets the track has, and how many of them could not be decoded
-    silence_s        : duration of the silence that fills holes
-    missing_s        : what the container states beyond the end
-    """
-
-    samples: NDArray[np.float32]
-    rate_hz: int
-    energies: tuple[float, ...]
-    mean_energy: float
-    packets: int
-    damaged: int
-    silence_s: float
-    missing_s: float
-    centre: int | None
 
 
 def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
@@ -63,45 +39,63 @@ def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
     A wrong header could fill the memory: at a rate of 1 Hz, 16,000 samples are made out of one.
     """
     if not LOWEST_HZ <= rate_hz <= HIGHEST_HZ:
-        raise InputError(
-            f"{name}: sampled at {rate_hz} Hz, required {LOWEST_HZ} to {HIGHEST_HZ}; export the recording again"
-        )
+        raise InputError(f"{name}: sampled at {rate_hz} Hz, required {LOWEST_HZ} to {HIGHEST_HZ}; {AGAIN}")
     if not 1 <= channels <= MAX_CHANNELS:
-        raise InputError(f"{name}: has {channels} channels, required 1 to {MAX_CHANNELS}; export the recording again")
+        raise InputError(f"{name}: has {channels} channels, required 1 to {MAX_CHANNELS}; {AGAIN}")
 
 
 class _TrackDecoder:
-    """Decodes one track; the sound so far is in ``_pieces``, each with the number of samples before it.
+    """Decodes one track: its sound, and what is known of it.
 
-    channel : number of the channel to take; None: the mean of all channels
-    Digital silence, and that which fills holes, is left out until the end: memory that nobody writes to costs nothing.
+    channel          : number of the channel to take; None: the mean of all channels
+    samples, rate_hz : float32 array [shape=(N,)], and its sampling rate
+    energies, centre : of every channel; the number of the centre of three and more, None where there is none
+    mean_energy      : energy of the channels' mean
+    packets, damaged : how many packets the track has, and how many of them could not be decoded
+    silence_s        : duration of the silence that fills holes
+    missing_s        : what the container states beyond the end
+    The sound so far is in ``_pieces``, each with the number of samples before it. Digital silence, and that which fills
+    holes, is left out until the end: memory that nobody writes to costs nothing.
     """
 
     def __init__(self, container: Any, rate_hz: int, channel: int | None) -> None:
         self._container = container
         self._name = container.name.removeprefix("file:")
         self._stream = container.streams.audio[0]
-        self._rate_hz, self._channel = rate_hz, channel
+        self.rate_hz, self._channel = rate_hz, channel
         self._pieces = [(0, bytearray())]
-        self._count = 0
         self._resampler: Any = None
         self._form: tuple[Any, ...] = ()
         self._layout: Any = None
-        self._cut = 0
         self._clock_s: float | None = None
         self._energies: NDArray[np.float64] | float = 0.0
-        self._mean_energy = 0.0
-        self._silence_s = self._sound_s = 0.0
-        self._packets = self._damaged = self._size = 0
+        self.mean_energy = self.silence_s = self._sound_s = 0.0
+        self.packets = self.damaged = self._size = self._count = self._cut = 0
 
-    def decoded(self) -> DecodedAudio:
-        """Return the decoded track; can be called once."""
-        for frame in self._frames():
-            check_sound_format(self._name, frame.sample_rate, frame.layout.nb_channels)
-            self._sound_s += frame.samples / frame.sample_rate
-            self._check_length(self._sound_s)
-            self._place(frame)
-            self._resample(frame)
+    def decode(self) -> None:
+        """Decode the track; can be called once."""
+        import av
+
+        for packet in self._container.demux(self._stream):
+            self.packets += packet.size > 0
+            self._size += packet.size
+            try:
+                frames = packet.decode()
+            except av.FFmpegError:
+                self.damaged += 1
+                continue
+            for frame in frames:
+                check_sound_format(self._name, frame.sample_rate, frame.layout.nb_channels)
+                self._sound_s += frame.samples / frame.sample_rate
+                self._check_length(self._sound_s)
+                self._place(frame)
+                form = (frame.format.name, frame.layout.name, frame.sample_rate)
+                if self._resampler is None or form != self._form:  # tracks joined end to end may change
+                    self._flush()
+                    self._form, self._layout = form, self._layout or frame.layout.name
+                    self._resampler = av.AudioResampler(format="flt", layout=self._layout, rate=self.rate_hz)
+                frame.pts = None
+                self._add(self._resampler.resample(frame))
         self._flush()
         self._check_silence()
         samples = np.zeros(self._count, np.float32)
@@ -112,31 +106,12 @@ class _TrackDecoder:
         third = 2 if len(names) in (6, 8) and "NONE" in names else None  # names that a WAVE file may lack
         is_stated = self._stream.duration or not self._container.streams.video
         stated_s = read_duration(self._container, self._stream) if is_stated else 0.0
-        missing_s = stated_s - len(samples) / self._rate_hz
+        missing_s = stated_s - len(samples) / self.rate_hz
         rounded_s = ROUNDED_S if self._container.format.name in STATED else (1 - CUT_SHORT_SHARE) * stated_s
-        return DecodedAudio(
-            samples=samples[self._cut :],
-            rate_hz=self._rate_hz,
-            energies=tuple(np.atleast_1d(self._energies).tolist()),
-            mean_energy=self._mean_energy,
-            packets=self._packets,
-            damaged=self._damaged,
-            silence_s=self._silence_s,
-            missing_s=missing_s if missing_s > rounded_s else 0.0,
-            centre=names.index("FC") if "FC" in names[1:] else third,
-        )
-
-    def _frames(self) -> Iterator[Any]:
-        """Yield the frames that can be decoded; damaged packets are counted."""
-        import av
-
-        for packet in self._container.demux(self._stream):
-            self._packets += packet.size > 0
-            self._size += packet.size
-            try:
-                yield from packet.decode()
-            except av.FFmpegError:
-                self._damaged += 1
+        self.samples = samples[self._cut :]
+        self.energies = np.atleast_1d(self._energies).tolist()
+        self.missing_s = missing_s if missing_s > rounded_s else 0.0
+        self.centre = names.index("FC") if "FC" in names[1:] else third
 
     def _place(self, frame: Any) -> None:
         """Note a hole before a frame that starts later than the one before it ended."""
@@ -145,10 +120,10 @@ class _TrackDecoder:
             if self._clock_s is None:
                 offset_s = time_s - (self._container.start_time or 0) / 1e6 if list_video(self._container) else 0.0
                 self._count += self._silence(max(offset_s, 0.0))
-                self._cut = max(round(-offset_s * self._rate_hz), 0)
+                self._cut = max(round(-offset_s * self.rate_hz), 0)
             elif time_s - self._clock_s > HOLE_S:
                 self._flush()
-                self._silence_s += time_s - self._clock_s
+                self.silence_s += time_s - self._clock_s
                 self._count += self._silence(time_s - self._clock_s)
             if self._clock_s is None or abs(time_s - self._clock_s) > HOLE_S:
                 self._clock_s = time_s
@@ -160,37 +135,26 @@ class _TrackDecoder:
         if duration_s > LONGEST_HOLE_S:
             raise InputError(
                 f"{self._name}: the time stamps of its sound jump by {duration_s:.0f} s, at most "
-                f"{LONGEST_HOLE_S:.0f} s are bridged; export the recording again"
+                f"{LONGEST_HOLE_S:.0f} s are bridged; {AGAIN}"
             )
-        return round(duration_s * self._rate_hz)
+        return round(duration_s * self.rate_hz)
 
     def _check_silence(self) -> None:
-        most_s = LONGEST_HOLE_S + MAX_SILENCE_RATIO * self._sound_s
-        if self._silence_s > most_s:
+        max_s = LONGEST_HOLE_S + MAX_SILENCE_RATIO * self._sound_s
+        if self.silence_s > max_s:
             raise InputError(
-                f"{self._name}: the time stamps of its sound leave holes of {self._silence_s:.0f} s beside "
-                f"{self._sound_s:.1f} s of sound, at most {most_s:.0f} s are bridged; export the recording again"
+                f"{self._name}: the time stamps of its sound leave holes of {self.silence_s:.0f} s beside "
+                f"{self._sound_s:.1f} s of sound, at most {max_s:.0f} s are bridged; {AGAIN}"
             )
-        self._check_length(self._sound_s + self._silence_s)
+        self._check_length(self._sound_s + self.silence_s)
 
     def _check_length(self, length_s: float) -> None:
-        most_s = LONGEST_HOLE_S + self._size / MIN_BYTES_PER_S
-        if length_s > most_s:
+        max_s = LONGEST_HOLE_S + self._size / MIN_BYTES_PER_S
+        if length_s > max_s:
             raise InputError(
-                f"{self._name}: {self._size} bytes of sound last {length_s:.0f} s, required at most {most_s:.0f} s "
-                f"({MIN_BYTES_PER_S:.0f} bytes a second); export the recording again"
+                f"{self._name}: {self._size} bytes of sound last {length_s:.0f} s, required at most {max_s:.0f} s "
+                f"({MIN_BYTES_PER_S:.0f} bytes a second); {AGAIN}"
             )
-
-    def _resample(self, frame: Any) -> None:
-        import av
-
-        form = (frame.format.name, frame.layout.name, frame.sample_rate)
-        if self._resampler is None or form != self._form:  # tracks joined end to end may change
-            self._flush()
-            self._form, self._layout = form, self._layout or frame.layout.name
-            self._resampler = av.AudioResampler(format="flt", layout=self._layout, rate=self._rate_hz)
-        frame.pts = None
-        self._add(self._resampler.resample(frame))
 
     def _flush(self) -> None:
         if self._resampler is not None:
@@ -204,7 +168,7 @@ class _TrackDecoder:
             with np.errstate(all="ignore"):  # samples that are not finite are refused when all is decoded
                 mean = channels.mean(axis=1)
                 self._energies = self._energies + np.square(channels, dtype=np.float64).sum(axis=0)
-                self._mean_energy += float(np.square(mean, dtype=np.float64).sum())
+                self.mean_energy += float(np.square(mean, dtype=np.float64).sum())
             chosen = mean if self._channel is None else channels[:, self._channel]
             if chosen.any():
                 first, piece = self._pieces[-1]
@@ -249,40 +213,38 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
     time stamps or a length that it cannot have, or samples not finite.
     """
     check_source(path, "recording")
-    sound, level = _decoded(path, rate_hz, None), logging.WARNING if warn else logging.DEBUG
+    sound, level = _decode(path, rate_hz, None), logging.WARNING if warn else logging.DEBUG
     count = len(sound.energies)
     if sound.mean_energy < CANCELLED_SHARE * sum(sound.energies) / max(count, 1) ** 2:
         loudest = int(np.argmax(sound.energies))
         what = "%s: its %d channels cancel one another in their mean; channel %d, the loudest, is used"
         LOG.log(level, what, path, count, loudest + 1)
-        sound = _decoded(path, rate_hz, loudest)
+        sound = _decode(path, rate_hz, loudest)
     elif sound.centre is not None:
         from lipmotion.speech.sound.acoustic_conditions import speaks_alone
 
-        if speaks_alone(sound.centre, sound.energies, lambda number: _decoded(path, SPEECH_RATE_HZ, number).samples):
+        if speaks_alone(sound.centre, sound.energies, lambda number: _decode(path, SPEECH_RATE_HZ, number).samples):
             what = "%s: of its %d channels, channel %d alone holds speech and is used; mix them down if others speak"
             LOG.log(level, what, path, count, sound.centre + 1)
-            sound = _decoded(path, rate_hz, sound.centre)
-    held_s = len(sound.samples) / sound.rate_hz
-    found = f"{sound.damaged} of {sound.packets} packets of sound cannot be decoded"
+            sound = _decode(path, rate_hz, sound.centre)
+    damage = f"{sound.damaged} of {sound.packets} packets of sound cannot be decoded"
     if sound.damaged > (1 - USABLE_SHARE) * sound.packets:
-        raise InputError(f"{path}: damaged: {found}; required: at least half of them; export the recording again")
+        raise InputError(f"{path}: damaged: {damage}; required: at least half of them; {AGAIN}")
     if sound.damaged or sound.silence_s >= SHORTEST_S:
         holes = f"; holes of {sound.silence_s:.2f} s became silence" if sound.silence_s >= MIN_HOLES_S else ""
-        LOG.log(level, "%s: damaged: %s%s", path, found, holes)
-    if sound.missing_s >= SHORTEST_S:
-        stated = f"it states {held_s + sound.missing_s:.1f} s of sound and holds {held_s:.1f} s"
-        found = f"{stated}; the last {sound.missing_s:.1f} s are missing"
-        LOG.log(level, "%s: cut short: %s", path, found)
+        LOG.log(level, "%s: damaged: %s%s", path, damage, holes)
     audio = Audio(sound.samples, rate_hz)
+    if sound.missing_s >= SHORTEST_S:
+        what = "%s: cut short: it states %.1f s of sound and holds %.1f s; the last %.1f s are missing"
+        LOG.log(level, what, path, audio.duration_s + sound.missing_s, audio.duration_s, sound.missing_s)
     if audio.duration_s < SHORTEST_S:
         raise InputError(f"{path}: holds {audio.duration_s * 1000:.0f} ms of sound, required at least 100 ms")
     if not np.isfinite([audio.samples.min(), audio.samples.max()]).all():  # which needs no further array
-        raise InputError(f"{path}: holds samples that are not finite (NaN or infinite); export the recording again")
+        raise InputError(f"{path}: holds samples that are not finite (NaN or infinite); {AGAIN}")
     return audio
 
 
-def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
+def _decode(path: Path, rate_hz: int, channel: int | None) -> _TrackDecoder:
     import av
 
     try:
@@ -298,14 +260,17 @@ def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
                 LOG.warning("%s: the first of %d sound tracks is used", path, len(container.streams.audio))
             if container.format.name == "ogg" and path.read_bytes().rpartition(b"OggS")[2][1:2] < b"\4":  # RFC 3533
                 LOG.warning("%s: its last page is not marked as the last: it may be cut short", path)
-            sound = _TrackDecoder(container, rate_hz, channel).decoded()
-            return replace(sound, missing_s=max(missing_s, sound.missing_s))
+            sound = _TrackDecoder(container, rate_hz, channel)
+            sound.decode()
+            sound.missing_s = max(missing_s, sound.missing_s)
+            return sound
     except (av.FFmpegError, ValueError) as error:
         if isinstance(error, InputError):
             raise
         if is_text(path):
-            told = f"is text, required a recording; give the recording first, its words with --transcript {path}"
-            raise InputError(f"{path}: {told}") from error
+            raise InputError(
+                f"{path}: is text, required a recording; give the recording first, its words with --transcript {path}"
+            ) from error
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: not a readable recording ({reason}); give an audio or video file") from error
 
@@ -338,50 +303,49 @@ def _correct_wave(path: Path) -> tuple[_Wave | None, float]:
             raise ValueError("a WAVE file with the high byte first (RIFX); export it as .wav or .flac")
         if kind not in {b"RIFF", b"RF64", b"BW64", b"riff"}:
             return None, 0.0
-        whole = _Wave(file.fileno(), 0, access=mmap.ACCESS_COPY)
-    form, body, size, moved = _sound_of_wave(whole)
+        content = _Wave(file.fileno(), 0, access=mmap.ACCESS_COPY)
+    form, body, size, unpadded = _find_wave_chunks(content)
     if len(form) < 16:
         return None, 0.0
     coding, channels, rate_hz, per_second, block, bits = struct.unpack_from("<HHIIHH", form)
-    valid, missing = bits, 0 if size in UNKNOWN_SIZES else max(body + size - len(whole), 0)
+    valid, missing = bits, 0 if size in UNKNOWN_SIZES else max(body + size - len(content), 0)
     missing_s = missing / max(per_second, 1)
     if coding == EXTENSIBLE:
-        whole_form = len(form) >= 40
-        valid, coding = struct.unpack_from("<H4xH", form, 18) if whole_form else (-1, PCM)
-    least = -(-bits // 8) * channels
-    frame = block if block * rate_hz == per_second and block >= least else least
+        valid, coding = struct.unpack_from("<H4xH", form, 18) if len(form) >= 40 else (-1, PCM)
+    min_frame = -(-bits // 8) * channels
+    frame = block if block * rate_hz == per_second and block >= min_frame else min_frame
     if coding not in {PCM, FLOAT} or not channels or frame % channels:
         return None, missing_s
     container = 8 * frame // channels
-    if not moved and bits == container and valid in {0, container}:
+    if not unpadded and bits == container and valid in {0, container}:
         return None, missing_s
-    size = min(size or len(whole), len(whole) - body)
+    size = min(size or len(content), len(content) - body)
     header = struct.pack("<HHIIHH", coding, channels, rate_hz, frame * rate_hz, frame, container)
     lengths = [min(length, 0xFFFFFFFF) for length in (36 + size, size)]
     header = struct.pack("<4sI8sI16s4sI", b"RIFF", lengths[0], b"WAVEfmt ", 16, header, b"data", lengths[1])
-    whole.start, whole.name = body - len(header), str(path)
-    whole[whole.start : body] = header
-    whole.seek(0)
-    return whole, missing_s
+    content.start, content.name = body - len(header), str(path)
+    content[content.start : body] = header
+    content.seek(0)
+    return content, missing_s
 
 
-def _sound_of_wave(whole: _Wave) -> tuple[bytes, int, int, bool]:
+def _find_wave_chunks(content: _Wave) -> tuple[bytes, int, int, bool]:
     """Return the content of the chunk of the form, where the samples are, how many bytes of them, and whether a chunk
     of odd length lacks the byte after it. The form is empty where there is none, or there are no samples."""
-    long = whole[:4] == b"riff"  # Sony's Wave64: 16 bytes of a name, 8 of a length that counts itself
+    long = content[:4] == b"riff"  # Sony's Wave64: 16 bytes of a name, 8 of a length that counts itself
     head, body, name, size = (24 if long else 8), (40 if long else 12), b"", 0
-    form, stated, moved = b"", 0, False
+    form, stated, unpadded = b"", 0, False
     while name != b"data":
         place = body + size + (-size % 8 if long else size % 2)
-        if not long and size % 2 and whole[body + size : body + size + 4] in {b"fmt ", b"data", b"LIST", b"fact"}:
-            place, moved = body + size, True
-        if size < 0 or place + head > len(whole):
+        if not long and size % 2 and content[body + size : body + size + 4] in {b"fmt ", b"data", b"LIST", b"fact"}:
+            place, unpadded = body + size, True
+        if size < 0 or place + head > len(content):
             return b"", 0, 0, False
-        body, name = place + head, whole[place : place + 4]
-        (size,) = struct.unpack_from("<16xQ" if long else "<4xI", whole, place)
+        body, name = place + head, content[place : place + 4]
+        (size,) = struct.unpack_from("<16xQ" if long else "<4xI", content, place)
         size -= 24 if long else 0
         if name == b"fmt ":
-            form = whole[body : body + size]
+            form = content[body : body + size]
         elif name == b"ds64":
-            stated = int.from_bytes(whole[body + 8 : body + 16], "little")
-    return form, body, stated or size, moved
+            stated = int.from_bytes(content[body + 8 : body + 16], "little")
+    return form, body, stated or size, unpadded

@@ -30,9 +30,8 @@ def measure_levels_db(audio: Audio) -> Array:
     """Return the smoothed level of every 10 ms [shape=(floor(duration / 0.01),)], dB of full scale."""
     from scipy.ndimage import uniform_filter1d
 
-    levels: Array = 10 * np.log10(
-        np.maximum(average_powers(audio.samples, round(STEP_S * audio.rate_hz)), 10 ** (QUIETEST_DB / 10))
-    )
+    powers = average_powers(audio.samples, round(STEP_S * audio.rate_hz))
+    levels: Array = 10 * np.log10(np.maximum(powers, 10 ** (QUIETEST_DB / 10)))
     return uniform_filter1d(levels, SMOOTHING_FRAMES, mode="nearest") if len(levels) else levels
 
 
@@ -68,8 +67,7 @@ def list_spans(levels: Array) -> list[tuple[float, float]]:
         middle = (block + 0.5) * len(levels) / count
         part = levels[max(0, round(middle - size)) : round(middle + size)]
         low, high = np.percentile(part, [QUIET_PERCENTILE, LOUD_PERCENTILE]) if part.size else (0.0, 0.0)
-        flat = high - low < MIN_RANGE_DB
-        values.append(QUIETEST_DB - 1 if flat else low + SPEECH_SHARE * (high - low))
+        values.append(QUIETEST_DB - 1 if high - low < MIN_RANGE_DB else low + SPEECH_SHARE * (high - low))
     middles = (np.arange(count) + 0.5) * len(levels) / count
     loud = levels > np.interp(np.arange(len(levels)), middles, values)
     edges = np.flatnonzero(np.diff(np.r_[False, loud, False]))

@@ -99,9 +99,7 @@ def overlap_pieces(sounds: Sequence[Samples], pieces_s: Sequence[tuple[float, fl
     pieces_s : start and end of each piece in its recording, in seconds
     """
     half, reach = round(OVERLAP_S * rate_hz / 2), round(REACH_S * rate_hz)
-    result = np.zeros(0)
-    starts: list[int] = []
-    shifts: list[int] = []
+    result, starts, shifts = np.zeros(0), list[int](), list[int]()
     for sound, (start_s, end_s) in zip(sounds, pieces_s, strict=True):
         start, end = round(start_s * rate_hz), round(end_s * rate_hz)
         if not starts:
@@ -110,7 +108,12 @@ def overlap_pieces(sounds: Sequence[Samples], pieces_s: Sequence[tuple[float, fl
             shifts.append(0)
             continue
         tail = result[-2 * half :]
-        shifts.append(_find_shift(tail, sound, start - half, reach))
+        area = _cut(sound, start - half - reach, start - half + reach + len(tail))
+        energies = np.convolve(np.square(area), np.ones(len(tail)), "valid")
+        likeness = np.correlate(area, tail, "valid")
+        likeness /= np.sqrt(np.maximum(energies, 1e-12) * max(float(tail @ tail), 1e-12))
+        likeness -= 1e-3 * np.abs(np.arange(-reach, reach + 1)) / max(reach, 1)  # of equals, the nearest
+        shifts.append(int(likeness.argmax()) - reach)
         start += shifts[-1]
         piece = _cut(sound, start - half, max(end, start + 1) + half)
         count = min(2 * half, len(tail), len(piece))
@@ -125,14 +128,3 @@ def _cut(sound: Samples, start: int, end: int) -> NDArray[np.float64]:
     """Return a part of a sound, with silence beyond its ends."""
     inside = sound[max(start, 0) : max(end, 0)].astype(float)
     return np.pad(inside, (max(-start, 0), max(end - max(start, 0) - len(inside), 0)))
-
-
-def _find_shift(tail: NDArray[np.float64], sound: Samples, start: int, reach: int) -> int:
-    """Return by how many samples later a piece begins so that its waveform is most like the end of the one before."""
-    area = _cut(sound, start - reach, start + reach + len(tail))
-    products = np.correlate(area, tail, "valid")
-    energies = np.convolve(np.square(area), np.ones(len(tail)), "valid")
-    likeness = products / np.sqrt(np.maximum(energies, 1e-12) * max(float(tail @ tail), 1e-12))
-    shifts = np.arange(-reach, reach + 1)
-    likeness -= 1e-3 * np.abs(shifts) / max(reach, 1)  # of equals, the nearest
-    return int(shifts[likeness.argmax()])

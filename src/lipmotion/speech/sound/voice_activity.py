@@ -36,8 +36,7 @@ LEVEL_STEP = 15 * DECIBEL
 PASSAGE_MARGIN = 75
 """Frames before and after the sound of a passage that belong to it, where they are not digital silence."""
 CUT_FROM, CUT_FRAMES, CUT_STEP = 6, 6, 6 * DECIBEL
-"""So many frames beside sound and more, a level that changes at once by the last of these, and for good, is of another
-recording."""
+"""So many frames and more beside sound, a level that changes at once by the last, for good, is of another recording."""
 LOCAL_FRAMES, LOCAL_DROP, SOFTEST_DROP = 301, 30 * DECIBEL, 42 * DECIBEL
 """Sound lies less than the second below the loudest within the first, and less than the third below all of it."""
 STEADY, STEADY_FRAMES = 10 * DECIBEL, 201
@@ -66,30 +65,18 @@ def find_sound(log_energy: NDArray[np.float32]) -> list[Stretch]:
     None is longer than ``LONGEST_FRAMES``. A recording of constant energy has none.
     """
     stretches: list[Stretch] = []
-    for first, end in find_sound_runs(find_loud_frames(log_energy), PAUSE_FRAMES):
+    for sound_first, sound_end in find_sound_runs(find_loud_frames(log_energy), PAUSE_FRAMES):
         earliest = stretches[-1].end if stretches else 0
-        stretch = Stretch(max(earliest, first - MARGIN_FRAMES), min(len(log_energy), end + MARGIN_FRAMES))
-        if (
-            stretches
-            and stretch.first - earliest <= JOINED_FRAMES
-            and stretch.end - stretches[-1].first <= LONGEST_FRAMES
-        ):
-            stretches[-1] = Stretch(stretches[-1].first, stretch.end)
-        else:
-            stretches += _cut(stretch, log_energy)
+        first, end = max(earliest, sound_first - MARGIN_FRAMES), min(len(log_energy), sound_end + MARGIN_FRAMES)
+        if stretches and first - earliest <= JOINED_FRAMES and end - stretches[-1].first <= LONGEST_FRAMES:
+            first = stretches.pop().first
+        while end - first > LONGEST_FRAMES:  # cut in the quietest frame of its second half
+            half = first + LONGEST_FRAMES // 2
+            cut = half + int(np.argmin(smooth_level(log_energy[half : first + LONGEST_FRAMES])))
+            stretches.append(Stretch(first, cut))
+            first = cut
+        stretches.append(Stretch(first, end))
     return stretches
-
-
-def _cut(stretch: Stretch, log_energy: NDArray[np.float32]) -> list[Stretch]:
-    """Return a stretch in pieces of at most ``LONGEST_FRAMES``, cut in the quietest frames of their second halves."""
-    first, end = stretch
-    pieces = []
-    while end - first > LONGEST_FRAMES:
-        half = first + LONGEST_FRAMES // 2
-        cut = half + int(np.argmin(smooth_level(log_energy[half : first + LONGEST_FRAMES])))
-        pieces.append(Stretch(first, cut))
-        first = cut
-    return [*pieces, Stretch(first, end)]
 
 
 def read_stretch(audio: Audio, stretch: Stretch) -> bytes:
@@ -106,8 +93,14 @@ def find_passages(log_energy: NDArray[np.float32]) -> list[Stretch]:
     passages: list[Stretch] = []
     floor = float(log_energy.max() + np.log(DYNAMIC_RANGE)) + 1e-3
     for region in _regions(log_energy):
-        found = find_sound_runs(find_loud_frames(log_energy[region.first : region.end]), SEPARATE_FRAMES)
-        runs = _joined([Stretch(region.first + first, region.first + end) for first, end in found])
+        runs: list[Stretch] = []
+        for first, end in find_sound_runs(find_loud_frames(log_energy[region.first : region.end]), SEPARATE_FRAMES):
+            run = Stretch(region.first + first, region.first + end)
+            short = runs and min(run.end - run.first, runs[-1].end - runs[-1].first) < SHORT_FRAMES
+            if short and run.first - runs[-1].end < NEAR_FRAMES:
+                runs[-1] = Stretch(runs[-1].first, run.end)
+            else:
+                runs.append(run)
         for number, run in enumerate(runs):
             before = (runs[number - 1].end + run.first + 1) // 2 if number else region.first
             after = (run.end + runs[number + 1].first + 1) // 2 if number + 1 < len(runs) else region.end
@@ -183,24 +176,11 @@ def _regions(log_energy: NDArray[np.float32]) -> list[Stretch]:
     return [Stretch(first, end) for first, end in pairwise(sorted(cuts))]
 
 
-def _joined(runs: list[Stretch]) -> list[Stretch]:
-    """Return runs of sound of which none is short, where a neighbour is near."""
-    joined: list[Stretch] = []
-    for run in runs:
-        short = joined and min(run.end - run.first, joined[-1].end - joined[-1].first) < SHORT_FRAMES
-        if short and run.first - joined[-1].end < NEAR_FRAMES:
-            joined[-1] = Stretch(joined[-1].first, run.end)
-        else:
-            joined.append(run)
-    return joined
-
-
 def fill_gaps(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the samples of a passage with noise in the digital silence between its words, as of a noise gate.
 
     samples, log_energy : as of ``find_passage_gain``: the samples are those of the passage
-    Where nothing is recorded, features are unlike those of any room: all else would look alike beside them, and every
-    voice like that of the training.
+    Features of nothing are unlike those of any room: beside them all voices would look like that of the training.
     """
     loud = float(average_power(log_energy).max())
     runs = find_sound_runs(log_energy < loud - GATED_DROP, 1)

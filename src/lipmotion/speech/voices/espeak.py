@@ -51,8 +51,7 @@ CLOSURE_SHARE = 0.03
 """Share of the largest sample that no sample of a closure exceeds: some variants have breath in it."""
 LONGEST_CLOSURE_S = 0.06
 LATE_L_S, L_SHARE = 0.045, 0.45
-"""An l that is reported so shortly before its end is late; it then gets this share of the vowel and l together, as in
-the project's own alignments."""
+"""An l that is reported so shortly before its end is late: it gets this share of vowel and l, as in our alignments."""
 
 Starts = Sequence[tuple[str, float]]
 
@@ -60,10 +59,11 @@ Starts = Sequence[tuple[str, float]]
 def correct_times(starts: Starts, audio: Audio, phone_map: PhoneMap = ESPEAK_PHONES) -> Timeline[str]:
     """Return phones in time: each from its corrected start to that of the next, or to the end of the sound."""
     labels = [label for label, _ in starts]
+    names = [(phone_map.get(label) or ("",))[-1] for label in labels]  # the last phone; empty: part of another, unknown
     edges_s = [*(start_s for _, start_s in starts), audio.duration_s]
     closed = np.abs(audio.samples) < CLOSURE_SHARE * np.abs(audio.samples).max(initial=0)
     for index in range(1, len(labels)):
-        before, here = _phone(labels[index - 1], phone_map), _phone(labels[index], phone_map)
+        before, here = names[index - 1 : index + 1]
         if here in CLOSING and before != SILENCE:
             burst = round(edges_s[index] * audio.rate_hz)
             first = max(burst - round(LONGEST_CLOSURE_S * audio.rate_hz), 0)
@@ -75,11 +75,6 @@ def correct_times(starts: Starts, audio: Audio, phone_map: PhoneMap = ESPEAK_PHO
             edges_s[index] = min(edges_s[index], edges_s[index + 1] - L_SHARE * length_s)
     spans = zip(edges_s, edges_s[1:], labels, strict=False)
     return Timeline(tuple(Span(start_s, max(start_s, end_s), label) for start_s, end_s, label in spans))
-
-
-def _phone(label: str, phone_map: PhoneMap) -> str:
-    """Return the last phone of a label; empty for a label that is part of another phone or unknown."""
-    return (phone_map.get(label) or ("",))[-1]
 
 
 LOG = logging.getLogger("lipmotion")
@@ -117,9 +112,7 @@ def _library() -> dict[str, str]:
 def _data() -> Path | None:
     """Return the folder of languages and variants; None: espeak-ng is not installed."""
     folder = find_wheel()
-    if folder is not None:
-        return folder / DATA
-    return _find_system_data(shutil.which("espeak-ng"))
+    return folder / DATA if folder else _find_system_data(shutil.which("espeak-ng"))
 
 
 @cache
@@ -136,19 +129,14 @@ def _find_system_data(program: str | None) -> Path | None:
 
 def _voices() -> tuple[SyntheticVoice, ...]:
     data = _data()
-    if data is None:
-        return ()
-    variants = [name for name in VARIANTS if (data / "voices" / "!v" / name).is_file()]
+    variants = [name for name in VARIANTS if data and (data / "voices" / "!v" / name).is_file()]
     return tuple(SyntheticVoice(f"{LANGUAGE}+{name}", "espeak-ng", f"espeak-{name}") for name in variants)
 
 
 def _others() -> tuple[SyntheticVoice, ...]:
     """Return a voice of every language; its name and ``+`` and one of ``VARIANTS`` name a voice, too."""
-    data = _data()
-    if data is None:
-        return ()
-    names = set()
-    for path in (data / "lang").rglob("*"):
+    data, names = _data(), set[str]()
+    for path in (data / "lang").rglob("*") if data else ():
         if path.is_file() and path.stat().st_size <= LARGEST_VOICE_BYTES:
             lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
             names |= {line.split()[1].lower() for line in lines if line.startswith("language ") and line.split()[1:]}
@@ -171,22 +159,6 @@ def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[Synt
         words = _spell_words(phones, [place for _, _, place in said], text)
         yield SynthesisedSentence(audio, phones, path, words, phone_map)
         path.unlink()
-
-
-def pronounce_words(words: Sequence[str], voice: str) -> list[str]:
-    """Return the phones of each word in IPA, divided by ``|`` and blanks, with marks of stress and language (``(en)``).
-
-    voice : of ``ESPEAK_NG.others()``
-    Raises MissingDependencyError: espeak-ng is not installed, or does not know the language.
-    Raises InputError: it fails.
-    """
-    if voice not in [each.name for each in _others()]:
-        raise MissingDependencyError(f"espeak-ng is not installed, or has no {voice}: {install_command(EXTRA)}")
-    task = {"voice": voice, "words": list(words)} | _library()
-    found = _answer(run_program(PROGRAM, PACKAGE, len(words), json.dumps(task)))
-    if not isinstance(found, list) or len(found) != len(words):
-        raise InputError(f"espeak-ng's library answers {str(found)[:40]!r}; install it again: {PACKAGE}")
-    return [str(phones) for phones in found]
 
 
 def _spell_words(phones: Timeline[str], places: Sequence[int], text: str) -> Timeline[str]:
@@ -255,18 +227,20 @@ def _pronounce(words: Sequence[str], language: str) -> dict[str, tuple[Pronuncia
                 f"as it is spoken ({' or '.join(spoken.scripts).lower()} letters), add it to a lexicon file, or give "
                 "another language"
             )
-    try:
-        said = zip(words, pronounce_words(words, spoken.voice or language), strict=True)
-        found: dict[str, tuple[Pronunciation, ...]] = {
-            word: (tuple(phone for label in re.split(r"[|\s]+", ipa) for phone in read_ipa(label)[0]),)
-            for word, ipa in said
-        }
-    except MissingDependencyError as error:
+    voice = spoken.voice or language
+    if voice not in [each.name for each in _others()]:
         raise MissingDependencyError(
             f"no pronunciation of {shorten(repr(words[0]))} in {spoken.name}: install espeak-ng "
             f"({install_command(EXTRA)}), or give a lexicon file with its {len(words)} words"
-        ) from error
-    silent = next((word for word, (phones,) in found.items() if not phones), None)
-    if silent is not None:
-        raise InputError(f"{shorten(repr(silent))} has no phone in {spoken.name}; add it to a lexicon file")
-    return found
+        )
+    task = {"voice": voice, "words": list(words)} | _library()
+    answers = _answer(run_program(PROGRAM, PACKAGE, len(words), json.dumps(task)))
+    if not isinstance(answers, list) or len(answers) != len(words):
+        raise InputError(f"espeak-ng's library answers {str(answers)[:40]!r}; install it again: {PACKAGE}")
+    pronounced: dict[str, tuple[Pronunciation, ...]] = {}
+    for word, ipa in zip(words, answers, strict=True):
+        phones = tuple(phone for label in re.split(r"[|\s]+", str(ipa)) for phone in read_ipa(label)[0])
+        if not phones:
+            raise InputError(f"{shorten(repr(word))} has no phone in {spoken.name}; add it to a lexicon file")
+        pronounced[word] = (phones,)
+    return pronounced

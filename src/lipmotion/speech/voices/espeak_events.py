@@ -5,8 +5,7 @@ paths of the library and of the folder that holds ``espeak-ng-data``. It writes 
 for every text as JSON, and the sound of text n to ``folder/n.wav``. A label is espeak-ng's mnemonic, or with ``"ipa"``
 the phone in the International Phonetic Alphabet; ``place`` is where the written word begins in the text, in characters.
 With ``"words"`` instead of texts, it writes a list of the phones of each in IPA, divided by ``|`` and blanks; nothing
-is spoken. Without ``"voice"`` it writes ``{"version", "data"}``: what is installed. It imports nothing of this package,
-so that it starts fast.
+is spoken. Without ``"voice"`` it writes what is installed, ``{"version", "data"}``. To start fast it imports nothing.
 """
 
 from __future__ import annotations
@@ -131,9 +130,8 @@ def main() -> None:
         json.dump({"version": version.decode(), "data": os.path.realpath((found.value or b"").decode())}, sys.stdout)
         return
     voice = task["voice"].encode()
-    if library.espeak_SetVoiceByName(voice) and library.espeak_SetVoiceByProperties(
-        ctypes.byref(_Voice(languages=voice))
-    ):
+    properties = ctypes.byref(_Voice(languages=voice))
+    if library.espeak_SetVoiceByName(voice) and library.espeak_SetVoiceByProperties(properties):
         sys.exit(f"no voice {task['voice']!r}")
     if "words" in task:
         json.dump([_pronounce(library, word) for word in task["words"]], sys.stdout)

@@ -7,9 +7,8 @@ import re
 import shutil
 import wave
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import closing
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from lipmotion.errors import InputError, LipMotionError, MissingDependencyError, shorten
 from lipmotion.extensions import install_command
@@ -131,8 +130,7 @@ DEFAULT_VOICES = (("espeak-ng", "en-us+f2"), ("flite", "slt"))
 """Synthesiser and name of the voices that speak where none is asked for: that of the Python package first."""
 
 
-@dataclass(frozen=True, eq=False)
-class VoicedSentence:
+class VoicedSentence(NamedTuple):
     """A sentence that a voice has said.
 
     audio : the sound at 16 kHz
@@ -184,31 +182,29 @@ def find_voice(name: str) -> SyntheticVoice:
 
     name : ``SYNTHESISER:VOICE``, as in ``flite:slt`` or ``espeak-ng:de``; or the voice's name alone, where only one
            synthesiser has it. A language of espeak-ng may be followed by a variant: ``espeak-ng:de+f3``.
-    Raises MissingDependencyError: no synthesiser is installed, or not that one. Raises InputError: no such voice, or
-    several.
+    Raises MissingDependencyError: no synthesiser, or not that one, is installed. Raises InputError: none, or several.
     """
     maker, colon, rest = name.rpartition(":")
     if colon and maker not in SYNTHESISERS:
         raise InputError(f"unknown synthesiser {shorten(maker)!r}; required one of: {', '.join(SYNTHESISERS)}")
-    asked = [SYNTHESISERS[maker]] if colon else [each for each in SYNTHESISERS.values() if _works(each)]
-    if not colon and not any(synthesiser.voices() for synthesiser in asked):
+    synthesisers = [SYNTHESISERS[maker]] if colon else [each for each in SYNTHESISERS.values() if _works(each)]
+    if not colon and not any(synthesiser.voices() for synthesiser in synthesisers):
         raise explain_missing()
-    found = []
-    for synthesiser in asked:
+    matches = []
+    for synthesiser in synthesisers:
         listed = {voice.name: voice for voice in (*synthesiser.others(), *synthesiser.voices())}
         if rest in listed:
-            found.append(listed[rest])
+            matches.append(listed[rest])
         elif listed and _is_other(rest, synthesiser):
-            language = rest.partition("+")[0]
-            found.append(SyntheticVoice(rest, synthesiser.name, f"espeak-{rest}", language))
+            matches.append(SyntheticVoice(rest, synthesiser.name, f"espeak-{rest}", rest.partition("+")[0]))
         elif colon and not listed:
             raise MissingDependencyError(f"{maker} is not installed: {explain_install(synthesiser)}")
-    if len(found) == 1:
-        return found[0]
-    if found:
-        names = ", ".join(f"{voice.synthesiser}:{voice.name}" for voice in found)
+    if not matches:
+        raise InputError(f"no voice {shorten(name)!r} is installed; lipmotion speak --voices lists those that are")
+    if len(matches) > 1:
+        names = ", ".join(voice.full_name for voice in matches)
         raise InputError(f"several voices are called {name!r}; give one of: {names}")
-    raise InputError(f"no voice {shorten(name)!r} is installed; lipmotion speak --voices lists those that are")
+    return matches[0]
 
 
 def choose_voice() -> SyntheticVoice:
@@ -236,22 +232,13 @@ def explain_missing() -> MissingDependencyError:
 
 def speak_sentences(
     texts: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None = None
-) -> Generator[tuple[Audio, Timeline[Unit]], None, None]:
+) -> Generator[VoicedSentence, None, None]:
     """Yield sentences in a voice, each with its phones in time, from 0 s to its end; one run makes all where it can.
 
     lexicon : its pronunciations tell which vowels are unstressed; the built-in one by default
     Raises MissingDependencyError: the synthesiser is not installed (the message names the package).
     Raises InputError: no such synthesiser or voice, a text without a word, or one that the synthesiser cannot say.
     """
-    with closing(voice_sentences(texts, voice, lexicon)) as sentences:
-        for sentence in sentences:
-            yield sentence.audio, sentence.units
-
-
-def voice_sentences(
-    texts: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None = None
-) -> Generator[VoicedSentence, None, None]:
-    """Yield several sentences in a voice, as ``speak_sentences``, each with the sound at the synthesiser's own rate."""
     synthesiser = SYNTHESISERS.get(voice.synthesiser)
     if synthesiser is None:
         raise InputError(f"unknown synthesiser {voice.synthesiser!r}; required one of: {', '.join(SYNTHESISERS)}")
@@ -263,7 +250,7 @@ def voice_sentences(
     if voice.name not in names and not _is_other(voice.name, synthesiser):
         raise InputError(f"{synthesiser.name} has no voice {voice.name!r} here; it has: {', '.join(names)}")
     words = [split_words(text) for text in texts]
-    known = (lexicon or Lexicon()) if voice.is_english else None
+    known = (lexicon or Lexicon()) if voice.language.partition("-")[0] == "en" else None
     with open_temporary() as folder:
         plain = [" ".join(text.split()) for text in texts]
         sentences = synthesiser.synthesise(voice.name, plain, folder) if plain else iter(())

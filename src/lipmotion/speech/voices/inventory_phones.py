@@ -17,8 +17,7 @@ from lipmotion.units.phones import REDUCED_VOWELS, SHORT_PAUSE_S
 from lipmotion.units.spelling import normalise_text
 
 GAP_COST, OWN_FORM_COST, OWN_KIND_COST, OTHER_KIND_COST = 0.7, 0.3, 0.8, 1.5
-"""Costs of matching a phone with none, with a form of itself, with another of its kind (vowel or consonant), and with
-one of the other kind."""
+"""Costs of matching a phone with none, a form of itself, another of its kind (vowel, consonant), and the other kind."""
 VOWELS = list_phone_classes()["vowel"]
 WRITTEN_EDGES = re.compile(r"^[^\w]+|[^\w]+$")
 """Punctuation at the ends of a written word."""
@@ -43,15 +42,13 @@ def convert_phones(
     said: list[tuple[str, float, float]] = []
     for span in labels:
         if span.label not in phone_map:
-            raise InputError(
-                f"the synthesiser says {span.label!r}, which is no phone; known are: {' '.join(phone_map)}"
-            )
+            raise InputError(f"the synthesiser says {span.label!r}, which is no phone; known: {' '.join(phone_map)}")
         names = phone_map[span.label]
         if not names and said:
             said[-1] = (*said[-1][:2], span.end_s)
         each_s = span.duration_s / max(len(names), 1)
         said += [(phone, span.start_s + i * each_s, span.start_s + (i + 1) * each_s) for i, phone in enumerate(names)]
-    phones = _join(_cover([(phone, start, end) for phone, start, end in said if end > start], duration_s))
+    phones = _cover([(phone, start, end) for phone, start, end in said if end > start], duration_s)
     spoken = [phone for phone in phones if not is_silent(phone[0])]
     if not spoken:
         raise InputError("the synthesiser says no phone; give another text")
@@ -72,8 +69,7 @@ def convert_phones(
 def with_words(phones: Sequence[str], words: Sequence[str], lexicon: Lexicon) -> list[Unit]:
     """Return phones with their words; AH, ER and IH are reduced where the dictionary reduces them.
 
-    Both follow from the cheapest match with the words' first pronunciations; a phone that matches none belongs to the
-    word before it.
+    Both follow from the cheapest match with the words' first pronunciations; other phones belong to the word before.
     """
     expected = [(phone, number) for number, word in enumerate(words) for phone in _pronunciation(word, lexicon)]
     units, number = [], expected[0][1] if expected else 0
@@ -146,20 +142,14 @@ def _cost(phone: str, other: str) -> float:
 
 
 def _cover(phones: Phones, duration_s: float) -> list[tuple[str, float, float]]:
-    """Return phones with silence where none was, cut at the end of the sound."""
+    """Return phones with silence where none was, cut at the end of the sound; neighbouring silences are one."""
     covered: list[tuple[str, float, float]] = []
     now = 0.0
-    for phone, start, end in phones:
-        covered += [(SILENCE, now, min(start, duration_s)), (phone, start, min(end, duration_s))]
+    for phone, start, end in [*phones, (SILENCE, duration_s, duration_s)]:
+        for name, first, last in ((SILENCE, now, min(start, duration_s)), (phone, start, min(end, duration_s))):
+            if last > first and is_silent(name) and covered and covered[-1][0] == SILENCE:
+                covered[-1] = (SILENCE, covered[-1][1], last)
+            elif last > first:
+                covered.append((SILENCE if is_silent(name) else name, first, last))
         now = min(end, duration_s)
-    covered.append((SILENCE, now, duration_s))
-    return [(phone, start, end) for phone, start, end in covered if end > start]
-
-
-def _join(phones: Phones) -> list[tuple[str, float, float]]:
-    """Return phones in which neighbouring silences are one."""
-    joined: list[tuple[str, float, float]] = []
-    for silent, run in groupby(phones, key=lambda phone: is_silent(phone[0])):
-        part = list(run)
-        joined += [(SILENCE, part[0][1], part[-1][2])] if silent else part
-    return joined
+    return covered

@@ -10,7 +10,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -43,9 +43,7 @@ _ESPEAK: dict[str, str] = {
     # parts of what is before: the glide from a vowel to the next, the beginning of an unstressed vowel
     "; @-": "",
 }  # fmt: skip
-ESPEAK_PHONES: PhoneMap = {
-    label: tuple(phones.split()) for labels, phones in _ESPEAK.items() for label in labels.split()
-}
+ESPEAK_PHONES: PhoneMap = {name: tuple(phones.split()) for names, phones in _ESPEAK.items() for name in names.split()}
 """espeak-ng's mnemonics (as ``espeak-ng -x`` writes them), voice en-us."""
 
 
@@ -88,11 +86,6 @@ class SyntheticVoice:
     def full_name(self) -> str:
         """The name by which people ask for it: ``espeak-ng:en-us+f2``."""
         return f"{self.synthesiser}:{self.name}"
-
-    @property
-    def is_english(self) -> bool:
-        """Whether it speaks English, so that the dictionary knows its words."""
-        return self.language.partition("-")[0] == "en"
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,8 +146,7 @@ def run_program(
     """Return the standard output of a program. When it has ended, in whatever way, so have the programs it started.
 
     sentences : how many it synthesises, which sets its limits
-    Raises MissingDependencyError: there is no such program. Raises InputError: it fails, takes too long, or prints or
-    writes too much.
+    Raises MissingDependencyError: no such program. Raises InputError: it fails, takes too long, or writes too much.
     """
     program = shutil.which(command[0])
     if program is None:
@@ -164,14 +156,22 @@ def run_program(
         with tempfile.TemporaryFile() as task, tempfile.TemporaryFile() as printed, tempfile.TemporaryFile() as errors:
             task.write(given.encode())
             task.seek(0)
-            with _started([program, *command[1:]], task, printed, errors) as process:
-                _wait(process, name, sentences, lambda: (_size(printed) + _size(errors), _written(folder)))
+            process = subprocess.Popen(
+                [program, *command[1:]], stdin=task, stdout=printed, stderr=errors, start_new_session=True
+            )
+            try:
+                _wait(process, name, sentences, (printed, errors), folder)
+            finally:
+                if sys.platform == "win32":
+                    process.kill()
+                else:
+                    with suppress(OSError):  # all have ended
+                        os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
             if process.returncode:
                 errors.seek(0)
-                message = (
-                    " ".join(errors.read(4 * SHOWN_CHARACTERS).decode(errors="replace").split())[:SHOWN_CHARACTERS]
-                    or "no message"
-                )
+                message = " ".join(errors.read(4 * SHOWN_CHARACTERS).decode(errors="replace").split())
+                message = message[:SHOWN_CHARACTERS] or "no message"
                 raise InputError(f"{name} failed with {process.returncode} ({message}); try another text or voice")
             printed.seek(0)
             return printed.read().decode().replace("\r\n", "\n")
@@ -179,49 +179,27 @@ def run_program(
         raise InputError(f"{name} cannot be run ({error}); install it again: apt install {package}") from error
 
 
-@contextmanager
-def _started(
-    command: Sequence[str], given: IO[bytes], printed: IO[bytes], errors: IO[bytes]
-) -> Iterator[subprocess.Popen[bytes]]:
-    """Give a program that runs in a group of its own; at the end it is killed, with all that it started."""
-    process = subprocess.Popen(command, stdin=given, stdout=printed, stderr=errors, start_new_session=True)
-    try:
-        yield process
-    finally:
-        if sys.platform == "win32":
-            process.kill()
-        else:
-            with suppress(OSError):  # all have ended
-                os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-
-
-def _wait(process: subprocess.Popen[bytes], name: str, sentences: int, sizes: Callable[[], tuple[int, int]]) -> None:
-    limit_s, largest = START_S + EACH_S * sentences, LARGEST_SOUND_BYTES * sentences
-    start = moved = time.monotonic()
+def _wait(
+    process: subprocess.Popen[bytes], name: str, sentences: int, outputs: Sequence[IO[bytes]], folder: Path | None
+) -> None:
+    """Wait until a program ends. Raises InputError: it takes too long, or prints or writes too much."""
+    limit_s, max_written = START_S + EACH_S * sentences, LARGEST_SOUND_BYTES * sentences
+    start = changed = time.monotonic()
     before = 0, 0
     running = True
     while running:
         with suppress(subprocess.TimeoutExpired):
             process.wait(POLL_S)
             running = False
-        now, sized = time.monotonic(), sizes()
-        moved, before = (moved if sized == before else now), sized
-        if sized[0] > LARGEST_OUTPUT_BYTES:
+        printed, written = sum(os.fstat(file.fileno()).st_size for file in outputs), 0
+        with suppress(OSError):  # the program removes what it wrote
+            for path in folder.iterdir() if folder else ():
+                written += path.lstat().st_size
+        now = time.monotonic()
+        changed, before = (changed if before == (printed, written) else now), (printed, written)
+        if printed > LARGEST_OUTPUT_BYTES:
             raise InputError(f"{name} prints more than {LARGEST_OUTPUT_BYTES} bytes; try another text or voice")
-        if sized[1] > largest:
-            raise InputError(f"{name} writes more than {largest} bytes; try another text or voice")
-        if running and (now - start > limit_s or now - moved > STILL_S):
+        if written > max_written:
+            raise InputError(f"{name} writes more than {max_written} bytes; try another text or voice")
+        if running and (now - start > limit_s or now - changed > STILL_S):
             raise InputError(f"{name} did not end within {now - start:.0f} s; give shorter or fewer texts")
-
-
-def _size(file: IO[bytes]) -> int:
-    return os.fstat(file.fileno()).st_size
-
-
-def _written(folder: Path | None) -> int:
-    total = 0
-    with suppress(OSError):  # the program removes what it wrote
-        for path in folder.iterdir() if folder else ():
-            total += path.lstat().st_size
-    return total

@@ -23,19 +23,22 @@ from engines.coupled.tiny import (
 )
 from lipmotion import engines, errors
 from lipmotion.engines import engine_named
-from lipmotion.engines.coupled.chains import densities, model
 from lipmotion.engines.coupled.chains.densities import MIN_COMPONENT_FRAMES, AudioVisualObservations, reestimate_group
 from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
-from lipmotion.engines.coupled.chains.structures import list_unit_sets
-from lipmotion.engines.coupled.conversion.em_conversion import EXACT, VITERBI, ConversionSettings, convert
-from lipmotion.engines.coupled.training import alignment, chain_training
-from lipmotion.engines.coupled.training import chain_training as em_steps
-from lipmotion.engines.coupled.training.alignment import AlignedUtterance
+from lipmotion.engines.coupled.chains.model import Chains, speech_observations
+from lipmotion.engines.coupled.chains.product import list_unit_sets
+from lipmotion.engines.coupled.conversion import EXACT, VITERBI, convert
 from lipmotion.engines.coupled.training.chain_training import (
     CONVERGENCE_GAIN,
-    MixtureSchedule,
+    AlignedUtterance,
+    LatticeUtterance,
     build_lattice_utterance,
+    compute_variance_floors,
+    count_components,
+    e_step,
     grow_chains,
+    mark_allowed_units,
+    split_evenly,
 )
 from lipmotion.engines.coupled.training.coupled_training import train_on_speech
 from lipmotion.measures.curves import correlate_pooled
@@ -49,7 +52,7 @@ from oracles.paths import posteriors
 PHONES = ("p", "uw", "aa", "b", "aa", "uw")
 
 
-def sentences(count=6, frames_each=9, seed=0) -> list[alignment.AlignedUtterance]:
+def sentences(count=6, frames_each=9, seed=0) -> list[AlignedUtterance]:
     """Speech and motion for the phones, motion a little ahead."""
     made = []
     for number in range(count):
@@ -62,8 +65,15 @@ def sentences(count=6, frames_each=9, seed=0) -> list[alignment.AlignedUtterance
         speech = draw.normal(0, 0.4, (len(index), 2)) + np.stack([index == 0, index == 1], axis=1) * 2
         seen = draw.normal(0, 0.3, (len(index), 1)) + (early == THREE.units.index("closed"))[:, None] * 2
         streams = AudioVisualObservations((speech.astype(np.float32), seen.astype(np.float32)), (None, None))
-        made.append(alignment.AlignedUtterance(streams, Timeline(spans)))
+        made.append(AlignedUtterance(streams, Timeline(spans)))
     return made
+
+
+class Steps(list[tuple[tuple[int, ...], float]]):
+    """The numbers of components, and the mean log likelihood, of every step of EM."""
+
+    def __call__(self, _: int, chains: Any, statistics: Any) -> None:
+        self.append((count_components(chains), statistics.mean_log_likelihood))
 
 
 @pytest.mark.parametrize(
@@ -72,24 +82,23 @@ def sentences(count=6, frames_each=9, seed=0) -> list[alignment.AlignedUtterance
      (MULTISTREAM, (THREE,), 1), (HMM, (THREE,), 1)],
 )  # fmt: skip
 def test_the_likelihood_rises_at_every_step(kind, sets, limit):
-    steps = []
-    how = MixtureSchedule((4,) if kind == HMM else (4, 2), (1.0, 1.0), most_steps=8)
-    of = structure(kind, sets, states=3, limit=limit)
-    *_, grown = grow_chains(of, ("speech", "seen"), sentences(), how, steps.append)
-    assert grown.converged is bool(steps[-1].log_likelihood - steps[-2].log_likelihood < CONVERGENCE_GAIN)
-    assert {step.mixtures[0] for step in steps} == {1, 2, 4}
+    steps = Steps()
+    of, mixtures = structure(kind, sets, states=3, limit=limit), (4,) if kind == HMM else (4, 2)
+    *_, grown = grow_chains(of, ("speech", "seen"), sentences(), mixtures, (1.0, 1.0), steps)
+    assert grown.converged is bool(steps[-1][1] - steps[-2][1] < CONVERGENCE_GAIN)
+    assert {mixtures[0] for mixtures, _ in steps} == {1, 2, 4}
     if limit is None:
         assert len(grown.model.transitions.own_density_states) > 5
-    for one, other in pairwise(steps):
-        if one.mixtures == other.mixtures:
-            assert other.log_likelihood >= one.log_likelihood - 1e-5
+    for (one, before), (other, after) in pairwise(steps):
+        if one == other:
+            assert after >= before - 1e-5
 
 
 def test_densities_are_weighted_means_and_variances():
     """Eqs. A.12 to A.15 of Xie & Liu 2007, by enumeration of paths and components."""
     model = chains()
     data = [observations(4, seed=1), observations(4, seed=2)]
-    statistics = em_steps.e_step(model, [em_steps.LatticeUtterance(one, model.full_lattice) for one in data])
+    statistics = e_step(model, [LatticeUtterance(one, model.full_lattice) for one in data])
     joints = [oracle.posteriors(model, one)[0] for one in data]
     compared = 0
     for stream, (group, own) in enumerate(zip(model.groups, statistics.emissions, strict=True)):
@@ -120,7 +129,7 @@ def test_no_recording_has_a_path_and_options_that_cannot_be():
     model = chains()
     lattice = replace(model.full_lattice, allowed_units=np.zeros((3, 3), bool))
     with pytest.raises(errors.InputError, match="labels"):
-        em_steps.e_step(model, [em_steps.LatticeUtterance(observations(3), lattice)])
+        e_step(model, [LatticeUtterance(observations(3), lattice)])
     for options in ({"mixtures": 3}, {"asynchrony": -2}, {"structure": "ring"}, {"audio_weight": -1.0}):
         with pytest.raises(errors.InputError):
             engines.engine_named("coupled", options)
@@ -129,7 +138,7 @@ def test_no_recording_has_a_path_and_options_that_cannot_be():
 def test_allowed_units_are_those_of_labels_near_a_frame():
     of = structure()
     phones = Timeline((Span(0.0, 0.2, Unit("p")), Span(0.2, 0.4, Unit("aa"))))
-    allowed = alignment.mark_allowed_units(of, phones, 60)
+    allowed = mark_allowed_units(of, phones, 60)
     closed, opened = of.units[0].index("closed"), of.units[0].index("open")
     assert allowed[:25, closed].all()
     assert not allowed[26:34, closed].any()
@@ -142,7 +151,7 @@ def test_allowed_units_are_those_of_labels_near_a_frame():
 def test_labels_are_divided_into_equal_parts():
     of = structure(states=3)
     product = chains(of).transitions.product
-    path = alignment.split_evenly(product, Timeline((Span(0.0, 0.06, Unit("uw")), Span(0.06, 0.09, Unit("p")))), 9)
+    path = split_evenly(product, Timeline((Span(0.0, 0.06, Unit("uw")), Span(0.06, 0.09, Unit("p")))), 9)
     states = [product.joint_states[s].states for s in path]
     assert states == [(0, 0), (0, 0), (1, 1), (1, 1), (2, 2), (2, 2), (0, 0), (1, 1), (2, 2)]
 
@@ -151,7 +160,7 @@ def test_floors_are_of_observed_frames():
     seen = np.arange(40) < 20
     values = np.where(seen, np.tile([0.0, 2.0], 20), 1e6)[:, None].astype(np.float32)
     data = AudioVisualObservations((np.zeros((40, 2), np.float32), values), (None, seen))
-    assert em_steps.compute_variance_floors([data])[1] == pytest.approx(0.01)
+    assert compute_variance_floors([data])[1] == pytest.approx(0.01)
 
 
 def test_frames_away_from_speech_are_silence():
@@ -232,8 +241,7 @@ def second_stage(mixtures: int, steps: int, weight: float) -> Any:
 def trained(kind: str = "coupled", mixtures: int = 2) -> Any:
     of = structure(kind, list_unit_sets(STRUCTURES[kind]))
     groups = 1 if kind == "hmm" else 2
-    how = chain_training.MixtureSchedule((mixtures, 1)[:groups], (1.0, 1.0))
-    *_, grown = chain_training.grow_chains(of, ("speech", "lips"), aligned(examples(4)), how)
+    *_, grown = grow_chains(of, ("speech", "lips"), aligned(examples(4)), (mixtures, 1)[:groups], (1.0, 1.0))
     return grown.model
 
 
@@ -269,7 +277,7 @@ def speech_posteriors(chains: Any, one: AlignedUtterance) -> np.ndarray:
 
     Its states are the joint ones, its emissions those of speech, its moves the coupled ones.
     """
-    lattice, mixtures = em_steps.build_lattice_utterance(chains, one).lattice, chains.groups[0].mixtures
+    lattice, mixtures = build_lattice_utterance(chains, one).lattice, chains.groups[0].mixtures
     x, product = one.observations.streams[0], chains.transitions.product
     log = np.full((len(x), len(mixtures.means)), -np.inf)
     for frame, density in np.ndindex(log.shape):
@@ -311,10 +319,10 @@ def learned(before: Any, density: int, gamma: np.ndarray, x: np.ndarray, floor: 
 def test_a_step_is_that_of_the_split_model() -> None:
     """Speech of the first stage and of other speakers: the same utterance, with weights 1 and 49."""
     chains, own = trained(), three_frames()
-    other = replace(own, observations=own.observations.without_stream(1))
+    other = replace(own, observations=own.observations.without_visual_streams())
     found = train_on_speech(chains, [own], [other], second_stage(2, 1, 49.0)).groups[0].mixtures
     gamma, x = 50 * speech_posteriors(chains, own), own.observations.streams[0]
-    before, (floor, _) = chains.groups[0].mixtures, em_steps.compute_variance_floors([own.observations])
+    before, (floor, _) = chains.groups[0].mixtures, compute_variance_floors([own.observations])
     visited = np.flatnonzero(gamma.sum(axis=0) >= 3)
     assert len(visited) >= 3
     for density in visited:
@@ -329,15 +337,15 @@ def test_a_step_is_that_of_the_split_model() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("kind", ["hmm", "coupled"])
 def test_every_step_raises_the_likelihood(kind: str) -> None:
-    steps: list[chain_training.TrainingStep] = []
+    steps = Steps()
     own, others = aligned(examples(4)), speech_alone(examples(4, seed=9))
-    train_on_speech(trained(kind), own, others, second_stage(4, 6, 0.5), steps.append)
-    for _, run in groupby(steps, lambda step: step.mixtures):
-        figures = [step.log_likelihood for step in run]
+    train_on_speech(trained(kind), own, others, second_stage(4, 6, 0.5), steps)
+    for _, run in groupby(steps, lambda step: step[0]):
+        figures = [log_likelihood for _, log_likelihood in run]
         assert len(figures) > 2
         assert np.diff(figures).min() > -1e-3
         assert figures[1] > figures[0] + 0.1
-    assert {step.mixtures[0] for step in steps} == ({2} if kind == "hmm" else {2, 4})
+    assert {mixtures[0] for mixtures, _ in steps} == ({2} if kind == "hmm" else {2, 4})
 
 
 @pytest.mark.parametrize("kind", ["coupled", pytest.param("multistream", marks=pytest.mark.long)])
@@ -355,8 +363,8 @@ def test_visual_densities_and_transitions_stay(kind: str) -> None:
 
 def test_a_weight_is_how_often_an_utterance_counts() -> None:
     chains, (one,) = trained(), aligned(examples(1))
-    twice = em_steps.e_step(chains, [em_steps.build_lattice_utterance(chains, one)] * 2)
-    heavy = em_steps.e_step(chains, [em_steps.build_lattice_utterance(chains, one, 2.0)])
+    twice = e_step(chains, [build_lattice_utterance(chains, one)] * 2)
+    heavy = e_step(chains, [build_lattice_utterance(chains, one, 2.0)])
     assert heavy.frames == twice.frames
     assert heavy.log_likelihood == pytest.approx(twice.log_likelihood)
     assert heavy.transition_counts == pytest.approx(twice.transition_counts, abs=1e-5)
@@ -392,9 +400,8 @@ def right(engine: Any, model: Any, sentence: Example) -> tuple[float, float]:
     """Return the correlation of the opening with the original's, of unknown words, and of speech frames right."""
     spoken = replace(sentence.speech, units_known=False)
     generated = engine.generate(model, spoken).motion["opening"]
-    observations = model.speech_observations(spoken)
     chains = model.chains
-    found = chains.posteriors(chains.emission_log_densities(observations, chains.full_lattice), chains.full_lattice)
+    found = chains.infer(speech_observations(spoken, model.visual), chains.full_lattice).posteriors
     states = found.chains[0].argmax(axis=1) // chains.structure.states
     labels = [
         (chains.structure.units[0].index(span.label.phone), frame)
@@ -438,22 +445,22 @@ def lagged(count: int, lag: int, seed: int) -> list[AlignedUtterance]:
         speech = 3 * np.stack([np.cos(state * 2 * np.pi / 9), np.sin(state * 2 * np.pi / 9)], axis=1)
         noisy = (values + draw.normal(0, size, values.shape) for values, size in ((speech, 0.6), (lips, 0.3)))
         streams = tuple(values.astype(np.float32) for values in noisy)
-        made.append(AlignedUtterance(densities.AudioVisualObservations(streams, (None, None)), Timeline(tuple(spans))))
+        made.append(AlignedUtterance(AudioVisualObservations(streams, (None, None)), Timeline(tuple(spans))))
     return made
 
 
 @cache
-def trained_on(lag: int, kind: str, limit: int | None = 1, **more: object) -> tuple[model.Chains, float]:
+def trained_on(lag: int, kind: str, limit: int | None = 1, **more: object) -> tuple[Chains, float]:
     """Return chains, and the correlation of the lips that they make from speech alone, as the paper converts."""
     of = structure(kind, (THREE,) if kind == MULTISTREAM else (THREE, THREE), STATES, limit, **more)
-    *_, grown = grow_chains(of, ("speech", "seen"), lagged(20, lag, 0), MixtureSchedule((1, 1), (1.0, 1.0)))
-    how, held_out, full = ConversionSettings(VITERBI, EXACT, 5), lagged(8, lag, 1), grown.model.full_lattice
-    lips = [convert(grown.model, one.observations, full, how).streams[1] for one in held_out]
+    *_, grown = grow_chains(of, ("speech", "seen"), lagged(20, lag, 0), (1, 1), (1.0, 1.0))
+    held_out, full = lagged(8, lag, 1), grown.model.full_lattice
+    lips = [convert(grown.model, one.observations, full, VITERBI, EXACT, 5)[0][0] for one in held_out]
     recorded = [one.observations.streams[1].astype(float) for one in held_out]
     return grown.model, float(correlate_pooled(lips, recorded).mean())
 
 
-def lead_shares(chains: model.Chains, lag: int) -> np.ndarray:
+def lead_shares(chains: Chains, lag: int) -> np.ndarray:
     """Return the shares of frames in which the lips are a state behind, in step and a state ahead, by both streams."""
     shares = np.zeros(3)
     for one in lagged(20, lag, 0):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,17 +29,15 @@ class AudioVisualObservations:
         """T."""
         return len(self.streams[0])
 
-    def without_stream(self, stream: int) -> AudioVisualObservations:
-        """Return the observations with one stream marked as not observed in any frame."""
-        return self.with_stream(stream, self.streams[stream], np.zeros(self.frames, bool))
-
-    def with_stream(
-        self, stream: int, values: Single, observed: NDArray[np.bool_] | None = None
+    def with_visual_streams(
+        self, values: Sequence[Single], observed: NDArray[np.bool_] | None = None
     ) -> AudioVisualObservations:
-        """Return the observations with other values of a stream [shape=(T, D_s)], observed there [shape=(T,)]."""
-        streams, masks = list(self.streams), list(self.observed)
-        streams[stream], masks[stream] = values, observed
-        return AudioVisualObservations(tuple(streams), tuple(masks))
+        """Return the speech with other visual streams [each shape=(T, D_s)], observed in some frames [shape=(T,)]."""
+        return AudioVisualObservations((self.streams[0], *values), (self.observed[0], *[observed] * len(values)))
+
+    def without_visual_streams(self) -> AudioVisualObservations:
+        """Return the observations with all streams but speech marked as not observed."""
+        return self.with_visual_streams(self.streams[1:], np.zeros(self.frames, bool))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,21 +62,11 @@ class StreamGroup:
         mixtures = self.mixtures
         return Mixtures(mixtures.log_weights, mixtures.means[:, :, columns], mixtures.variances[:, :, columns])
 
-    def evaluator(self) -> EmissionEvaluator:
-        """Return the densities in the form in which they are computed for frames."""
+    @cached_property
+    def _forms(self) -> tuple[QuadraticForm, ...]:
+        """The densities of each stream as quadratic forms, without component weights."""
         marginals = (self.stream_mixtures(stream) for stream in self.streams)
-        forms = [
-            replace(mixtures, log_weights=np.zeros_like(mixtures.log_weights)).quadratic() for mixtures in marginals
-        ]
-        return EmissionEvaluator(self, tuple(forms))
-
-
-@dataclass(frozen=True, eq=False)
-class EmissionEvaluator:
-    """A stream group with its densities as quadratic forms, one for each stream, without component weights."""
-
-    group: StreamGroup
-    forms: tuple[QuadraticForm, ...]
+        return tuple(replace(each, log_weights=np.zeros_like(each.log_weights)).quadratic() for each in marginals)
 
     def log_densities(self, observations: AudioVisualObservations, densities: Index) -> tuple[Single, Single | None]:
         """Return the log density of every frame under some mixtures [shape=(T, G')], and component responsibilities.
@@ -86,10 +75,9 @@ class EmissionEvaluator:
         The responsibilities [shape=(T, M, G')] sum to 1 over the M components; they are None where M is 1.
         A stream that was not observed is left out. This is exact: its density integrates to 1.
         """
-        group = self.group
-        log_weights = group.mixtures.log_weights[densities].T
+        log_weights = self.mixtures.log_weights[densities].T
         total = np.zeros((observations.frames, *log_weights.shape), np.float32)
-        for form, stream, exponent in zip(self.forms, group.streams, group.weights, strict=True):
+        for form, stream, exponent in zip(self._forms, self.streams, self.weights, strict=True):
             observed = observations.observed[stream]
             if observed is not None and not observed.any():
                 continue

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.densities import Single
-from lipmotion.engines.coupled.chains.product import Grammar
-from lipmotion.engines.coupled.chains.structures import Structure
+from lipmotion.engines.coupled.chains.product import MIN_ADVANCE, Grammar, Structure
 from lipmotion.kernels.factorial import infer_factorial
-from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, LoopCounts, find_factorial_path
+from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, find_factorial_path
 
 Index = NDArray[np.intp]
 
@@ -97,8 +96,6 @@ def tie_posteriors(posterior: Single, tie: Index, count: int) -> Single:
 
 
 Array = NDArray[np.float64]
-MIN_ADVANCE = 1e-5
-"""Least probability of moving on, and of staying."""
 VISIBLE_FRAMES = 10
 """The lips may be in a unit this many frames before and after the voice."""
 
@@ -114,10 +111,6 @@ class FactorialProduct:
     def chain_states(self) -> Index:
         """The state of each chain in each joint state [shape=(2, S)]."""
         return np.indices(self.structure.state_counts).reshape(2, -1)
-
-    def name(self, state: int) -> str:
-        """Return the name of a joint state, as ``Structure.name``."""
-        return self.structure.name(self.chain_states[:, state].tolist())
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,21 +189,23 @@ class FactorialLattice(Lattice):
 
     def posteriors(self, transitions: FactorialTransitions, logs: Sequence[Single]) -> LatticePosteriors:  # noqa: D102
         expected = infer_factorial(*self._loops(transitions), self._log_likelihoods(logs))
-        state_posteriors = expected.audio, expected.visual
-        structure = transitions.product.structure
-        speech, visual = self._density_posteriors(state_posteriors, expected.pair.astype(np.float32))
-        chains = []
-        for posterior, states, count in zip(state_posteriors, self.states, structure.state_counts, strict=True):
-            full = np.zeros((len(posterior), count), np.float32)
-            full[:, states] = posterior
+        own = expected.pair.astype(np.float32)
+        state_counts, chains, densities = transitions.product.structure.state_counts, [], []
+        for chain, posterior in enumerate((expected.audio, expected.visual)):
+            full = np.zeros((len(posterior), state_counts[chain]), np.float32)
+            full[:, self.states[chain]] = posterior
             chains.append(full)
+            remaining = posterior.astype(np.float32)  # what joint states with densities of their own leave a state
+            np.subtract.at(remaining.T, self.own_density_positions[:, chain], own.T)
+            densities.append(np.concatenate([np.maximum(remaining, 0), own], axis=1))
+        advance_counts: list[Array] = []  # chain by chain: how often each state is left, then how often it is kept
+        for counts in (expected.audio_counts, expected.visual_counts):
+            advance_counts += [counts.onward.ravel(), counts.enter.sum(axis=1), counts.stay.ravel()]
         return LatticePosteriors(
             chains=tuple(chains),
-            densities=(speech, *[visual] * (len(logs) - 1)),
-            most_probable=chains[0].argmax(axis=1) * structure.state_counts[1] + chains[1].argmax(axis=1),
-            transition_counts=np.concatenate(
-                [_advance_counts(counts) for counts in (expected.audio_counts, expected.visual_counts)]
-            ),
+            densities=(densities[0], *densities[1:] * (len(logs) - 1)),
+            most_probable=chains[0].argmax(axis=1) * state_counts[1] + chains[1].argmax(axis=1),
+            transition_counts=np.concatenate(advance_counts),
             log_likelihood=expected.log_likelihood,
         )
 
@@ -218,15 +213,6 @@ class FactorialLattice(Lattice):
         first, second, score = find_factorial_path(*self._loops(transitions), self._log_likelihoods(logs))
         count = transitions.product.structure.state_counts[1]
         return self.states[0][first] * count + self.states[1][second], score
-
-    def _density_posteriors(self, states: Sequence[Array], own: Single) -> list[Single]:
-        """Return the posteriors of each chain's ``densities``; a state's own has what joint states (``own``) leave."""
-        densities = []
-        for chain, posterior in enumerate(states):
-            remaining = posterior.astype(np.float32)
-            np.subtract.at(remaining.T, self.own_density_positions[:, chain], own.T)
-            densities.append(np.concatenate([np.maximum(remaining, 0), own], axis=1))
-        return densities
 
     def _loops(self, transitions: FactorialTransitions) -> tuple[Loop, Loop]:
         return transitions.loop(0, self.units[0]), transitions.loop(1, self.units[1])
@@ -257,7 +243,12 @@ def build_factorial_lattice(
         np.arange(len(units)) if allowed is None else np.flatnonzero(allowed.any(axis=0))
         for units, allowed in zip(structure.units, (allowed_units, visible_units), strict=True)
     )
-    states = _map_kernel_states(first, structure.states), _map_kernel_states(second, structure.states)
+    # the kernel's order: the first state of every unit, then the second
+    of_first, of_second = (
+        np.concatenate([units * structure.states + state for state in range(structure.states)])
+        for units in (first, second)
+    )
+    states = of_first, of_second
     columns, index, start = [], [], 0
     for chain, (own, count) in enumerate(zip(states, structure.state_counts, strict=True)):
         position = np.full(count, -1)
@@ -269,10 +260,15 @@ def build_factorial_lattice(
     inside = np.flatnonzero((own_density_positions >= 0).all(axis=1))
     chains = [min(number, 1) for number in range(len(ties))]
     densities = tuple(np.concatenate([states[chain], structure.state_counts[chain] + inside]) for chain in chains)
+    inner_ties = []  # of the joint states whose density is in the lattice, as positions there
+    for chosen, tie in zip(densities, ties, strict=True):
+        position = np.zeros(int(tie.max()) + 1, np.intp)
+        position[chosen] = np.arange(len(chosen))
+        inner_ties.append(position[tie[np.isin(tie, chosen)]])
     return FactorialLattice(
         transition_index=np.concatenate(index),
         densities=densities,
-        ties=tuple(_within(chosen, tie) for chosen, tie in zip(densities, ties, strict=True)),
+        ties=tuple(inner_ties),
         density_units=np.concatenate([states[0], transitions.own_density_states[inside, 0]]) // structure.states,
         allowed_units=allowed_units,
         units=(first, second),
@@ -291,21 +287,3 @@ def _find_visible_units(structure: Structure, allowed_units: NDArray[np.bool_]) 
     visible = np.zeros((len(allowed_units), len(structure.units[1])), bool)
     np.logical_or.at(visible.T, np.asarray(structure.corresponding_units[1]), near.T)
     return visible
-
-
-def _map_kernel_states(units: Index, states: int) -> Index:
-    """Return the states of some units in the order of the kernel: the first state of every unit, then the second."""
-    return np.concatenate([units * states + state for state in range(states)])
-
-
-def _within(densities: Index, tie: Index) -> Index:
-    """Return ``tie`` for the joint states whose density is one of ``densities``, as positions there."""
-    position = np.zeros(int(tie.max()) + 1, np.intp)
-    position[densities] = np.arange(len(densities))
-    return position[tie[np.isin(tie, densities)]]
-
-
-def _advance_counts(counts: LoopCounts) -> Array:
-    """Return how often each state is left, then how often it is kept, in the kernel's order [shape=(2 N',)]."""
-    moved = np.concatenate([counts.onward, counts.enter.sum(axis=1)[None]])
-    return np.concatenate([moved.ravel(), counts.stay.ravel()])

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, EmissionEvaluator, Single, StreamGroup
+from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, Single, StreamGroup
 from lipmotion.engines.coupled.chains.lattice import (
     FactorialTransitions,
     Index,
@@ -19,8 +19,7 @@ from lipmotion.engines.coupled.chains.lattice import (
     build_factorial_lattice,
     tie_posteriors,
 )
-from lipmotion.engines.coupled.chains.product import Transitions
-from lipmotion.engines.coupled.chains.structures import Structure
+from lipmotion.engines.coupled.chains.product import Structure, Transitions
 from lipmotion.kernels.network import ForwardBackwardNetwork
 from lipmotion.kernels.paths import NetworkArrays, best_path
 from lipmotion.motion.space import MotionSpace
@@ -47,7 +46,7 @@ class NetworkLattice(Lattice):
         )
         order = network.layout.order
         ordered_ties = [tie[order] for tie in self.ties]
-        expected = network.product_posteriors(logs, ordered_ties, np.array([len(logs[0])]))
+        expected = network.posteriors(logs, ordered_ties, np.array([len(logs[0])]))
         structure = transitions.product.structure
         return LatticePosteriors(
             tuple(
@@ -152,66 +151,52 @@ class Chains:
     @cached_property
     def full_lattice(self) -> Lattice:
         """The lattice of all joint states, for an utterance without transcript."""
-        return self._lattice(None)
+        return self.lattice(None)
 
-    def lattice(self, allowed_units: NDArray[np.bool_]) -> Lattice:
+    def lattice(self, allowed_units: NDArray[np.bool_] | None) -> Lattice:
         """Return the lattice of the joint states that an utterance may be in, given allowed units [shape=(T, U)]."""
-        return self._lattice(allowed_units)
-
-    def _lattice(self, allowed_units: NDArray[np.bool_] | None) -> Lattice:
         ties = [group.tie for group in self.groups]
         if isinstance(self.transitions, FactorialTransitions):
             return build_factorial_lattice(self.transitions, ties, allowed_units)
         return build_network_lattice(self.transitions, ties, allowed_units)
 
-    @cached_property
-    def evaluators(self) -> tuple[EmissionEvaluator, ...]:
-        """The emission densities of each stream group, in the form in which they are computed."""
-        return tuple(group.evaluator() for group in self.groups)
+    def log_densities(
+        self, observations: AudioVisualObservations, lattice: Lattice
+    ) -> tuple[tuple[Single, ...], tuple[Single | None, ...]]:
+        """Return log densities of all frames, group by group, for the G' densities that the lattice needs.
 
-    def emission_log_densities(self, observations: AudioVisualObservations, lattice: Lattice) -> EmissionLogDensities:
-        """Return the log densities of all frames under the densities that the lattice needs."""
-        computed = [
-            evaluator.log_densities(observations, densities)
-            for evaluator, densities in zip(self.evaluators, lattice.densities, strict=True)
-        ]
-        return EmissionLogDensities(
-            lattice.masked([log for log, _ in computed]), tuple(responsibilities for _, responsibilities in computed)
+        Returns log densities [each shape=(T, G')], -inf for units that are not allowed, and the responsibilities of
+        mixture components [each shape=(T, M, G')]; None: one component.
+        """
+        logs, responsibilities = zip(
+            *(
+                group.log_densities(observations, own)
+                for group, own in zip(self.groups, lattice.densities, strict=True)
+            ),
+            strict=True,
         )
-
-    def posteriors(self, emissions: EmissionLogDensities, lattice: Lattice) -> LatticePosteriors:
-        """Return the posteriors of hidden states, and expected transition counts."""
-        return lattice.posteriors(self.transitions, emissions.log_densities)
+        return lattice.masked(logs), responsibilities
 
     def infer(self, observations: AudioVisualObservations, lattice: Lattice) -> Inference:
         """Return the posteriors of hidden states together with what they were computed from."""
-        emissions = self.emission_log_densities(observations, lattice)
-        return Inference(observations, lattice, emissions, self.posteriors(emissions, lattice))
+        logs, responsibilities = self.log_densities(observations, lattice)
+        return Inference(observations, lattice, responsibilities, lattice.posteriors(self.transitions, logs))
 
-    def best_path(self, emissions: EmissionLogDensities, lattice: Lattice) -> tuple[Index, float]:
+    def best_path(self, observations: AudioVisualObservations, lattice: Lattice) -> tuple[Index, float]:
         """Return the most probable path of joint states [shape=(T,)] and its log probability; -inf: there is none."""
-        return lattice.best_path(self.transitions, emissions.log_densities)
-
-
-@dataclass(frozen=True, eq=False)
-class EmissionLogDensities:
-    """Log densities of the frames of an utterance, group by group, for the G' densities that a lattice needs.
-
-    log_densities    : of each stream group [each shape=(T, G')]
-    responsibilities : of the mixture components of each [each shape=(T, M, G')]; None: one component
-    """
-
-    log_densities: tuple[Single, ...]
-    responsibilities: tuple[Single | None, ...]
+        return lattice.best_path(self.transitions, self.log_densities(observations, lattice)[0])
 
 
 @dataclass(frozen=True, eq=False)
 class Inference:
-    """The posteriors of an utterance, with the observations, lattice and emission densities that they come from."""
+    """The posteriors of an utterance, with the observations and the lattice that they come from.
+
+    responsibilities : of the mixture components of each stream group [each shape=(T, M, G')]; None: one component
+    """
 
     observations: AudioVisualObservations
     lattice: Lattice
-    emissions: EmissionLogDensities
+    responsibilities: tuple[Single | None, ...]
     posteriors: LatticePosteriors
 
     @property

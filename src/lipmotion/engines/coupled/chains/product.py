@@ -1,9 +1,12 @@
-"""The product of chains: the joint states they can reach together, and the arcs between them with probabilities."""
+"""Structures of chains, and their product: joint states that chains reach together, arcs between them, probabilities.
+
+The six systems of Xie & Liu 2007 are structures by name.
+"""
 
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -12,7 +15,140 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.coupled.chains.structures import COUPLED, Structure
+from lipmotion.errors import InputError
+from lipmotion.units import PHONES, UnitSet, load_unit_set
+
+HMM, MULTISTREAM, FACTORIAL, COUPLED = "hmm", "multistream", "factorial", "coupled"
+STRUCTURES = (HMM, MULTISTREAM, FACTORIAL, COUPLED)
+UNSEEN_LOSS = 10.0
+"""Chosen on the validation list (docs/results/xieliu2007.md)."""
+
+AS_PRINTED: dict[str, Any] = {
+    "states": 5,
+    "mixtures": 1,
+    "conversion": "em",
+    "start": "viterbi",
+    "steps": 5,
+    "variance_scaling": False,
+    "closures": False,
+    "articulation": False,
+}
+"""What the paper's systems have in common: five states a unit, lips converted frame by frame, by EM that starts from
+the best path, and nothing done to them afterwards (§4.1, §7.1). Ours, as the print gives no number: one Gaussian a
+state, five steps of EM ("a very few").
+"""
+FREE: dict[str, Any] = {"asynchrony": -1, "unseen_loss": 0.0, "start_asynchrony": 4}
+"""Factorial chains that nothing ties together: every density integrates to 1, and they may be apart from the start."""
+SYSTEMS: dict[str, dict[str, Any]] = {
+    "ph-HMM": AS_PRINTED | {"structure": HMM, "chains": "phone"},
+    "ph-MSHMM": AS_PRINTED | {"structure": MULTISTREAM, "chains": "phone"},
+    "ph-FHMM": AS_PRINTED | FREE | {"structure": FACTORIAL, "chains": "phone phone"},
+    "ph-vi-FHMM": AS_PRINTED | FREE | {"structure": FACTORIAL, "chains": "phone viseme"},
+    "ph-CHMM": AS_PRINTED | {"structure": COUPLED, "chains": "phone phone"},
+    "ph-vi-CHMM": AS_PRINTED | {"structure": COUPLED, "chains": "phone viseme"},
+}
+"""Options of the coupled engine for each system. Source: Xie & Liu 2007, Table 2."""
+PRESETS: dict[str, dict[str, Any]] = SYSTEMS | {"xieliu2007": AS_PRINTED}
+"""The systems by name, and what they share: alone it is the one that the paper proposes, ph-vi-CHMM."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """The chains, their units, and how the chains depend on each other.
+
+    kind        : ``hmm`` (one chain, one mixture over all streams), ``multistream`` (one chain, one mixture for each
+                  stream), ``factorial`` (chains with independent transitions, emission densities of joint states) or
+                  ``coupled`` (chains whose transitions depend on the states of all chains, emission densities of each
+                  chain's states)
+    chains      : the unit set of each chain; the first chain emits speech, and its bigram decides which unit follows
+    states      : states per unit, left to right, without skips
+    limit       : the greatest asynchrony, in states; None: no limit
+    cross_units : whether chains may leave a unit at different times
+    start_limit : without a limit, the one that holds while the first densities are learned (Viterbi training)
+    unseen_loss : without a limit, what the log density of a joint state without a density of its own loses, nats; 0:
+                  all densities integrate to 1, and nothing but the shared densities holds the chains together
+    moves_together : of coupled chains: whether the chance that a chain moves on depends also on which chains before it
+                  move in the same frame. In Eq. 2 it depends on the joint state before alone, so that chains in step
+                  must fall out of step, for a frame at least, nearly wherever one moves
+    Source: Xie & Liu 2007, Fig. 3 and Eqs. 17–19.
+    Raises InputError: an unknown kind, or a number of chains or limit that does not fit it.
+    """
+
+    kind: str
+    chains: tuple[UnitSet, ...]
+    states: int
+    limit: int | None
+    cross_units: bool = True
+    start_limit: int = 1
+    unseen_loss: float = UNSEEN_LOSS
+    moves_together: bool = False
+
+    def __post_init__(self) -> None:
+        if self.kind not in STRUCTURES:
+            raise InputError(f"structure is {self.kind!r}, required one of: {', '.join(STRUCTURES)}")
+        if (self.kind in (HMM, MULTISTREAM)) != (len(self.chains) == 1):
+            raise InputError(f"structure {self.kind} with {len(self.chains)} chains; hmm and multistream have one")
+        if self.moves_together and self.kind != COUPLED:
+            raise InputError(f"moves_together with the structure {self.kind}; required {COUPLED}")
+        if self.limit is None and (self.kind != FACTORIAL or len(self.chains) != 2):
+            raise InputError("asynchrony is -1, no limit, which only two factorial chains have")
+        if self.limit is not None and not 0 <= self.limit < self.states:
+            raise InputError(
+                f"asynchrony is {self.limit} states, required 0 to {self.states - 1} (fewer than a unit has), or -1"
+            )
+
+    @cached_property
+    def units(self) -> tuple[tuple[str, ...], ...]:
+        """The units of every chain; those of the first are sorted by the corresponding units of the others."""
+        first, *others = self.chains
+        key = {
+            unit: [chain.units.index(find_matching_unit(chain, first, unit)) for chain in others]
+            for unit in first.units
+        }
+        return (tuple(sorted(first.units, key=lambda unit: key[unit])), *(chain.units for chain in others))
+
+    @cached_property
+    def corresponding_units(self) -> tuple[tuple[int, ...], ...]:
+        """For each chain, the number of its unit that corresponds to each unit of the first chain."""
+        return tuple(
+            tuple(units.index(find_matching_unit(chain, self.chains[0], unit)) for unit in self.units[0])
+            for chain, units in zip(self.chains, self.units, strict=True)
+        )
+
+    @cached_property
+    def state_counts(self) -> tuple[int, ...]:
+        """The number of states of each chain."""
+        return tuple(len(units) * self.states for units in self.units)
+
+    def chain_of(self, stream: int) -> int:
+        """Return the chain that emits a stream: the first emits speech, the others the visual streams in order."""
+        return min(stream, len(self.chains) - 1)
+
+    def name(self, states: Iterable[int]) -> str:
+        """Return the name of a joint state, given that of each chain: ``b.1 | bi.2``, with states counted from 1."""
+        return " | ".join(self.state_name(chain, state) for chain, state in enumerate(states))
+
+    def state_name(self, chain: int, state: int) -> str:
+        """Return the name of a state of one chain, as ``b.1``."""
+        unit, position = divmod(state, self.states)
+        return f"{self.units[chain][unit]}.{position + 1}"
+
+
+def list_unit_sets(names: str) -> tuple[UnitSet, ...]:
+    """Return the unit sets named, or read from files, in a text. Raises InputError: none, or no such set."""
+    sets = tuple(load_unit_set(name) for name in names.split())
+    if not sets:
+        raise InputError("no chains were given; required the unit set of each, as in 'phone viseme'")
+    return sets
+
+
+def find_matching_unit(chain: UnitSet, first: UnitSet, unit: str) -> str:
+    """Return the unit of a chain that corresponds to a unit of the first chain: that of most of its phones."""
+    if chain is first:
+        return unit
+    units = [chain.unit(phone) for phone in PHONES if first.unit(phone) == unit]
+    return max(units, key=units.count)
+
 
 Index = NDArray[np.intp]
 
@@ -63,11 +199,8 @@ class Product:
     @cached_property
     def chain_states(self) -> Index:
         """The state of every chain in each joint state [shape=(C, S)]."""
-        chains = range(len(self.structure.chains))
-        return np.array(
-            [[self.structure.state(joint.units[c], joint.states[c]) for joint in self.joint_states] for c in chains],
-            np.intp,
-        )
+        units, states, _ = (np.array(part, np.intp).T for part in zip(*self.joint_states, strict=True))
+        return units * self.structure.states + states
 
     @cached_property
     def lead(self) -> Index:
@@ -79,10 +212,6 @@ class Product:
         ]
         positions = np.array(progress).T
         return positions - positions[0]
-
-    def name(self, state: int) -> str:
-        """Return the name of a joint state, as ``Structure.name``."""
-        return self.structure.name(self.chain_states[:, state].tolist())
 
 
 def find_reachable(structure: Structure, grammar: Grammar) -> Product:
@@ -98,14 +227,13 @@ def find_reachable(structure: Structure, grammar: Grammar) -> Product:
         )
         for unit, probability in enumerate(grammar.initial[0])
     }
-    successors = _Successors(structure, grammar.bigrams[0])
     reached: dict[JointState, list[_Successor]] = {}
     waiting = deque(initial_states)
     while waiting:
         joint = waiting.popleft()
         if joint in reached:
             continue
-        reached[joint] = list(successors.of(joint))
+        reached[joint] = list(_list_successors(structure, grammar.bigrams[0], joint))
         waiting.extend(target for target, _, _ in reached[joint] if target not in reached)
     joint_states = tuple(sorted(reached, key=lambda j: (j.ahead, j.states, j.units[1:], j.units[0])))
     number = {joint: index for index, joint in enumerate(joint_states)}
@@ -134,65 +262,37 @@ _Successor = tuple[JointState, tuple[bool, ...], float]
 """A joint state that may follow, which chains move on, and the probability of the units entered."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Successors:
-    """The joint states that may follow a joint state, by the limit of asynchrony and the first chain's bigram."""
-
-    structure: Structure
-    bigram: NDArray[np.float64]
-
-    def of(self, joint: JointState) -> Iterator[_Successor]:
-        """Yield the joint states that may follow, which chains move on, and the probability of the units entered."""
-        for moved in product((False, True), repeat=len(joint.units)):
-            leaving = tuple(
-                move and state == self.structure.states - 1 for move, state in zip(moved, joint.states, strict=True)
-            )
-            if any(out and ahead for out, ahead in zip(leaving, joint.ahead, strict=True)):
-                continue  # the chain would be a second unit ahead
-            if any(leaving) and not (self.structure.cross_units or all(leaving)):
-                continue
-            states = tuple(
-                0 if out else state + move for out, state, move in zip(leaving, joint.states, moved, strict=True)
-            )
-            ahead = tuple(out or was for out, was in zip(leaving, joint.ahead, strict=True))
-            positions = [state + self.structure.states * out for state, out in zip(states, ahead, strict=True)]
-            if not (self.structure.limit is None or max(positions) - min(positions) <= self.structure.limit):
-                continue
-            relative_ahead = (False,) * len(ahead) if all(ahead) else ahead
-            for units, probability in self._entered(joint, leaving):
-                yield JointState(units, states, relative_ahead), moved, probability
-
-    def _entered(self, joint: JointState, leaving: tuple[bool, ...]) -> Iterator[tuple[tuple[int, ...], float]]:
-        """Yield the units of all chains after those in ``leaving`` entered the next unit, and their probability."""
-        corresponding_units = self.structure.corresponding_units
-        if not any(leaving):
-            yield joint.units, 1.0
-            return
-        if joint.ahead[0]:  # the first chain is in the next unit already
-            yield self._with(joint, leaving, joint.units[0]), 1.0
-            return
-        row = self.bigram[joint.units[0]]
-        candidates = [
-            unit
-            for unit in range(len(row))
-            if all(
-                corresponding_units[c][unit] == own
-                for c, (own, out) in enumerate(zip(joint.units, joint.ahead, strict=True))
-                if out
-            )
-        ]
-        total = sum(row[unit] for unit in candidates)
-        probabilities: dict[tuple[int, ...], float] = defaultdict(float)
-        for unit in candidates:
-            probabilities[self._with(joint, leaving, unit)] += float(row[unit] / total)
-        yield from probabilities.items()
-
-    def _with(self, joint: JointState, leaving: tuple[bool, ...], unit: int) -> tuple[int, ...]:
-        """Return the units of all chains; those in ``leaving`` get what corresponds to ``unit`` of the first chain."""
-        return tuple(
-            self.structure.corresponding_units[c][unit] if out else own
-            for c, (own, out) in enumerate(zip(joint.units, leaving, strict=True))
+def _list_successors(structure: Structure, bigram: NDArray[np.float64], joint: JointState) -> Iterator[_Successor]:
+    """Yield what may follow a joint state, by the limit of asynchrony and the first chain's bigram."""
+    corresponding = structure.corresponding_units
+    for moved in product((False, True), repeat=len(joint.units)):
+        leaving = tuple(move and state == structure.states - 1 for move, state in zip(moved, joint.states, strict=True))
+        if any(out and ahead for out, ahead in zip(leaving, joint.ahead, strict=True)):
+            continue  # the chain would be a second unit ahead
+        if any(leaving) and not (structure.cross_units or all(leaving)):
+            continue
+        states = tuple(
+            0 if out else state + move for out, state, move in zip(leaving, joint.states, moved, strict=True)
         )
+        ahead = tuple(out or was for out, was in zip(leaving, joint.ahead, strict=True))
+        positions = [state + structure.states * out for state, out in zip(states, ahead, strict=True)]
+        if not (structure.limit is None or max(positions) - min(positions) <= structure.limit):
+            continue
+        relative_ahead = (False,) * len(ahead) if all(ahead) else ahead
+        entered = {joint.units[0]: 1.0}  # of the first chain, if it enters one or is in it already
+        if any(leaving) and not joint.ahead[0]:
+            row, chains_ahead = bigram[joint.units[0]], [c for c, is_ahead in enumerate(joint.ahead) if is_ahead]
+            candidates = [
+                unit for unit in range(len(row)) if all(corresponding[c][unit] == joint.units[c] for c in chains_ahead)
+            ]
+            total = sum(row[unit] for unit in candidates)
+            entered = {unit: float(row[unit] / total) for unit in candidates}
+        probabilities: dict[tuple[int, ...], float] = defaultdict(float)
+        for unit, probability in entered.items():
+            units = (corresponding[c][unit] if out else joint.units[c] for c, out in enumerate(leaving))
+            probabilities[tuple(units)] += probability
+        for units_of_chains, probability in probabilities.items():
+            yield JointState(units_of_chains, states, relative_ahead), moved, probability
 
 
 Array = NDArray[np.float64]
@@ -256,7 +356,13 @@ class Transitions:
         Source: Darroch & Ratcliff 1972; the M-step of Xie & Liu 2007, Eq. A.16, is exact only without the mask.
         """
         if self.product.structure.moves_together:
-            return replace(self, advance=tuple(self._counted(chain, counts) for chain in range(len(self.rows))))
+            shares = []
+            for chain, old in enumerate(self.advance):
+                rows = self._arc_rows(chain)
+                moved = np.bincount(rows, counts * self.product.moves[chain], len(old))
+                share = (moved + old) / (np.bincount(rows, counts, len(old)) + 1)
+                shares.append(np.clip(share, MIN_ADVANCE, 1 - MIN_ADVANCE))
+            return replace(self, advance=tuple(shares))
         left: Array = np.bincount(self.product.arc_from, counts, len(self.product.joint_states)).astype(float)[
             self.product.arc_from
         ]
@@ -294,13 +400,6 @@ class Transitions:
         if blocks == 1:
             return rows
         return rows + len(self.advance[chain]) // blocks * ((1 << np.arange(chain)) @ self.product.moves[:chain])
-
-    def _counted(self, chain: int, counts: Array) -> Array:
-        """Return the shares of moving on in a chain's table, from counts of arcs [shape=(E,)]."""
-        rows, old = self._arc_rows(chain), self.advance[chain]
-        moved = np.bincount(rows, counts * self.product.moves[chain], len(old))
-        share = (moved + old) / (np.bincount(rows, counts, len(old)) + 1)
-        return np.clip(share, MIN_ADVANCE, 1 - MIN_ADVANCE)
 
     def _rescaled(self, chain: int, counts: Array, expected: Array) -> Transitions:
         """Return the transitions after a step of iterative scaling, of one chain's table, towards counts of arcs."""

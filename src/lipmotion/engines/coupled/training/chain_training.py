@@ -1,4 +1,7 @@
-"""EM training of coupled chains (Xie & Liu 2007, Appendix A), from Viterbi training on, with more Gaussians."""
+"""Training of coupled chains: labels in time, Viterbi training, then EM with more and more Gaussians.
+
+Source: Xie & Liu 2007, Appendix A.
+"""
 
 from __future__ import annotations
 
@@ -20,19 +23,91 @@ from lipmotion.engines.coupled.chains.densities import (
 )
 from lipmotion.engines.coupled.chains.lattice import FactorialProduct, FactorialTransitions, Lattice
 from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.product import Transitions, create_transitions, find_reachable
-from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, Structure
-from lipmotion.engines.coupled.training.alignment import (
-    AlignedUtterance,
-    estimate_grammar,
-    mark_allowed_units,
-    split_evenly,
+from lipmotion.engines.coupled.chains.product import (
+    COUPLED,
+    FACTORIAL,
+    HMM,
+    Grammar,
+    JointState,
+    Product,
+    Structure,
+    Transitions,
+    create_transitions,
+    find_reachable,
 )
 from lipmotion.errors import InputError
-from lipmotion.stats.em import EmResult, Sums, run_em, sum_statistics
+from lipmotion.hmm.multistream.unit_states import units_to_frames
+from lipmotion.stats.bigram import estimate_bigram
+from lipmotion.stats.em import EmResult, Sums, no_report, run_em, sum_statistics
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
-from lipmotion.units import find_similar_phone
+from lipmotion.types import FRAME_RATE_HZ, Timeline, Unit
+from lipmotion.units import SILENCE, find_similar_phone
+
+Index = NDArray[np.intp]
+SLACK_S = 0.05
+"""A unit is allowed this long before and after its label."""
+FIRST_SHARE = 0.1
+"""Share of the probability of the first unit that is spread over all units, whatever utterances begin with."""
+
+
+@dataclass(frozen=True, eq=False)
+class AlignedUtterance:
+    """The observations of an utterance, and its phones in time."""
+
+    observations: AudioVisualObservations
+    phones: Timeline[Unit]
+
+
+def mark_allowed_units(structure: Structure, phones: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
+    """Return the units that each frame may belong to [shape=(T, U)]: labelled near it; without a label, silence."""
+    names, first = structure.units[0], structure.chains[0]
+    allowed = np.zeros((frames, len(names)), bool)
+    slack = round(SLACK_S * FRAME_RATE_HZ)
+    for unit, start, stop in list_unit_segments(structure, phones, frames):
+        allowed[max(start - slack, 0) : stop + slack, unit] = True
+    unlabelled = ~allowed.any(axis=1)
+    for silence in first.silence:
+        allowed[unlabelled, names.index(silence)] = True
+    return allowed
+
+
+def list_unit_segments(structure: Structure, phones: Timeline[Unit], frames: int) -> list[tuple[int, int, int]]:
+    """Return the unit of the first chain, the first frame, and the frame after the last, of every non-empty label."""
+    names, bounds = units_to_frames(phones, frames, SILENCE)
+    units = [structure.units[0].index(structure.chains[0].unit(name)) for name in names]
+    return list(zip(units, bounds[:-1].tolist(), bounds[1:].tolist(), strict=True))
+
+
+def split_evenly(product: Product, phones: Timeline[Unit], frames: int) -> Index:
+    """Return the joint states [shape=(T,)] of uniform segmentation: all chains divide every label into equal parts."""
+    structure, chains = product.structure, range(len(product.structure.chains))
+    number = {joint: index for index, joint in enumerate(product.joint_states)}
+    path = np.empty(frames, np.intp)
+    for unit, start, stop in list_unit_segments(structure, phones, frames):
+        units = tuple(structure.corresponding_units[c][unit] for c in chains)
+        for frame in range(start, stop):
+            state = (frame - start) * structure.states // (stop - start)
+            path[frame] = number[JointState(units, (state,) * len(chains), (False,) * len(chains))]
+    return path
+
+
+def estimate_grammar(structure: Structure, data: Sequence[AlignedUtterance]) -> Grammar:
+    """Return the bigrams, and the probabilities of the first unit, of every chain, from labels."""
+    sentences = [
+        [unit for unit, _, _ in list_unit_segments(structure, utterance.phones, utterance.observations.frames)]
+        for utterance in data
+    ]
+    bigrams, initials = [], []
+    for units, corresponding in zip(structure.units, structure.corresponding_units, strict=True):
+        chain_sentences = [[units[corresponding[unit]] for unit in sentence] for sentence in sentences]
+        bigrams.append(np.exp(estimate_bigram(units, chain_sentences).log_probability.astype(float)))
+        initial = np.full(len(units), FIRST_SHARE / len(units))
+        for sentence in chain_sentences:
+            initial[units.index(sentence[0])] += (1 - FIRST_SHARE) / len(chain_sentences)
+        initials.append(initial)
+    return Grammar(tuple(bigrams), tuple(initials))
+
 
 SHARD = 16
 """Utterances of a shard of the E-step."""
@@ -132,8 +207,8 @@ def _shard_sums(job: tuple[Chains, Sequence[LatticeUtterance]]) -> Sums:
     log_likelihood, frames = 0.0, 0.0
     for utterance in utterances:
         observations, lattice, weight = utterance.observations, utterance.lattice, utterance.weight
-        emissions = chains.emission_log_densities(observations, lattice)
-        posteriors = chains.posteriors(emissions, lattice)
+        inference = chains.infer(observations, lattice)
+        posteriors = inference.posteriors
         if not np.isfinite(posteriors.log_likelihood):
             continue
         for statistics, group, densities, posterior, responsibilities in zip(
@@ -141,7 +216,7 @@ def _shard_sums(job: tuple[Chains, Sequence[LatticeUtterance]]) -> Sums:
             chains.groups,
             lattice.densities,
             posteriors.densities,
-            emissions.responsibilities,
+            inference.responsibilities,
             strict=True,
         ):
             weighted = posterior if weight == 1 else posterior * np.float32(weight)
@@ -174,9 +249,18 @@ def with_joint_state_densities(
     frequent = np.unique(product.chain_states[:, visits >= MIN_FRAMES].T, axis=0)
     new_transitions: Transitions | FactorialTransitions = transitions
     chain_states = product.chain_states
-    if structure.limit is None:
-        new_transitions = _remove_limits(transitions, structure, frequent)
-        chain_states = new_transitions.product.chain_states
+    if structure.limit is None:  # independent chains move on with the mean probability of joint states
+        first, second = (
+            np.bincount(states, advance[rows], count) / np.maximum(np.bincount(states, minlength=count), 1)
+            for states, advance, rows, count in zip(
+                chain_states, transitions.advance, transitions.rows, structure.state_counts, strict=True
+            )
+        )
+        factorial = FactorialProduct(structure, product.grammar)
+        new_transitions, chain_states = (
+            FactorialTransitions(factorial, (first, second), frequent),
+            factorial.chain_states,
+        )
     number = np.full(structure.state_counts, -1)
     number[tuple(frequent.T)] = np.arange(len(frequent))
     frequent_number = number[chain_states[0], chain_states[1]]
@@ -189,24 +273,6 @@ def with_joint_state_densities(
     return Chains(chains.streams, new_transitions, tuple(groups))
 
 
-def _remove_limits(transitions: Transitions, structure: Structure, frequent: NDArray[np.intp]) -> FactorialTransitions:
-    """Return transitions of independent chains, which move on with the mean probability of joint states."""
-    product = transitions.product
-    first, second = (
-        _average_by_state(product.chain_states[chain], advance[rows], count)
-        for chain, (advance, rows, count) in enumerate(
-            zip(transitions.advance, transitions.rows, structure.state_counts, strict=True)
-        )
-    )
-    return FactorialTransitions(FactorialProduct(structure, product.grammar), (first, second), frequent)
-
-
-def _average_by_state(states: NDArray[np.intp], values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Return the mean, for each of ``count`` states, of the values [shape=(S,)] of the joint states that have it."""
-    return np.bincount(states, values, count) / np.maximum(np.bincount(states, minlength=count), 1)
-
-
-Index = NDArray[np.intp]
 VITERBI_STEPS = 2
 
 
@@ -222,18 +288,16 @@ def create_chains(
     floors  : the least variance of each stream [each shape=(D_s,)]
     A structure without a limit of asynchrony has one, ``start_limit``, during the Viterbi training.
     """
-    limited = (
-        replace(structure, limit=min(structure.start_limit, structure.states - 1))
-        if structure.limit is None
-        else structure
-    )
+    limited = structure
+    if structure.limit is None:
+        limited = replace(structure, limit=min(structure.start_limit, structure.states - 1))
     transitions = create_transitions(find_reachable(limited, estimate_grammar(limited, data)))
     chains = _create_untrained_chains(streams, transitions, data, weights)
     utterances = [build_lattice_utterance(chains, utterance) for utterance in data]
     paths = [split_evenly(transitions.product, utterance.phones, utterance.observations.frames) for utterance in data]
     for _ in range(1 + VITERBI_STEPS):
         chains, transitions = _reestimate_along(chains, transitions, utterances, paths, floors)
-        paths = [_best_path(chains, utterance) for utterance in utterances]
+        paths = [chains.best_path(utterance.observations, utterance.lattice)[0] for utterance in utterances]
     visits = np.bincount(np.concatenate(paths), minlength=len(transitions.product.joint_states))
     if structure.kind == COUPLED:
         return replace(chains, transitions=transitions.tied(visits))
@@ -247,10 +311,8 @@ def _create_untrained_chains(
 ) -> Chains:
     """Return chains whose densities are all standard normal."""
     product, structure, groups = transitions.product, transitions.product.structure, []
-    if structure.kind == HMM:
-        stream_groups = [tuple(range(len(streams)))]
-    else:
-        stream_groups = [(stream,) for stream in range(len(streams))]
+    numbers = tuple(range(len(streams)))
+    stream_groups = [numbers] if structure.kind == HMM else [(stream,) for stream in numbers]
     dimensions = [stream.shape[1] for stream in data[0].observations.streams]
     for members in stream_groups:
         edges = np.cumsum([0, *(dimensions[s] for s in members)])
@@ -313,18 +375,13 @@ def _with_borrowed_densities(
         phones = [
             phone
             for number, name in enumerate(units)
-            if learned[structure.state(number, position)]
+            if learned[number * structure.states + position]
             for phone in unit_set.phones(name)
         ]
         if phones:
             similar = unit_set.unit(find_similar_phone(unit_set.phones(units[unit])[0], phones))
-            source[state] = structure.state(units.index(similar), position)
+            source[state] = units.index(similar) * structure.states + position
     return replace(group, mixtures=group.mixtures.select(source))
-
-
-def _best_path(chains: Chains, utterance: LatticeUtterance) -> Index:
-    emissions = chains.emission_log_densities(utterance.observations, utterance.lattice)
-    return chains.best_path(emissions, utterance.lattice)[0]
 
 
 FRAMES_A_GAUSSIAN = 25.0
@@ -333,65 +390,45 @@ CONVERGENCE_GAIN = 0.02
 """EM ends when the log likelihood per frame gains less."""
 
 
-@dataclass(frozen=True)
-class TrainingStep:
-    """One step of EM, with the mean log likelihood per frame before it."""
-
-    mixtures: tuple[int, ...]
-    log_likelihood: float
-
-
-Report = Callable[[TrainingStep], None]
-
-
-def no_report(step: TrainingStep) -> None:
-    """Report nothing after a step."""
-
-
-@dataclass(frozen=True)
-class MixtureSchedule:
-    """How many Gaussians densities get, and how many steps of EM.
-
-    mixtures   : Gaussians per density of each stream group in the end, powers of two
-    most_steps : greatest number of EM steps between one splitting and the next
-    """
-
-    mixtures: tuple[int, ...]
-    weights: tuple[float, ...]
-    most_steps: int = 6
+Report = Callable[[int, Chains, ChainStatistics], None]
+"""Called after every step of EM with its number, the new chains, and the statistics that they were estimated from."""
+MAX_STEPS = 6
+"""Greatest number of EM steps between one splitting and the next."""
 
 
 def grow_chains(
     structure: Structure,
     streams: tuple[str, ...],
     data: Sequence[AlignedUtterance],
-    schedule: MixtureSchedule,
+    mixtures: Sequence[int],
+    weights: Sequence[float],
     report: Report = no_report,
     work: Checkpoint = NO_CHECKPOINT,
 ) -> Iterator[EmResult[Chains, ChainStatistics]]:
     """Yield results of EM, started by Viterbi training: chains with 1, 2, 4, … Gaussians, each to convergence.
 
-    streams : the names of the streams
-    report  : is called after every step; while the number of components stays, the log likelihood never falls
+    streams  : the names of the streams
+    mixtures : Gaussians per density of each stream group in the end, powers of two
+    weights  : the exponent of each stream's density
+    report   : while the number of components stays, the log likelihood never falls
     Source: Xie & Liu 2007, §3.4 and Appendix A, with scaled recursions.
     """
     floors = compute_variance_floors([utterance.observations for utterance in data])
-    chains = create_chains(structure, streams, data, schedule.weights, floors)
+    chains = create_chains(structure, streams, data, weights, floors)
     utterances = [build_lattice_utterance(chains, utterance) for utterance in data]
     while True:
-        result = train_to_convergence(chains, utterances, floors, schedule.most_steps, report, work)
+        result = train_to_convergence(chains, utterances, floors, MAX_STEPS, report, work)
         yield result
-        counts = count_components(result.model)
-        if all(count >= most for count, most in zip(counts, schedule.mixtures, strict=True)):
+        if all(count >= most for count, most in zip(count_components(result.model), mixtures, strict=True)):
             return
-        chains = with_split_components(result.model, schedule.mixtures, result.statistics)
+        chains = with_split_components(result.model, mixtures, result.statistics)
 
 
 def train_to_convergence(
     chains: Chains,
     utterances: Sequence[LatticeUtterance],
     floors: Sequence[Single],
-    most_steps: int,
+    max_steps: int,
     report: Report,
     work: Checkpoint,
     *,
@@ -403,8 +440,8 @@ def train_to_convergence(
         chains,
         lambda chains: e_step(chains, utterances, work),
         lambda chains, statistics: m_step(chains, statistics, floors, streams=streams, transitions=not speech_only),
-        most_steps,
-        lambda _, chains, statistics: report(TrainingStep(count_components(chains), statistics.mean_log_likelihood)),
+        max_steps,
+        report,
         min_gain=CONVERGENCE_GAIN,
     )
 
@@ -414,25 +451,19 @@ def count_components(chains: Chains) -> tuple[int, ...]:
     return tuple(group.mixtures.size[1] for group in chains.groups)
 
 
-def with_split_components(chains: Chains, most: Sequence[int], statistics: ChainStatistics) -> Chains:
-    """Return chains with twice as many Gaussians in the densities of those groups that have fewer than ``most``.
+def with_split_components(chains: Chains, mixtures: Sequence[int], statistics: ChainStatistics) -> Chains:
+    """Return chains with twice as many Gaussians in the densities of those groups that have fewer than ``mixtures``.
 
     statistics : of the last E-step; a density with too little data keeps its components, the new ones are switched off
     """
-    groups = [
-        replace(group, mixtures=_split(group.mixtures, own.occupancy)) if count < target else group
-        for group, own, count, target in zip(
-            chains.groups, statistics.emissions, count_components(chains), most, strict=True
-        )
-    ]
+    groups = list(chains.groups)
+    for number, (group, own, count) in enumerate(zip(chains.groups, statistics.emissions, mixtures, strict=True)):
+        present, now = group.mixtures, group.mixtures.size[1]
+        if now < count:
+            halves = present.split()
+            few = own.occupancy.sum(axis=0) < FRAMES_A_GAUSSIAN * 2 * np.isfinite(present.log_weights).sum(axis=1)
+            halves.log_weights[few, :now] = present.log_weights[few]
+            halves.means[few, :now] = present.means[few]
+            halves.log_weights[few, now:] = -np.inf
+            groups[number] = replace(group, mixtures=halves)
     return replace(chains, groups=tuple(groups))
-
-
-def _split(mixtures: Mixtures, occupancy: NDArray[np.float64]) -> Mixtures:
-    """Return the mixtures with twice as many components; ``occupancy`` is that of the present ones [shape=(M, G)]."""
-    halves, now = mixtures.split(), mixtures.log_weights.shape[1]
-    few = occupancy.sum(axis=0) < FRAMES_A_GAUSSIAN * 2 * np.isfinite(mixtures.log_weights).sum(axis=1)
-    halves.log_weights[few, :now] = mixtures.log_weights[few]
-    halves.means[few, :now] = mixtures.means[few]
-    halves.log_weights[few, now:] = -np.inf
-    return halves

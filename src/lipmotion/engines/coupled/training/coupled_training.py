@@ -15,18 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Fit
-from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
-from lipmotion.engines.coupled.chains.model import (
-    EIGENLIPS,
-    GEOMETRY,
-    Chains,
-    VisualStream,
-    fit_visual_streams,
-    speech_observations,
-)
-from lipmotion.engines.coupled.chains.structures import HMM, Structure, list_unit_sets
-from lipmotion.engines.coupled.conversion.em_conversion import without_visual_streams
-from lipmotion.engines.coupled.conversion.mean_regression import (
+from lipmotion.engines.coupled.chains.model import EIGENLIPS, GEOMETRY, Chains, fit_visual_streams, speech_observations
+from lipmotion.engines.coupled.chains.product import HMM, list_unit_sets
+from lipmotion.engines.coupled.conversion import (
     RegressionInputs,
     RegressionUtterance,
     VisualRegression,
@@ -35,17 +26,15 @@ from lipmotion.engines.coupled.conversion.mean_regression import (
     fit_visual_regression,
 )
 from lipmotion.engines.coupled.model import AWAY_FROM_SPEECH_S, CoupledConfig, CoupledModel
-from lipmotion.engines.coupled.training.alignment import AlignedUtterance
 from lipmotion.engines.coupled.training.chain_training import (
+    MAX_STEPS,
+    AlignedUtterance,
     ChainStatistics,
-    MixtureSchedule,
     Report,
-    TrainingStep,
     build_lattice_utterance,
     compute_variance_floors,
     count_components,
     grow_chains,
-    no_report,
     train_to_convergence,
     with_split_components,
 )
@@ -59,7 +48,7 @@ from lipmotion.motion.modulation_filter import learn_filter
 from lipmotion.motion.predictors import PREDICTORS, Predictor, PredictorTraining
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.stats.curves import mark_known_dynamics
-from lipmotion.stats.em import EmResult
+from lipmotion.stats.em import EmResult, no_report
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Example, Monitor, Progress, sub_monitor
 from lipmotion.units import VISEME_OF, is_silent
@@ -78,27 +67,26 @@ def train_on_speech(
     data        : what the chains were trained on; its speech is used here too, without its motion
     speech_only : utterances of other speakers; the values of their visual streams are ignored
     config      : its ``speech_only`` options count; densities never get fewer Gaussians than they have
-    report      : is called after every step; while the number of components stays, the weighted log likelihood never
-                  falls
+    report      : while the number of components stays, the weighted log likelihood never falls
     Where speech and motion share their components (``hmm``), these stay as many, but their weights are re-estimated.
     """
     floors = compute_variance_floors([utterance.observations for utterance in data])
     utterances = [
         build_lattice_utterance(
-            chains, replace(utterance, observations=without_visual_streams(utterance.observations)), weight
+            chains, replace(utterance, observations=utterance.observations.without_visual_streams()), weight
         )
         for group, weight in ((data, 1.0), (speech_only, config.speech_only_weight))
         for utterance in group
     ]
     present = count_components(chains)
-    most = present if chains.structure.kind == HMM else (max(config.speech_only_mixtures, present[0]), *present[1:])
+    mixtures = present if chains.structure.kind == HMM else (max(config.speech_only_mixtures, present[0]), *present[1:])
     while True:
         result = train_to_convergence(
             chains, utterances, floors, config.speech_only_steps, report, work, speech_only=True
         )
-        if count_components(result.model) == most:
+        if count_components(result.model) == mixtures:
             return result.model
-        chains = with_split_components(result.model, most, result.statistics)
+        chains = with_split_components(result.model, mixtures, result.statistics)
 
 
 Array = NDArray[np.float64]
@@ -145,7 +133,10 @@ def grow_models(
     valid = [mark_known_dynamics(example.valid) for example in moving]
     visual = fit_visual_streams(space, values, valid, config.dynamic)
     data = [
-        AlignedUtterance(_observations(example, x, mask, visual), example.speech.units)
+        AlignedUtterance(
+            speech_observations(example.speech, visual).with_visual_streams([s.standardised(x) for s in visual], mask),
+            example.speech.units,
+        )
         for example, x, mask in zip(moving, values, valid, strict=True)
     ]
     speech_only = [
@@ -165,8 +156,7 @@ def grow_models(
         if speech_only:
             second_monitor = sub_monitor(monitor, first_share, second_share)
             doublings = max(config.speech_only_mixtures // config.mixtures, 1).bit_length()
-            most_steps = config.speech_only_steps * doublings
-            report = _reporter("more speech", most_steps, second_monitor)
+            report = _reporter("more speech", config.speech_only_steps * doublings, second_monitor)
             chains = train_on_speech(chains, data, speech_only, config, report, work)
         model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest_pose, closure, prior)
         model = replace(model, encoding=encoding)
@@ -186,39 +176,21 @@ def grow_models(
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(model, {"frames": frames, "joint_states": joint_states, "converged": float(grown.converged)})
 
-    names, schedule = (SPEECH, *(stream.name for stream in visual)), _schedule(structure, visual, config)
-    most_steps = schedule.most_steps * max(schedule.mixtures).bit_length()
-    report = _reporter("chains", most_steps, sub_monitor(monitor, 0, first_share))
-    for grown in grow_chains(structure, names, data, schedule, report, work):
+    weight_of = {GEOMETRY: config.visual_weight, EIGENLIPS: config.eigenlips_weight}
+    names, weights = (SPEECH, *(s.name for s in visual)), (config.audio_weight, *(weight_of[s.name] for s in visual))
+    mixtures = (config.mixtures, *(config.visual_mixtures for _ in visual if structure.kind != HMM))
+    report = _reporter("chains", MAX_STEPS * max(mixtures).bit_length(), sub_monitor(monitor, 0, first_share))
+    for grown in grow_chains(structure, names, data, mixtures, weights, report, work):
         yield partial(finish, grown)
 
 
-def _observations(
-    example: Example, values: Array, valid: NDArray[np.bool_], visual: Sequence[VisualStream]
-) -> AudioVisualObservations:
-    """Return the speech of an example with its visual streams, from motion in the space [shape=(T, Q)]."""
-    observations = speech_observations(example.speech, visual)
-    for number, stream in enumerate(visual, start=1):
-        observations = observations.with_stream(number, stream.standardised(values), valid)
-    return observations
-
-
-def _schedule(structure: Structure, visual: Sequence[VisualStream], config: CoupledConfig) -> MixtureSchedule:
-    mixtures = (config.mixtures, *(config.visual_mixtures for _ in visual))
-    weights = {GEOMETRY: config.visual_weight, EIGENLIPS: config.eigenlips_weight}
-    return MixtureSchedule(
-        mixtures[:1] if structure.kind == HMM else mixtures,
-        (config.audio_weight, *(weights[stream.name] for stream in visual)),
-    )
-
-
-def _reporter(stage: str, most_steps: int, monitor: Monitor) -> Callable[[TrainingStep], None]:
-    """Return a function that reports the steps of a stage of training, ``most_steps`` at most, to the monitor."""
+def _reporter(stage: str, max_steps: int, monitor: Monitor) -> Report:
+    """Return a function that reports the steps of a stage of training, ``max_steps`` at most, to the monitor."""
     numbers = itertools.count(1)
 
-    def report(step: TrainingStep) -> None:
+    def report(_: int, __: Chains, statistics: ChainStatistics) -> None:
         number = next(numbers)
-        monitor(Progress(stage, number, most_steps, number / most_steps, step.log_likelihood))
+        monitor(Progress(stage, number, max_steps, number / max_steps, statistics.mean_log_likelihood))
 
     return report
 
@@ -239,43 +211,33 @@ def _estimate_regression(
     model: CoupledModel, data: Sequence[AlignedUtterance]
 ) -> tuple[RegressionInputs, tuple[VisualRegression, ...]]:
     """Return the regression of visual means on acoustic features and on the posteriors given speech alone."""
-    structure = model.chains.structure
+    chains, structure = model.chains, model.chains.structure
     visual_chains = [structure.chain_of(stream + 1) for stream in range(len(model.visual))]
-    posteriors = list(
-        _run_threaded(lambda utterance: _chain_posteriors(model.chains, utterance, (0, *visual_chains)), data)
-    )
+
+    def infer_chains(utterance: AlignedUtterance) -> tuple[NDArray[np.float32], ...]:
+        """Return the posteriors of the states of all chains given speech alone, without transcript."""
+        return chains.infer(utterance.observations.without_visual_streams(), chains.full_lattice).posteriors.chains
+
+    posteriors = list(_run_threaded(infer_chains, data))
     axes = fit_axes(first for first, *_ in posteriors)
     utterances = [
         RegressionUtterance(
             utterance.observations.streams[0],
-            first @ axes,
-            visual,
+            of_chains[0] @ axes,
+            [of_chains[chain] for chain in visual_chains],
             utterance.observations.streams[1:],
             np.asarray(utterance.observations.observed[1]),
         )
-        for utterance, (first, *visual) in zip(data, posteriors, strict=True)
+        for utterance, of_chains in zip(data, posteriors, strict=True)
     ]
-    inputs = fit_regression_inputs(axes, utterances)
-    return inputs, tuple(
-        fit_visual_regression(inputs, utterances, stream, *_list_state_regressions(structure, chain))
-        for stream, chain in enumerate(visual_chains)
-    )
-
-
-def _chain_posteriors(
-    chains: Chains, utterance: AlignedUtterance, numbers: Sequence[int]
-) -> tuple[NDArray[np.float32], ...]:
-    """Return the posteriors of the states of some chains given speech alone, without transcript [each shape=(T, N)]."""
-    posteriors = chains.infer(without_visual_streams(utterance.observations), chains.full_lattice).posteriors
-    return tuple(posteriors.chains[number] for number in numbers)
-
-
-def _list_state_regressions(structure: Structure, chain: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the regression of each state of a chain [shape=(N,)], and the viseme of each regression [shape=(E,)]."""
-    visemes = [VISEME_OF[structure.chains[chain].phones(unit)[0]] for unit in structure.units[chain]]
-    numbers = np.unique(visemes, return_inverse=True)[1]
-    family = np.repeat(np.arange(numbers.max() + 1), structure.states)
-    return (numbers[:, None] * structure.states + np.arange(structure.states)).ravel().astype(np.intp), family
+    inputs, regressions = fit_regression_inputs(axes, utterances), []
+    for stream, chain in enumerate(visual_chains):  # each state of each viseme has a regression
+        visemes = [VISEME_OF[structure.chains[chain].phones(unit)[0]] for unit in structure.units[chain]]
+        numbers = np.unique(visemes, return_inverse=True)[1]
+        family = np.repeat(np.arange(numbers.max() + 1), structure.states)
+        of_state = (numbers[:, None] * structure.states + np.arange(structure.states)).ravel().astype(np.intp)
+        regressions.append(fit_visual_regression(inputs, utterances, stream, of_state, family))
+    return inputs, tuple(regressions)
 
 
 def _generated(model: CoupledModel, data: Sequence[AlignedUtterance]) -> list[Array]:
@@ -283,7 +245,7 @@ def _generated(model: CoupledModel, data: Sequence[AlignedUtterance]) -> list[Ar
     chains = model.chains
 
     def generated(utterance: AlignedUtterance) -> Array:
-        speech = without_visual_streams(utterance.observations)
+        speech = utterance.observations.without_visual_streams()
         motion, _ = solve_mlpg(*model.motion_statistics(chains.infer(speech, chains.full_lattice)))
         return motion[utterance.observations.observed[1]]
 

@@ -1,8 +1,7 @@
 """The search for words in posteriors: the most probable sequence of words, and of phones outside of words.
 
 Words and their neighbours decide together: a path says the phones of one word after the other, each in a row of
-posteriors or several, with blanks between. Where no word fits, a path may say any phones: names, other languages, and
-what is no word.
+posteriors or several, with blanks between. Where no word fits, as of names, a path may say any phones.
 
 Source: Graves, Fernández, Gomez and Schmidhuber 2006, "Connectionist temporal classification" (paths with blanks); Ney,
 Haeb-Umbach, Tran and Oerder 1992, "Improvements in beam search" (the tree of words, and the score of the most probable
@@ -11,6 +10,7 @@ word below a node). The best path counts, not the sum of all.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
@@ -55,11 +55,10 @@ class LanguageModel:
     def score(self, word: int, before: tuple[int, ...]) -> float:
         """Return the weighted logarithm of the probability of a word after up to two others, the last one first."""
         key = (word, *before)
-        score = self._known.get(key)
-        if score is None:
+        if key not in self._known:
             names = [self.words[number] for number in key]
-            score = self._known[key] = LANGUAGE_WEIGHT * self._model.prob(names) * self._log_base
-        return score
+            self._known[key] = LANGUAGE_WEIGHT * self._model.prob(names) * self._log_base
+        return self._known[key]
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,18 +122,13 @@ def load_english() -> EnglishWords:
 
 def _pronunciations() -> dict[str, list[str]]:
     """Return the pronunciations of every word: those of the dictionary, and those that phone networks write."""
-    found: dict[str, list[str]] = {}
+    variants = defaultdict[str, list[str]](list)
     written = resources.files(__package__).joinpath("written_words.txt").read_text(encoding="ascii")
     lines = (find_english_data() / "cmudict-en-us.dict").read_text(encoding="utf-8")
     for line in (lines + written).splitlines():
         word, _, phones = line.partition(" ")
-        if word[-1] == ")":
-            word = word[:-3]
-        if word in found:
-            found[word].append(phones)
-        else:
-            found[word] = [phones]
-    return found
+        variants[word[:-3] if word[-1] == ")" else word].append(phones)
+    return variants
 
 
 def build_word_tree(pronunciations: list[list[bytes]], scores: NDArray[np.float64]) -> WordTree:
@@ -265,27 +259,21 @@ class _Paths:
         """The better score of each path."""
         return np.maximum(self.blank, self.sound)
 
-    def chosen(self, which: NDArray[np.bool_] | Indices) -> _Paths:
+    def select(self, which: NDArray[np.bool_] | Indices) -> _Paths:
         """Return some of the paths."""
         return _Paths(self.node[which], self.context[which], self.blank[which], self.sound[which], self.origin[which])
 
-    def with_others(self, other: _Paths) -> _Paths:
+    def join(self, other: _Paths) -> _Paths:
         """Return these paths and others; of those with the same node and context the better one."""
         both = _Paths(*(np.concatenate(pair) for pair in zip(vars(self).values(), vars(other).values(), strict=True)))
         key = both.node << 32 | both.context
         order = np.lexsort((both.best, key))
         ordered = key[order]
         first = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]]))
-        last = order[np.concatenate([first[1:], [len(ordered)]]) - 1]
-        kept = both.chosen(last)
-        kept.blank = np.maximum.reduceat(both.blank[order], first)
-        kept.sound = np.maximum.reduceat(both.sound[order], first)
-        return kept
-
-
-def decode_words(english: EnglishWords, rows: Scored) -> list[DecodedWord]:
-    """Return the words of the best path, in order; none where every path has been given up within a word."""
-    return _BeamSearch(english).words(rows)
+        best = both.select(order[np.concatenate([first[1:], [len(ordered)]]) - 1])
+        best.blank = np.maximum.reduceat(both.blank[order], first)
+        best.sound = np.maximum.reduceat(both.sound[order], first)
+        return best
 
 
 @dataclass
@@ -301,28 +289,9 @@ class _BeamSearch:
     contexts: dict[tuple[int, ...], int] = field(default_factory=lambda: {(): 0})
     named: list[tuple[int, ...]] = field(default_factory=lambda: [()])
 
-    def words(self, rows: Scored) -> list[DecodedWord]:
-        """Return what ``decode_words`` does."""
-        none = np.zeros(1, np.int64)
-        paths = _Paths(none, none, np.zeros(1), np.full(1, NEVER), none - 1)
-        for row in range(len(rows.sounds)):
-            paths = self._step(paths, rows, row)
-        ended = np.where(paths.node == 0, paths.best, NEVER)
-        number = int(paths.origin[ended.argmax()]) if ended.max() > NEVER else -1
-        found: list[tuple[int, int]] = []
-        while number >= 0:
-            number, word, end = self.history[number]
-            found.append((word, end))
-        found.reverse()
-        firsts = [0, *(end for _, end in found)]
-        names = self.english.language.words
-        return [
-            DecodedWord(names[word] if word != NO_WORD else "", first, end)
-            for (word, end), first in zip(found, firsts, strict=False)
-        ]
-
-    def _step(self, paths: _Paths, rows: Scored, row: int) -> _Paths:
+    def step(self, paths: _Paths, rows: Scored, row: int) -> _Paths:
         tree = self.english.tree
+        """Return the paths after one more row of posteriors."""
         sounds, between, inside = rows.sounds[row], rows.between[row], rows.blank[row]
         root = paths.node == 0
         said = np.where(root, NEVER, paths.sound + sounds[tree.sound[paths.node]])
@@ -331,14 +300,14 @@ class _BeamSearch:
             stay.sound = np.full(len(said), NEVER)
             return stay
         entered = self._enter(paths, sounds)
-        least = max(float(stay.best.max()), float(entered.sound.max(initial=NEVER))) - BEAM
-        after = stay.chosen(stay.best > least).with_others(entered.chosen(entered.sound > least))
-        after = self._with_ended_words(after, least, row)
+        limit = max(float(stay.best.max()), float(entered.sound.max(initial=NEVER))) - BEAM
+        after = stay.select(stay.best > limit).join(entered.select(entered.sound > limit))
+        after = self._end_words(after, limit, row)
         best = after.best
-        kept = best > best.max() - BEAM
-        if kept.sum() > MAX_PATHS:
-            kept = best >= np.partition(best, -MAX_PATHS)[-MAX_PATHS]
-        return after.chosen(kept)
+        within = best > best.max() - BEAM
+        if within.sum() > MAX_PATHS:
+            within = best >= np.partition(best, -MAX_PATHS)[-MAX_PATHS]
+        return after.select(within)
 
     def _enter(self, paths: _Paths, sounds: Scores) -> _Paths:
         """Return the paths that go on to the next phone; between two that are the same there is a blank."""
@@ -352,10 +321,10 @@ class _BeamSearch:
         score += tree.score[target] - tree.score[before] - FREE_PHONE_LOSS * (target >= tree.free)
         return _Paths(target, paths.context[source], np.full(len(target), NEVER), score, paths.origin[source])
 
-    def _with_ended_words(self, paths: _Paths, least: float, row: int) -> _Paths:
+    def _end_words(self, paths: _Paths, limit: float, row: int) -> _Paths:
         """Return the paths with those whose word ends in a row, which are at the root again."""
         tree = self.english.tree
-        ending = np.flatnonzero(tree.is_end[paths.node] & (paths.sound > least))
+        ending = np.flatnonzero(tree.is_end[paths.node] & (paths.sound > limit))
         if len(ending) > MAX_ENDS:
             ending = ending[np.argsort(-paths.sound[ending], kind="stable")[:MAX_ENDS]]
         ended: WordEnds = {}
@@ -366,26 +335,33 @@ class _BeamSearch:
                 free = word == NO_WORD
                 score = base - FREE_WORD_LOSS if free else base + WORD_GAIN + self.english.language.score(word, before)
                 context = () if free else (word, *before[:1])
-                if score > least and score > ended.get(context, (NEVER,))[0]:
+                if score > limit and score > ended.get(context, (NEVER,))[0]:
                     ended[context] = score, word, origin
         if not ended:
             return paths
-        contexts, origins, scores = [], [], []
-        for context, (score, word, origin) in ended.items():
+        for context in ended:
             if context not in self.contexts:
                 self.contexts[context] = len(self.named)
                 self.named.append(context)
-            contexts.append(self.contexts[context])
-            origins.append(len(self.history))
-            scores.append(score)
-            self.history.append((origin, word, row + 1))
-        count = len(scores)
-        return paths.with_others(
-            _Paths(
-                np.zeros(count, np.int64),
-                np.array(contexts, np.int64),
-                np.array(scores),
-                np.full(count, NEVER),
-                np.array(origins, np.int64),
-            )
-        )
+        contexts = np.array([self.contexts[context] for context in ended], np.int64)
+        origins = len(self.history) + np.arange(len(ended), dtype=np.int64)
+        self.history += [(origin, word, row + 1) for _, word, origin in ended.values()]
+        scores, root = np.array([score for score, _, _ in ended.values()]), np.zeros(len(ended), np.int64)
+        return paths.join(_Paths(root, contexts, scores, np.full(len(ended), NEVER), origins))
+
+
+def decode_words(english: EnglishWords, rows: Scored) -> list[DecodedWord]:
+    """Return the words of the best path, in order; none where every path has been given up within a word."""
+    search, none = _BeamSearch(english), np.zeros(1, np.int64)
+    paths = _Paths(none, none, np.zeros(1), np.full(1, NEVER), none - 1)
+    for row in range(len(rows.sounds)):
+        paths = search.step(paths, rows, row)
+    ended = np.where(paths.node == 0, paths.best, NEVER)
+    number = int(paths.origin[ended.argmax()]) if ended.max() > NEVER else -1
+    words: list[DecodedWord] = []
+    while number >= 0:
+        before, word, end = search.history[number]
+        first = search.history[before][2] if before >= 0 else 0
+        words.append(DecodedWord(english.language.words[word] if word != NO_WORD else "", first, end))
+        number = before
+    return words[::-1]

@@ -15,7 +15,7 @@ from functools import cache, cached_property, partial
 from hashlib import sha256
 from importlib import metadata, resources
 from importlib.util import find_spec
-from itertools import groupby
+from itertools import pairwise
 from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
@@ -115,11 +115,6 @@ class PhonePosteriors:
     tokens: tuple[str, ...]
 
     @property
-    def blank(self) -> NDArray[np.float32]:
-        """Logarithms of the posteriors of no token [shape=(N,)]."""
-        return self.values[:, self.tokens.index(BLANK)]
-
-    @property
     def word_boundary(self) -> NDArray[np.float32]:
         """Logarithms of the posteriors of the boundary of words [shape=(N,)]; −∞ where the network has none."""
         if WORD_BOUNDARY not in self.tokens:
@@ -135,18 +130,15 @@ class PhonePosteriors:
     @cached_property
     def best_tokens(self) -> tuple[FoundToken, ...]:
         """The tokens of the path with the most probable token in every row, without blanks."""
-        found, at = list[FoundToken](), 0
-        for number, group in groupby(self.values.argmax(axis=1).tolist()):
-            length = len(list(group))
-            if self.tokens[number] != BLANK:
-                found.append(FoundToken(self.tokens[number], at, at + length))
-            at += length
-        return tuple(found)
+        best = self.values.argmax(axis=1)
+        bounds = pairwise([0, *(np.flatnonzero(np.diff(best)) + 1).tolist(), len(best)])
+        tokens = (FoundToken(self.tokens[best[first]], first, end) for first, end in bounds if end)
+        return tuple(each for each in tokens if each.token != BLANK)
 
     def phones_between(self, first: int, end: int) -> list[str]:
         """Return the phones of the best path that begin in some rows: from ``first`` to before ``end``."""
-        found = [each.token for each in self.best_tokens if first <= each.first < end]
-        return [phone for phone, _ in read_tokens(found)]
+        tokens = [each.token for each in self.best_tokens if first <= each.first < end]
+        return [phone for phone, _ in read_tokens(tokens)]
 
     def mean_posterior(self, first: int, end: int) -> float:
         """Return the mean posterior of the tokens of the best path that begin in some rows, 0 to 1; 0 without any."""

@@ -1,10 +1,14 @@
-"""Triangles to pixels by definition: a triangle at a time, all of its samples at once; with textures, too."""
+"""Twins of ``lipmotion_faces.kernels``: triangles, light, bands of paint and pictures, for all samples at once."""
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion_faces.kernels import textured
+from lipmotion_faces.kernels.painting import Floats, Layer
 from lipmotion_faces.kernels.raster import GRID
+from lipmotion_faces.kernels.shading import MIN_FACING_COSINE
 
 Real = NDArray[np.float64]
 Colours = NDArray[np.float32]
@@ -231,3 +235,125 @@ def _texel(ids: Whole, places: Real, planes: Real, surface: textured.TexturedTri
         result[:, channel] = (upper + low_share * (lower - upper)) * textured.SCALE
     result[row < 0] = 1.0
     return result
+
+
+def shade(
+    normals: Real, places: Real, viewer: Real, colours: Real, reaches: Real, strands: Real,
+    kinds: NDArray[np.intp], finishes: Real, lamps: Real,
+) -> NDArray[np.float32]:  # fmt: skip
+    """Return what ``lipmotion_faces.kernels.shading.shade`` says, for all vertices at once."""
+    finish = finishes[kinds]
+    eye = viewer - places
+    eye = eye / np.sqrt(_dot(eye, eye))[:, None]
+    faces = _dot(normals, eye)
+    grazing = np.minimum(np.maximum(1.0 - faces, 0.0), 1.0)
+    grazing2 = grazing * grazing
+    open_sky, direct = reaches[:, 0], reaches[:, 1]
+    up = 0.5 + 0.5 * normals[:, 1]
+    diffuse = [_bounced(open_sky, colours[:, c]) * (up * lamps[4, c] + (1.0 - up) * lamps[5, c]) for c in range(3)]
+    edge = finish[:, 5] * grazing2 * grazing2 * open_sky
+    shine = [edge * lamps[4, c] for c in range(3)]
+    for n in range(2):
+        towards, arrives = lamps[n, :3], direct if n == 0 else open_sky
+        facing = _dot(normals, towards[None])
+        half = eye + towards
+        length = np.sqrt(_dot(half, half))
+        along = _dot(strands, half) / length
+        across = np.where(
+            finish[:, 6] > 0, np.sqrt(np.maximum(1.0 - along * along, 0)), np.maximum(_dot(normals, half) / length, 0)
+        )
+        for step in range(int(finish[:, 4].max(initial=0))):
+            across = np.where(step < finish[:, 4], across * across, across)
+        glint = finish[:, 3] * across * np.minimum(np.maximum(4.0 * facing + 0.3, 0.0), 1.0) * arrives
+        for c in range(3):
+            soft = np.maximum(facing + finish[:, c], 0.0) / (1.0 + finish[:, c])
+            diffuse[c] = diffuse[c] + soft * np.sqrt(soft) * _bounced(arrives, colours[:, c]) * lamps[n, 3 + c]
+            glare = glint * lamps[n, 3 + c]
+            glare = np.where(finish[:, 6] > 0, glare * (4.0 * colours[:, c]), glare)
+            shine[c] = shine[c] + np.where(finish[:, 3] > 0, glare, 0.0)
+    for n in range(2, 4):
+        rim = np.maximum(_dot(normals, lamps[n, None, :3]), 0.0) * grazing2 * open_sky
+        for c in range(3):
+            diffuse[c] = diffuse[c] + 0.9 * rim * lamps[n, 3 + c]
+            shine[c] = shine[c] + 0.12 * rim * lamps[n, 3 + c]
+    light = np.stack([colours[:, c] * diffuse[c] + shine[c] for c in range(3)], axis=1)
+    light[faces < MIN_FACING_COSINE] = 0
+    return light.astype(np.float32)
+
+
+def _bounced(arrives: Real, colour: Real) -> Real:
+    """Return the light that arrives together with what the surface near by sends on, in its own colour."""
+    return arrives * (1.0 + colour * (1.0 - arrives))
+
+
+def _dot(a: Real, b: Real) -> Real:
+    return np.asarray(a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2])
+
+
+def paint_band(layer: Layer, top: Floats, bottom: Floats, across: Floats, texture: Floats) -> None:
+    row = np.arange(len(layer))[:, None].astype(np.float64)
+    cover = np.zeros(layer.shape[:2])
+    for upper, lower in zip(top, bottom, strict=True):
+        cover += np.maximum(np.minimum(lower, row + 1) - np.maximum(upper, row), 0)
+    cover = cover / len(top)
+    start, end = top[0].copy(), bottom[0].copy()
+    for upper, lower in zip(top[1:], bottom[1:], strict=True):
+        start += upper
+        end += lower
+    start, end = start / len(top), end / len(top)
+    depth = np.minimum(np.maximum((row + 0.5 - start) / np.maximum(end - start, 1e-3), 0), 1)
+    down, beside = depth * (texture.shape[0] - 1), across * (texture.shape[1] - 1)
+    d0 = np.minimum(down.astype(np.int64), max(texture.shape[0] - 2, 0))
+    u0 = np.minimum(beside.astype(np.int64), max(texture.shape[1] - 2, 0))
+    d1, u1 = np.minimum(d0 + 1, texture.shape[0] - 1), np.minimum(u0 + 1, texture.shape[1] - 1)
+    fd, fu = (down - d0)[..., None], (beside - u0)[:, None]
+    upper_row = texture[d0, u0] + fu * (texture[d0, u1] - texture[d0, u0])
+    lower_row = texture[d1, u0] + fu * (texture[d1, u1] - texture[d1, u0])
+    texel = upper_row + fd * (lower_row - upper_row)
+    opacity = cover * texel[..., 3]
+    texel[..., 3] = 1
+    layer += (opacity[..., None] * (texel - layer)).astype(np.float32)
+
+
+A = -0.5
+"""Parameter of cubic convolution (Keys 1981)."""
+
+
+def kernel(distance: float, kind: str) -> float:
+    """Return the weight of a pixel at a distance along one side."""
+    distance = abs(distance)
+    if kind == "linear":
+        return max(0.0, 1 - distance)
+    if distance <= 1:
+        return (A + 2) * distance**3 - (A + 3) * distance**2 + 1
+    if distance < 2:
+        return A * distance**3 - 5 * A * distance**2 + 8 * A * distance - 4 * A
+    return 0.0
+
+
+def value(picture: np.ndarray, x: float, y: float, kind: str) -> np.ndarray:
+    """Return the colours at a position; outside the picture its outermost pixels repeat."""
+    height, width = picture.shape[:2]
+    total = np.zeros(picture.shape[2:])
+    for row in range(math.floor(y) - 2, math.floor(y) + 4):
+        for column in range(math.floor(x) - 2, math.floor(x) + 4):
+            pixel = picture[min(max(row, 0), height - 1), min(max(column, 0), width - 1)]
+            total = total + kernel(x - column, kind) * kernel(y - row, kind) * pixel.astype(float)
+    return total
+
+
+def resample(picture: np.ndarray, to_source: np.ndarray, size: tuple[int, int], kind: str) -> np.ndarray:
+    """Return the new picture [shape=(h, w, C)]."""
+    new = np.empty((*size, picture.shape[2]))
+    for row in range(size[0]):
+        for column in range(size[1]):
+            x, y = to_source @ [column, row, 1]
+            new[row, column] = value(picture, x, y, kind)
+    return new
+
+
+def blended(part: np.ndarray, patch: np.ndarray, weight: np.ndarray, to_patch: np.ndarray, kind: str) -> np.ndarray:
+    """Return a part of a frame with the patch blended in, before rounding."""
+    new = resample(patch, to_patch, part.shape[:2], kind)
+    share = resample(weight[..., None], to_patch, part.shape[:2], "linear")
+    return np.clip(part + share * (new - part), 0, 255)

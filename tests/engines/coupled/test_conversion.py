@@ -5,17 +5,8 @@ import pytest
 
 from engines.coupled.tiny import KINDS, chains, observations, structure
 from lipmotion.engines import engine_named
-from lipmotion.engines.coupled.conversion import mean_regression
-from lipmotion.engines.coupled.conversion.em_conversion import (
-    EXACT,
-    PRINTED,
-    SOFT,
-    VITERBI,
-    ConversionSettings,
-    convert,
-    path_to_means,
-    without_visual_streams,
-)
+from lipmotion.engines.coupled import conversion
+from lipmotion.engines.coupled.conversion import EXACT, PRINTED, SOFT, VITERBI, convert, path_to_means
 from lipmotion.stats.curves import with_dynamics
 from lipmotion.testing import example, examples, speech, timeline
 from lipmotion.types import silent_monitor
@@ -30,63 +21,60 @@ every = pytest.mark.parametrize(("kind", "sets", "limit"), KINDS)
 def test_speech_and_streams_become_more_likely_at_every_step(kind, sets, limit, start):
     for seed in range(2):
         model = chains(structure(kind, sets, limit=limit), seed=seed)
-        result = convert(model, observations(12, seed=seed), model.full_lattice, ConversionSettings(start, EXACT, 15))
-        assert len(result.log_likelihood) > 2
-        assert min(np.diff(result.log_likelihood)) > -2e-6
+        _, log_likelihoods = convert(model, observations(12, seed=seed), model.full_lattice, start, EXACT, 15)
+        assert len(log_likelihoods) > 2
+        assert min(np.diff(log_likelihoods)) > -2e-6
 
 
 def test_the_soft_start_is_the_precision_weighted_mean_over_all_paths():
     model, data = chains(), observations(4)
-    result = convert(model, data, model.full_lattice, ConversionSettings(SOFT, EXACT, 0))
-    precision, weighted = oracle.component_statistics(model, without_visual_streams(data), 1, 1)
-    np.testing.assert_allclose(result.streams[1], weighted / precision, rtol=1e-3, atol=1e-4)
+    (lips,), _ = convert(model, data, model.full_lattice, SOFT, EXACT, 0)
+    precision, weighted = oracle.component_statistics(model, data.without_visual_streams(), 1, 1)
+    np.testing.assert_allclose(lips, weighted / precision, rtol=1e-3, atol=1e-4)
 
 
 def test_values_of_visual_streams_are_ignored():
     model = chains()
     one, other = observations(6, seed=1), observations(6, seed=2)
-    other = other.with_stream(0, one.streams[0])
-    results = [
-        convert(model, data, model.full_lattice, ConversionSettings(most_steps=4)).streams[1] for data in (one, other)
-    ]
+    other = one.with_visual_streams(other.streams[1:])
+    results = [convert(model, data, model.full_lattice, max_steps=4)[0][0] for data in (one, other)]
     np.testing.assert_array_equal(*results)
 
 
 def test_the_viterbi_start_is_the_means_along_the_best_path():
     model, data = chains(), observations(5)
-    result = convert(model, data, model.full_lattice, ConversionSettings(VITERBI, EXACT, 0))
-    path, _ = max(oracle.paths(model, without_visual_streams(data)), key=lambda pair: pair[1])
+    (lips,), _ = convert(model, data, model.full_lattice, VITERBI, EXACT, 0)
+    path, _ = max(oracle.paths(model, data.without_visual_streams()), key=lambda pair: pair[1])
     group = model.groups[1]
     expected = [
         (np.exp(group.mixtures.log_weights[d])[:, None] * group.mixtures.means[d]).sum(axis=0)
         for d in group.tie[list(path)]
     ]
-    np.testing.assert_allclose(result.streams[1], expected, rtol=1e-5)
+    np.testing.assert_allclose(lips, expected, rtol=1e-5)
     np.testing.assert_allclose(path_to_means(model, np.array(path), 1), expected, rtol=1e-5)
 
 
 def test_the_maximiser_is_where_the_derivative_vanishes():
     """Σ γ(q, k) Σ⁻¹ (μ − o) = 0: the joint likelihood itself is stationary where EM stands still."""
     model, data = chains(seed=3), observations(4, seed=3)
-    result = convert(model, data, model.full_lattice, ConversionSettings(SOFT, EXACT, 400))
+    (lips,), _ = convert(model, data, model.full_lattice, SOFT, EXACT, 400)
 
     def log_likelihood(values):
-        return oracle.posteriors(model, data.with_stream(1, values.astype(np.float32)))[2]
+        return oracle.posteriors(model, data.with_visual_streams([values.astype(np.float32)]))[2]
 
-    settled = result.streams[1]
     for frame in range(4):
         for step in (-0.02, 0.02):
-            moved = settled.copy()
+            moved = lips.copy()
             moved[frame] += step
-            assert log_likelihood(moved) <= log_likelihood(settled) + 1e-4
+            assert log_likelihood(moved) <= log_likelihood(lips) + 1e-4
 
 
 def test_the_printed_update_weighs_by_components_and_partners():
     """Eq. 9: every joint state counts, so a visual state counts as often as it has partners, and w stands twice."""
     model, data = chains(), observations(4)
-    start = convert(model, data, model.full_lattice, ConversionSettings(SOFT, EXACT, 0)).streams[1]
-    printed = convert(model, data, model.full_lattice, ConversionSettings(SOFT, PRINTED, 1)).streams[1]
-    seen = data.with_stream(1, start.astype(np.float32))
+    (start,), _ = convert(model, data, model.full_lattice, SOFT, EXACT, 0)
+    (printed,), _ = convert(model, data, model.full_lattice, SOFT, PRINTED, 1)
+    seen = data.with_visual_streams([start.astype(np.float32)])
     joint, _, _ = oracle.posteriors(model, seen)
     group = model.groups[1]
     expected = np.zeros_like(printed)
@@ -105,7 +93,7 @@ def test_the_printed_update_weighs_by_components_and_partners():
     np.testing.assert_allclose(printed, expected, rtol=1e-3, atol=1e-4)
 
 
-def utterances(count=3, frames=60, states=4, seed=0) -> list[mean_regression.RegressionUtterance]:
+def utterances(count=3, frames=60, states=4, seed=0) -> list[conversion.RegressionUtterance]:
     draw = np.random.default_rng(seed)
     result = []
     for _ in range(count):
@@ -115,40 +103,37 @@ def utterances(count=3, frames=60, states=4, seed=0) -> list[mean_regression.Reg
         observed = draw.random(frames) < 0.8
         target = (features[:, :2] + visual[:, :2] * 3).astype(np.float32)
         target = np.where(observed[:, None], target, 99).astype(np.float32)
-        result.append(mean_regression.RegressionUtterance(features, first, [visual], [target], observed))
+        result.append(conversion.RegressionUtterance(features, first, [visual], [target], observed))
     return result
 
 
 def test_the_regressions_are_ridges_one_towards_the_other():
     """By normal equations over explicitly weighted rows: all, then families, then regressions."""
     data = utterances()
-    inputs = mean_regression.fit_regression_inputs(np.eye(4, dtype=np.float32), data)
+    inputs = conversion.fit_regression_inputs(np.eye(4, dtype=np.float32), data)
     regression_of_state, family = np.array([0, 0, 1, 1, 2, 2]), np.array([0, 0, 1])
-    found = mean_regression.fit_visual_regression(inputs, data, 0, regression_of_state, family)
+    found = conversion.fit_visual_regression(inputs, data, 0, regression_of_state, family)
     z = np.concatenate([inputs(one.features, one.reduced_posteriors)[one.observed] for one in data]).astype(float)
     target = np.concatenate([one.targets[0][one.observed] for one in data]).astype(float)
     weight = np.concatenate(
-        [
-            mean_regression.weigh_regressions(one.chain_posteriors[0], regression_of_state, 3)[one.observed]
-            for one in data
-        ]
+        [conversion.weigh_regressions(one.chain_posteriors[0], regression_of_state, 3)[one.observed] for one in data]
     ).astype(float)
 
     def solved(rows, prior, strength):
         system = z.T @ (rows[:, None] * z) + strength * np.eye(z.shape[1])
         return np.linalg.solve(system, z.T @ (rows[:, None] * target) + strength * prior)
 
-    shared = solved(weight.sum(axis=1), 0 * np.zeros((z.shape[1], 2)), mean_regression.SHARED_RIDGE * len(z))
+    shared = solved(weight.sum(axis=1), 0 * np.zeros((z.shape[1], 2)), conversion.SHARED_RIDGE * len(z))
     for number in range(3):
-        above = solved(weight[:, family == family[number]].sum(axis=1), shared, mean_regression.OWN_RIDGE)
+        above = solved(weight[:, family == family[number]].sum(axis=1), shared, conversion.OWN_RIDGE)
         np.testing.assert_allclose(
-            found.coefficients[number], solved(weight[:, number], above, mean_regression.OWN_RIDGE), atol=2e-3
+            found.coefficients[number], solved(weight[:, number], above, conversion.OWN_RIDGE), atol=2e-3
         )
 
 
 def test_expected_means_and_precisions_are_sums_over_states():
     draw = np.random.default_rng(0)
-    regression = mean_regression.VisualRegression(
+    regression = conversion.VisualRegression(
         np.array([0, 1, 1]),
         draw.normal(0, 1, (2, 5, 3)).astype(np.float32),
         draw.uniform(0.5, 2, (3, 3)).astype(np.float32),
