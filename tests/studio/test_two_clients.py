@@ -55,12 +55,12 @@ def test_a_line_that_was_removed_has_its_edits_when_its_sound_is_added_again(stu
 
 
 def test_every_change_names_the_revision_that_it_saw(studio):
-    content = {"steps": ["phone 2 is p"], "text": "mama", "mark": "redo"}
+    members = {"steps": ["phone 2 is p"], "text": "mama", "mark": "redo"}
     seen = studio.ready()["revision"]
     assert studio.edit("phone 3 is p").status == 200
     for change in ("edits", "undo", "transcript", "mark", "versions", "remove", "restore"):
-        assert studio.ask(f"/api/lines/1/{change}", content).status == 422
-        late = studio.ask(f"/api/lines/1/{change}", content | {"revision": seen})
+        assert studio.ask(f"/api/lines/1/{change}", members).status == 422
+        late = studio.ask(f"/api/lines/1/{change}", members | {"revision": seen})
         assert (late.status, "window" in late.content["error"]) == (409, True)
     state = studio.ready()
     assert (state["steps"], state["mark"], state["versions"]) == (["phone 3 is p"], "none", [])
