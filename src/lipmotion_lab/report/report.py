@@ -26,17 +26,10 @@ from lipmotion_lab.engine_comparison import compare_engines
 from lipmotion_lab.folds import FOLDS, cross_validate
 from lipmotion_lab.learning_curve import run_learning_curve
 from lipmotion_lab.minnis2000 import run_minnis2000
+from lipmotion_lab.report import sections
 from lipmotion_lab.report.html import GENERATOR
 from lipmotion_lab.report.page import ClipKeeper, FinishedPart, write_html, write_videos
 from lipmotion_lab.report.section import Section, write_text
-from lipmotion_lab.report.sections import (
-    build_engines_section,
-    build_folds_section,
-    build_hofer_section,
-    build_learning_section,
-    build_minnis_section,
-    build_xie_liu_section,
-)
 from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, Stamp, check_opening, share_out, take_quick_part
 from lipmotion_lab.xie_liu2007 import six_systems
 from lipmotion_lab.xie_liu2007.six_systems import PLOT_CAPTIONS
@@ -95,25 +88,25 @@ PARTS: dict[str, ReportPart] = {
         lambda run: hofer2008.run_hofer2008(
             run.corpus, hofer2008.QUICK if run.quick else hofer2008.FULL, work=run.work, settings=run.settings
         ),
-        build_hofer_section,
+        sections.build_hofer_section,
     ),
-    "xieliu2007": ReportPart(("train", TEST), 8, _run_xie_liu, build_xie_liu_section, draws=True),
+    "xieliu2007": ReportPart(("train", TEST), 8, _run_xie_liu, sections.build_xie_liu_section, draws=True),
     "minnis2000": ReportPart(
         ("train", TEST),
         2,
         lambda run: run_minnis2000(
             run.corpus, models=run.models, quick=run.quick, work=run.work, settings=run.settings
         ),
-        build_minnis_section,
+        sections.build_minnis_section,
     ),
     "engines": ReportPart(
         ("train", TEST),
         4,
         lambda run: compare_engines(run.corpus, split=TEST, models=run.models, settings=run.settings),
-        build_engines_section,
+        sections.build_engines_section,
     ),
-    "learning-curve": ReportPart(("train", TEST), 2, _run_learning_curve, build_learning_section),
-    "folds": ReportPart(("train",), 4, _run_folds, build_folds_section),
+    "learning-curve": ReportPart(("train", TEST), 2, _run_learning_curve, sections.build_learning_section),
+    "folds": ReportPart(("train",), 4, _run_folds, sections.build_folds_section),
 }
 """All experiments by name, in the order of the report: the papers' first."""
 
