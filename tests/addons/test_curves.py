@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from formats.examples import of_motion
+from formats.examples import generation as weights_of
+from formats.examples import written
 from lipmotion import read_motion as read_library_motion
-from lipmotion.formats import write_motion
-from lipmotion.types import WEIGHT, Channel, Generation, Motion
+from lipmotion.types import Generation
 from lipmotion_blender.curves import at_frames, closures, control, matched, read_motion, spelling
 from lipmotion_blender.keying import add_sound, key_shapes
 
@@ -19,15 +19,12 @@ NAMES = ("jawOpen", "mouthSmileLeft", "tongueOut")
 
 @pytest.fixture
 def generation() -> Generation:
-    moved = Motion(np.random.default_rng(3).random((121, 3)), 60.0, tuple(Channel(name, WEIGHT) for name in NAMES))
-    return of_motion(moved)
+    return weights_of(*NAMES, rate_hz=60.0, frames=121)
 
 
 @pytest.mark.parametrize("suffix", [".json", ".csv", ".livelink.csv"])
 def test_files_of_lipmotion_are_read(tmp_path, generation, suffix):
-    path = tmp_path / f"a{suffix}"
-    write_motion(path, generation, source={}, model={})
-    curves, times = read_motion(str(path))
+    curves, times = read_motion(str(written(tmp_path / f"a{suffix}", generation)))
     spelt = {spelling(name): values for name, values in curves.items()}
     assert times == pytest.approx(generation.motion.time_s.tolist(), abs=1e-4)
     for name in NAMES:
@@ -118,10 +115,8 @@ def test_frames_lie_on_straight_lines_and_lips_that_close_between_two_are_closed
     frames = at_frames(curves, times, 24.0)["tongueOut"]
     assert len(frames) == 25
     assert frames == pytest.approx(np.interp(np.arange(25) / 24, times, curves["tongueOut"]).tolist())
-    jaw = [0.3 + 0.0 * time_s for time_s in times]
-    close = [0.0 if number != 52 else 0.3 for number in range(101)]
-    eyes = [number / 100 for number in range(101)]
-    curves = {"jawOpen": jaw, "mouthClose": close, "eyeBlinkLeft": eyes}
+    jaw, close = [0.3] * 101, [0.0 if number != 52 else 0.3 for number in range(101)]
+    curves = {"jawOpen": jaw, "mouthClose": close, "eyeBlinkLeft": times}
     assert closures(curves, 101) == [52]
     sampled = at_frames(curves, times, 25.0)
     assert sampled["mouthClose"][13] == pytest.approx(0.3)
@@ -153,17 +148,14 @@ class Strips(list[Any]):
         return self[-1]
 
 
-@pytest.mark.parametrize(
-    ("sound_s", "start", "played_from"), [(0.0, 10, 10), (0.5, 22, 22), (-0.5, -2, 10)]
-)  # fmt: skip
+@pytest.mark.parametrize(("sound_s", "start", "played_from"), [(0.0, 10, 10), (0.5, 22, 22), (-0.5, -2, 10)])
 def test_the_sound_is_where_the_motion_is(sound_s, start, played_from, tmp_path):
-    path = tmp_path / "a.wav"
-    path.write_bytes(b"")
+    (tmp_path / "a.wav").touch()
     strips = Strips()
     rate = SimpleNamespace(fps=24, fps_base=1.0)
     scene = SimpleNamespace(sequence_editor=SimpleNamespace(strips=strips), render=rate, sync_mode="")
     for _ in range(2):
-        assert add_sound(scene, str(path), 10.0, sound_s)
+        assert add_sound(scene, str(tmp_path / "a.wav"), 10.0, sound_s)
     (strip,) = strips
     assert (strip.start, strip.frame_final_start) == (start, played_from)
 

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from lipmotion.articulation import contact
+from lipmotion.motion.frame_labels import find_runs
 from lipmotion.types import Channel, Motion
 from meshes.speech import said
 
@@ -13,8 +14,7 @@ def motion(opening: np.ndarray, rate_hz: float = 100.0, name: str = "opening") -
 
 
 def runs(mask: np.ndarray) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
-    return [(int(first), int(stop)) for first, stop in edges.reshape(-1, 2)]
+    return [(first, stop) for first, stop in find_runs(mask).tolist()]
 
 
 def test_the_gap_is_0_where_trackers_see_closed_lips_and_grows_with_the_opening():

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.formats import write_motion
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion.formats.label_files import read_transcript
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, TimedTranscript, Timeline, Unit
 from testing.toy import toy_motion
 
 NOTHING_SAID: Timeline[Unit] = Timeline(())
@@ -33,6 +34,13 @@ def timeline(phones: Sequence[tuple[str, float]]) -> Timeline[Unit]:
 def result(units: Timeline[Unit], motion: Motion | None = None) -> Generation:
     """Return a generation with these phones; its motion is that of the toy face, unless another is given."""
     return of_motion(motion or toy_motion(units, 100.0), units)
+
+
+def timed(path: Path, **choice: str) -> TimedTranscript:
+    """Return the words in time of a file."""
+    transcript = read_transcript(path, **choice)
+    assert isinstance(transcript, TimedTranscript)
+    return transcript
 
 
 def spoken(text: str, duration_s: float = 0.1, silence_s: float = 0.3) -> Generation:

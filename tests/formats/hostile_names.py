@@ -170,10 +170,8 @@ def _usd_tokens(text: str, attribute: str) -> list[str]:
 
 def _glb(folder: Path, name: str) -> None:
     path = folder / "a.glb"
-    gltf_writer.write_gltf_scene(
-        path,
-        Scene(mesh(name), types.Motion(np.zeros((2, 1)), 25.0, (types.Channel(name, types.WEIGHT),)), sound=f"x{name}"),
-    )
+    moved = types.Motion(np.zeros((2, 1)), 25.0, (types.Channel(name, types.WEIGHT),))
+    gltf_writer.write_gltf_scene(path, Scene(mesh(name), moved, sound=f"x{name}"))
     document = gltf_document.read_gltf_document(path).json
     assert document["meshes"][0]["extras"]["targetNames"] == [name]
     assert document["scenes"][0]["extras"]["audio"]["uri"] == quote(as_text(f"x{name}"), safe="/")

@@ -135,9 +135,7 @@ def test_what_is_no_json_and_rows_of_other_things_are_refused() -> None:
 
 @pytest.fixture
 def path(tmp_path, generation):
-    path = tmp_path / "a.json"
-    formats.write_motion(path, generation, source={"file": "Größe.wav"}, model={"engine": "trajectory"})
-    return path
+    return write(tmp_path / "a.json", generation)
 
 
 def test_the_document_is_as_specified(path, generation):
@@ -194,9 +192,7 @@ def test_what_is_wrong_is_said(path, generation):
 
 @pytest.fixture
 def npz_path(tmp_path, generation):
-    npz_path = tmp_path / "a.npz"
-    formats.write_motion(npz_path, generation, source={"file": "Größe.wav"}, model={})
-    return npz_path
+    return write(tmp_path / "a.npz", generation)
 
 
 def test_arrays_are_not_rounded_and_plain(npz_path, generation):
@@ -211,16 +207,13 @@ def test_arrays_are_not_rounded_and_plain(npz_path, generation):
 
 
 def test_every_value_has_a_standard_deviation(tmp_path, generation):
-    spread = np.random.default_rng(3).uniform(0.01, 4, generation.motion.values.shape)
-    npz_path = tmp_path / "b.npz"
-    formats.write_motion(npz_path, replace(generation, spread=spread), source={}, model={})
-    with np.load(npz_path, allow_pickle=False) as arrays:
-        np.testing.assert_allclose(arrays["standard_deviations"], np.sqrt(spread), rtol=1e-6)
-    reduced = ReducedVariance(spread[:, :1], np.array([[1.0, 4.0]]))
-    formats.write_motion(npz_path, replace(generation, spread=reduced), source={}, model={})
-    with np.load(npz_path, allow_pickle=False) as arrays:
-        np.testing.assert_allclose(arrays["standard_deviations"], np.sqrt(spread[:, :1] * [1, 4]), rtol=1e-6)
-    assert (formats.read_motion(npz_path)[0].values == generation.motion.values).all()
+    variance = np.random.default_rng(3).uniform(0.01, 4, generation.motion.values.shape)
+    reduced = ReducedVariance(variance[:, :1], np.array([[1.0, 4.0]]))
+    for spread, whole in ((variance, variance), (reduced, variance[:, :1] * [1, 4])):
+        npz_path = write(tmp_path / "b.npz", replace(generation, spread=spread))
+        with np.load(npz_path, allow_pickle=False) as arrays:
+            np.testing.assert_allclose(arrays["standard_deviations"], np.sqrt(whole), rtol=1e-6)
+        assert (formats.read_motion(npz_path)[0].values == generation.motion.values).all()
 
 
 RATE_HZ = 22_050

@@ -148,9 +148,8 @@ def test_what_is_written_is_read(vmd_path: Path, vmd_generation: Generation) -> 
     for name in NAMES:
         assert motion[name] == pytest.approx(vmd_generation.motion[name], abs=1e-6)
     assert with_mouth(motion)["lip_gap"].max() > 0.1
-    lowered = replace(
-        vmd_generation, motion=replace(vmd_generation.motion, channels=(*vmd_generation.motion.channels[:6], *BROWS))
-    )
+    moved = vmd_generation.motion
+    lowered = replace(vmd_generation, motion=replace(moved, channels=(*moved.channels[:6], *BROWS)))
     brow = read_motion(written(vmd_path, lowered))[0]["browDownLeft"]
     assert brow == pytest.approx(vmd_generation.motion["eyeBlinkLeft"], abs=1e-6)
 

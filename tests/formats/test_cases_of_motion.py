@@ -233,11 +233,10 @@ def test_frames_of_weights_that_contradict_one_another(tmp_path: Path, caplog: p
 
 
 @pytest.mark.parametrize("counted", [24, 30, 60])
-def test_timecodes_that_count_whole_frames_of_television(tmp_path, counted, caplog):
+def test_timecodes_that_count_whole_frames_of_television(write, tmp_path, counted, caplog):
     duration_s, rate_hz = 120.0, counted / 1.001
     jaw = (np.arange(int(duration_s * rate_hz)) / rate_hz > 118).astype(int)
-    (tmp_path / "a.csv").write_text(take([f"{code(n, counted)},2,{each},0" for n, each in enumerate(jaw)]))
-    generation = read_generation(tmp_path / "a.csv")
+    generation = read_generation(write(take([f"{code(n, counted)},2,{each},0" for n, each in enumerate(jaw)]), "a.csv"))
     motion = match_duration(generation, duration_s).motion
     assert counted / motion.rate_hz == pytest.approx(1.001, abs=1e-6)
     assert motion.time_s[first_open(motion)] == pytest.approx(118, abs=2 / counted)

@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -276,10 +277,9 @@ def test_motion_of_cues_that_are_written(form: str, motion_sheet: CueSheet, tmp_
 @pytest.mark.parametrize(
     ("times", "scale"), [("0 1000 2000", 1000.0), ("0 80 160", 1000.0), ("0 2 4", 1.0), ("0 99.5 199", 1.0)]
 )
-def test_milliseconds_are_read(times: str, scale: float, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_milliseconds_are_read(write: Any, times: str, scale: float, caplog: pytest.LogCaptureFixture) -> None:
     starts = times.split()
-    (tmp_path / "a.tsv").write_text("".join(map("{}\t{}\n".format, starts, "XDX")))
-    found = read_cues(tmp_path / "a.tsv").cues
+    found = read_cues(write("".join(map("{}\t{}\n".format, starts, "XDX")), "a.tsv")).cues
     assert [cue.end_s for cue in found] == pytest.approx([float(time) / scale for time in starts[1:]])
     assert ("milliseconds" in caplog.text) == (scale > 1)
 
@@ -301,9 +301,8 @@ TABLES = {
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_cues_of_tables_and_events_of_visemes(name: str, tmp_path: Path) -> None:
-    (tmp_path / name).write_text(TABLES[name])
-    motion, units = read_motion(tmp_path / name)
+def test_cues_of_tables_and_events_of_visemes(write: Any, name: str) -> None:
+    motion, units = read_motion(write(TABLES[name], name))
     closes = "A" in TABLES[name] or "PP" in TABLES[name]
     closed = [("sil", 0.0, 0.5), ("p", 0.5, 1.0)] if closes else [("sil", 0.0, 1.0)]
     found = [(span.label.phone, span.start_s, span.end_s) for span in units]
@@ -311,9 +310,8 @@ def test_cues_of_tables_and_events_of_visemes(name: str, tmp_path: Path) -> None
     assert motion.time_s[-1] == pytest.approx(2.0)
 
 
-def test_a_table_of_motion_is_none_of_cues(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text("time_s,opening\n0.00,0.5\n0.01,0.6\n0.02,0.7\n")
-    motion, _ = read_motion(tmp_path / "a.csv")
+def test_a_table_of_motion_is_none_of_cues(write: Any) -> None:
+    motion, _ = read_motion(write("time_s,opening\n0.00,0.5\n0.01,0.6\n0.02,0.7\n", "a.csv"))
     assert motion.names == ("opening",)
 
 
@@ -330,11 +328,10 @@ def test_lips_close_in_a_and_are_as_open_as_the_drawings(motion_sheet: CueSheet)
     assert np.abs(np.diff(mouth.gap)).max() < 0.05
 
 
-def test_switch_data_of_rhubarb_has_letters(tmp_path: Path) -> None:
+def test_switch_data_of_rhubarb_has_letters(write: Any, tmp_path: Path) -> None:
     (tmp_path / "a.dat").write_text("MohoSwitch1\n1 X\n13 E\n25 A\n49 X\n")
     assert [cue.label for cue in read_cues(tmp_path / "a.dat").cues] == ["X", "E", "A"]
-    (tmp_path / "a.dat").write_text("MohoSwitch1\n1 rest\n13 E\n25 WQ\n49 rest\n")
-    found = read_cues(tmp_path / "a.dat").cues
+    found = read_cues(write("MohoSwitch1\n1 rest\n13 E\n25 WQ\n49 rest\n", "a.dat")).cues
     assert [(cue.start_s, cue.label) for cue in found] == [(0, "X"), (0.5, "C"), (1, "F")]
 
 
@@ -358,11 +355,10 @@ ERRORS = {
 
 
 @pytest.mark.parametrize("name", ERRORS)
-def test_damaged_files_are_refused(name: str, tmp_path: Path) -> None:
+def test_damaged_files_are_refused(write: Any, name: str) -> None:
     content, message = ERRORS[name]
-    (tmp_path / name).write_text(content, encoding="utf-8")
     with pytest.raises(InputError, match=re.escape(message)):
-        read_motion(tmp_path / name)
+        read_motion(write(content, name))
     assert CUE_FORMATS[Path(name).suffix.removeprefix(".")].parse
 
 
@@ -394,7 +390,6 @@ def test_cues_with_times_need_no_rate(motion_sheet: CueSheet, tmp_path: Path) ->
         ("x a d g f x", "XADGFX"),
     ],
 )
-def test_switch_data_with_names_of_other_sets(names: str, shapes: str, tmp_path: Path) -> None:
+def test_switch_data_with_names_of_other_sets(write: Any, names: str, shapes: str) -> None:
     rows = "".join(f"{1 + 12 * place} {name}\n" for place, name in enumerate(names.split()))
-    (tmp_path / "a.dat").write_text(f"MohoSwitch1\n{rows}")
-    assert "".join(cue.label for cue in read_cues(tmp_path / "a.dat").cues) == shapes[:-1]
+    assert "".join(cue.label for cue in read_cues(write(f"MohoSwitch1\n{rows}", "a.dat")).cues) == shapes[:-1]

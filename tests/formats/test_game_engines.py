@@ -11,7 +11,7 @@ import pytest
 from formats.examples import generation, of_motion, written
 from lipmotion.articulation.contact import opening_to_gap
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats import read_motion, write_motion
+from lipmotion.formats import read_motion
 from lipmotion.formats.blender import write_addon
 from lipmotion.formats.fap import FAP, MOUTH_TO_NOSE, PARAMETERS, STEPS, move_faps
 from lipmotion.types import WEIGHT, Channel, Generation, Motion
@@ -96,8 +96,8 @@ def test_a_clip_has_the_curves_of_the_motion(tmp_path: Path) -> None:
     assert [*found] == ["blendShape.jawOpen", '"blendShape.Mund auf"']
     for name, keys in zip(("jawOpen", "Mund auf"), found.values(), strict=True):
         times_s, values = ([key[field] for key in keys] for field in ("time", "value"))
-        again = np.interp(talking.motion.time_s, times_s, values)
-        assert again == pytest.approx(100 * talking.motion[name], abs=0.02)
+        expected = pytest.approx(100 * talking.motion[name], abs=0.02)
+        assert np.interp(talking.motion.time_s, times_s, values) == expected
         assert (times_s[0], times_s[1]) == (0, pytest.approx(0.3, abs=1e-5))
         slopes = np.diff(values) / np.diff(times_s)
         assert [key["outSlope"] for key in keys[:-1]] == pytest.approx(slopes, rel=1e-3, abs=0.1)
@@ -127,9 +127,6 @@ def test_held_poses_have_constant_tangents(tmp_path: Path) -> None:
     assert {(key["inSlope"], key["outSlope"], key["tangentMode"]) for key in keys} == {(np.inf, np.inf, 103)}
 
 
-NONE = ["0"] * 68
-
-
 def fap_generation(frames: int = 50, rate_hz: float = 25.0) -> Generation:
     values = np.rint(np.random.default_rng(5).normal(0, 200, (frames, len(PARAMETERS))))
     channels = tuple(Channel(f"fap{number}_{name}", FAP) for number, name, *_ in PARAMETERS)
@@ -138,12 +135,12 @@ def fap_generation(frames: int = 50, rate_hz: float = 25.0) -> Generation:
 
 @pytest.mark.parametrize("rate_hz", [25.0, 29.97, 100.0])
 def test_parameters_come_back(tmp_path, rate_hz):
-    written = fap_generation(rate_hz=rate_hz)
-    write_motion(tmp_path / "a.fap", written, source={"file": "my talk.wav"}, model={})
-    motion, units = read_motion(tmp_path / "a.fap")
-    assert (motion.channels, motion.rate_hz, len(units)) == (written.motion.channels, rate_hz, 0)
-    np.testing.assert_array_equal(motion.values, written.motion.values)
-    assert (tmp_path / "a.fap").read_text().splitlines()[0] == f"2.1 my_talk {rate_hz:g} 50"
+    made = fap_generation(rate_hz=rate_hz)
+    path = written(tmp_path / "a.fap", made, file="my talk.wav")
+    motion, units = read_motion(path)
+    assert (motion.channels, motion.rate_hz, len(units)) == (made.motion.channels, rate_hz, 0)
+    np.testing.assert_array_equal(motion.values, made.motion.values)
+    assert path.read_text().splitlines()[0] == f"2.1 my_talk {rate_hz:g} 50"
 
 
 def marks(*numbers: int) -> str:
@@ -189,7 +186,7 @@ def test_what_is_wrong_is_said(tmp_path):
             read(tmp_path, *lines)
     other = replace(fap_generation(), motion=Motion(np.zeros((2, 1)), 25.0, (Channel("opening"),)))
     with pytest.raises(ExportError, match="no parameters of MPEG-4 but opening"):
-        write_motion(tmp_path / "a.fap", other, source={}, model={})
+        written(tmp_path / "a.fap", other)
 
 
 def test_lips_rest_at_0_meet_in_p_and_m_and_go_as_the_standard_says():
@@ -219,9 +216,8 @@ def run(path: Path) -> dict[str, Any]:
 def path(tmp_path: Path) -> Path:
     names = ("jawOpen", 'odd "name"\\')
     moved = Motion(np.random.default_rng(5).random((7, 2)), 100.0, tuple(Channel(name, WEIGHT) for name in names))
-    source = {"file": "a.wav", "path": "../a 'b'.wav", "start_s": "0.25"}
-    write_motion(tmp_path / "a.blender.py", of_motion(moved, stepped=("jawOpen", "width")), source=source, model={})
-    return tmp_path / "a.blender.py"
+    made = of_motion(moved, stepped=("jawOpen", "width"))
+    return written(tmp_path / "a.blender.py", made, file="a.wav", path="../a 'b'.wav", start_s="0.25")
 
 
 def test_it_holds_curves_rate_and_sound(path: Path) -> None:

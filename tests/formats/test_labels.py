@@ -1,6 +1,7 @@
 import html
 import math
 import re
+from itertools import accumulate
 from pathlib import Path
 
 import pytest
@@ -121,29 +122,25 @@ def test_what_cannot_be_used_is_named_with_its_line(read, text, message):
 def test_what_is_written_is_read(tmp_path_factory, phones):
     """Every phone of the inventory, in HTK's and Audacity's form."""
     path = tmp_path_factory.mktemp("labels") / "a.lab"
-    edges = [0]
-    for _, length in phones:
-        edges.append(edges[-1] + length)
-    names = [name for name, _ in phones]
+    names, lengths = zip(*phones, strict=True)
+    edges = [0, *accumulate(lengths)]
     spans = list(zip(edges, edges[1:], names, strict=False))
     path.write_text("".join(f"{a * 100_000} {b * 100_000} {name}\n" for a, b, name in spans))
     htk = rows(label_files.read_labels(path))
     path.write_text("".join(f"{a / 100:.6f}\t{b / 100:.6f}\t{name.upper()}\n" for a, b, name in spans))
     for found in (htk, rows(label_files.read_labels(path))):
-        assert [name for *_, name in found] == names
+        assert tuple(name for *_, name in found) == names
         assert [round(100 * start_s) for start_s, *_ in found] == edges[:-1]
         assert [round(100 * end_s) for _, end_s, _ in found] == edges[1:]
 
 
-def test_without_stress_the_word_decides(tmp_path):
+def test_without_stress_the_word_decides(read):
     phones = [("B", 0.0, 0.1), ("AH", 0.1, 0.2), ("T", 0.2, 0.3), ("ER", 0.3, 0.4)]
     lines = ['"ooTextFile"', '"TextGrid"', "0 0.4 <exists> 2", '"IntervalTier" "words" 0 0.4 1', '0 0.4 "Butter"']
     lines += ['"IntervalTier" "phones" 0 0.4 4', *(f'{a} {b} "{name}"' for name, a, b in phones)]
-    path = tmp_path / "a.TextGrid"
-    path.write_text("\n".join(lines))
-    assert [phone for *_, phone in rows(label_files.read_labels(path))] == ["b", "ah", "t", "axr"]
-    path.write_text("\n".join(lines).replace('"Butter"', '"butter it"'))  # a sentence: no word to be had
-    assert [phone for *_, phone in rows(label_files.read_labels(path))] == ["b", "ah", "t", "er"]
+    for words, found in (("Butter", "axr"), ("butter it", "er")):  # a sentence: no word to be had
+        text = "\n".join(lines).replace("Butter", words)
+        assert [phone for *_, phone in rows(read(text, "a.TextGrid"))] == ["b", "ah", "t", found]
 
 
 def test_other_names_of_silence(read):
@@ -205,32 +202,26 @@ LABEL_WORDS = [
 ]  # fmt: skip
 
 
-def test_what_would_be_read_as_words_is_refused(tmp_path: Path) -> None:
+def test_what_would_be_read_as_words_is_refused(read, write) -> None:
     for text, message in OTHER.values():
         for suffix in (".txt", ".lab"):
-            path = tmp_path / f"a{suffix}"
-            path.write_text(text, encoding="utf-8")
             with pytest.raises(InputError, match=message):
-                label_files.read_labels(path)
+                read(text, f"a{suffix}")
         with pytest.raises(InputError, match=message):
-            label_files.read_plain_text(path)
+            label_files.read_plain_text(write(text, "a.lab"))
 
 
-def test_words_and_labels_in_time_are_no_plain_text_and_words_with_numbers_are(tmp_path: Path) -> None:
-    path = tmp_path / "a.txt"
+def test_words_and_labels_in_time_are_no_plain_text_and_words_with_numbers_are(read, write) -> None:
     for text, message in TIMED.values():
-        path.write_text(text, encoding="utf-8")
         with pytest.raises(InputError, match=message):
-            label_files.read_plain_text(path)
-        assert "hello" in (label_files.read_labels(path).words or ())
+            label_files.read_plain_text(write(text, "a.txt"))
+        assert "hello" in (read(text, "a.txt").words or ())
     for text in ("0 1000000 p\n1000000 2000000 aa\n", "0.0\t0.5\thello\n", '"ooTextFile" "TextGrid"'):
-        path.write_text(text, encoding="utf-8")
         with pytest.raises(InputError, match=r"a\.txt: holds labels in time, required the words alone"):
-            label_files.read_plain_text(path)
+            label_files.read_plain_text(write(text, "a.txt"))
     for text in LABEL_WORDS:
-        path.write_text(text, encoding="utf-8")
-        assert label_files.read_plain_text(path) == text
-        assert label_files.read_labels(path).words
+        assert label_files.read_plain_text(write(text, "a.txt")) == text
+        assert read(text, "a.txt").words
 
 
 LABELLED = [(0.0, 0.31, "sil", ""), (0.31, 0.4, "m", "ma"), (0.4, 0.52, "aa", "ma"), (0.52, 0.7, "dh", 'a "the"')]
@@ -317,8 +308,7 @@ def short_form(tiers: dict[str, list[Interval]]) -> str:
     return "\n".join([*lines, ""])
 
 
-def test_both_forms_in_every_encoding(tmp_path):
-    path = tmp_path / "a.TextGrid"
+def test_both_forms_in_every_encoding(read):
     names = {"S": "s", "EY1": "ey", "HH": "hh", "AY1": "ay", "B": "b", "AA1": "aa"}
     for form, encoding, ends in (
         *[(long_form, "utf-8", "\n"), (short_form, "utf-8-sig", "\n"), (long_form, "utf-16", "\n")],
@@ -326,35 +316,28 @@ def test_both_forms_in_every_encoding(tmp_path):
     ):
         marked = "\ufeff" if encoding == "utf-16-be" else ""
         text = form(TIERS | {"näher": [(0, 2, "…")]}).replace("\n", ends)
-        path.write_bytes((marked + text).encode(encoding))
-        found = label_files.read_labels(path)
+        found = read((marked + text).encode(encoding), "a.TextGrid")
         assert found.words == ("say", "hi", "bob")
-        assert found.phones is not None
-        assert [(s.start_s, s.end_s, s.label.phone) for s in found.phones] == [
-            (start_s, end_s, names.get(text, "sil")) for start_s, end_s, text in TEXTGRID_PHONES
-        ]
+        assert rows(found) == [(start_s, end_s, names.get(text, "sil")) for start_s, end_s, text in TEXTGRID_PHONES]
 
 
-def test_every_file_that_breaks_off_is_refused(tmp_path):
+def test_every_file_that_breaks_off_is_refused(read):
     """Cut after any token but the last, something is missing."""
-    path = tmp_path / "a.TextGrid"
     tokens = short_form({"words": [(0, 1, "a"), (1, 2, "b")]}).split("\n")
     for count in range(3, len(tokens) - 1):
-        path.write_text("\n".join(tokens[:count]))
         with pytest.raises(InputError, match=r"a\.TextGrid: (the header|tier .*) is damaged: .*save it again in Praat"):
-            label_files.read_labels(path)
+            read("\n".join(tokens[:count]), "a.TextGrid")
 
 
-def test_two_tiers_of_phones_and_binary_grids_are_refused(tmp_path):
+def test_two_tiers_of_phones_and_binary_grids_are_refused(write):
     two = short_form({"one": TEXTGRID_PHONES, "two": TEXTGRID_PHONES}).encode()
     for content, message in (
         (two, r"tier 'one' and tier 'two' both hold phones; .*--tier"),
         (b"ooBinaryFile\x08TextGrid\xff\xfe\x00", "is a binary TextGrid, required"),
         (b"ooBinaryFile\x08TextGrid", "is a binary TextGrid, required"),
     ):
-        (tmp_path / "a.TextGrid").write_bytes(content)
         with pytest.raises(InputError, match=message):
-            label_files.read_labels(tmp_path / "a.TextGrid")
+            label_files.read_labels(write(content, "a.TextGrid"))
 
 
 @pytest.mark.recordings
@@ -383,12 +366,11 @@ def test_a_real_one(recordings: Path):
         ('"phones"', f'"{"x" * 9000}"\n"', "is damaged: there stands text 0 2 9 0.0 0.4, required a number"),
     ],
 )
-def test_what_cannot_be_used_is_named_in_one_short_line(tmp_path, old, new, words):
+def test_what_cannot_be_used_is_named_in_one_short_line(write, old, new, words):
     text = short_form(TIERS)
     assert old in text
-    (tmp_path / "a.TextGrid").write_text(text.replace(old, new))
     with pytest.raises(InputError, match=re.escape(words)) as caught:
-        label_files.read_labels(tmp_path / "a.TextGrid")
+        label_files.read_labels(write(text.replace(old, new), "a.TextGrid"))
     assert len(str(caught.value)) < 500 or "the phones are" in words
     assert "\n" not in str(caught.value)
 
@@ -402,29 +384,26 @@ def test_texts_may_hold_anything_and_quotes_are_written_twice() -> None:
         assert [label.text for label in tier.labels] == expected
 
 
-def test_comments_are_passed_over_and_a_grid_may_have_no_tiers(tmp_path: Path) -> None:
+def test_comments_are_passed_over_and_a_grid_may_have_no_tiers(write):
     text = short_form(TIERS).replace("<exists>", "<exists> ! are there 7 tiers?")
     assert [tier.name for tier in parse_interval_tiers(text, "a")] == ["words", "phones"]
-    (tmp_path / "a.TextGrid").write_text('File type = "ooTextFile"\n"TextGrid"\n0\n1\n<absent>\n')
-    found = label_files.read_labels(tmp_path / "a.TextGrid")
+    found = label_files.read_labels(write('File type = "ooTextFile"\n"TextGrid"\n0\n1\n<absent>\n', "a.TextGrid"))
     assert (found.words, found.phones) == (None, None)
 
 
-def test_a_word_that_is_said_again_stays_another_word(tmp_path):
+def test_a_word_that_is_said_again_stays_another_word(write):
     words: list[Interval] = [(0, 0.3, "city"), (0.3, 0.6, "city"), (0.6, 0.8, ""), (0.8, 0.9, "city")]
     said = "S DX IY S T IH SIL SIL IY".split()
     phones: list[Interval] = [(n / 10, (n + 1) / 10, phone) for n, phone in enumerate(said)]
-    (tmp_path / "a.TextGrid").write_text(short_form({"words": words, "phones": phones}))
-    units = label_files.read_phones(tmp_path / "a.TextGrid")
+    units = label_files.read_phones(write(short_form({"words": words, "phones": phones}), "a.TextGrid"))
     assert [span.label for span in group_words(units)] == ["city", "city", "", "city"]
     assert [span.label.again for span in units] == [n == 3 for n in range(9)]
 
 
-def test_vowels_are_reduced_word_by_word(tmp_path):
+def test_vowels_are_reduced_word_by_word(write):
     words: list[Interval] = [(i, i + 1, "about") for i in range(40)]
     phones: list[Interval] = [(n / 4, (n + 1) / 4, phone) for n, phone in enumerate(["AH", "B", "AW", "T"] * 40)]
-    (tmp_path / "a.TextGrid").write_text(short_form({"words": words, "phones": phones}))
-    found = label_files.read_labels(tmp_path / "a.TextGrid").phones
+    found = label_files.read_labels(write(short_form({"words": words, "phones": phones}), "a.TextGrid")).phones
     assert [span.label.phone for span in found] == ["ax", "b", "aw", "t"] * 40
 
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
+from formats.examples import timed
 from lipmotion import Request
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import list_speakers, read_labels, read_phones, read_transcript
 from lipmotion.pipeline.analysis.read_request import read_request
-from lipmotion.types import TimedTranscript
 from lipmotion.units import UNKNOWN_PHONES
 
 CASES = Path(__file__).parents[1] / "data" / "cases" / "labels"
@@ -21,9 +21,7 @@ W = [("hello", 0.4, 0.8), ("big", 0.85, 1.1), ("moon", 1.2, 1.6)]
 
 
 def words(path: Path, **choice: str) -> str:
-    found = read_transcript(path, **choice)
-    assert isinstance(found, TimedTranscript)
-    return " ".join(found.words)
+    return " ".join(timed(path, **choice).words)
 
 
 def phones(path: Path, **choice: str) -> list[str]:
@@ -31,9 +29,7 @@ def phones(path: Path, **choice: str) -> list[str]:
 
 
 def times(path: Path) -> list[tuple[float | None, float | None]]:
-    found = read_transcript(path)
-    assert isinstance(found, TimedTranscript)
-    return [(word.start_s, word.end_s) for line in found.lines for word in line.words]
+    return [(word.start_s, word.end_s) for line in timed(path).lines for word in line.words]
 
 
 def grid(end: float = 2, /, **tiers: Sequence[tuple[float, float, str]]) -> str:
@@ -321,9 +317,7 @@ LINES = {
 
 @pytest.mark.parametrize("name", LINES)
 def test_lines_in_time(write: Any, name: str) -> None:
-    found = read_transcript(write(LINES[name]))
-    assert isinstance(found, TimedTranscript)
-    line = found.lines[0]
+    line = timed(write(LINES[name])).lines[0]
     assert " ".join(word.word for word in line.words) == "hello big moon"
     assert (line.start_s, line.end_s) == pytest.approx((0.4, 1.6))
 

@@ -1,6 +1,7 @@
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from formats.examples import of_motion, written
 from lipmotion import read_motion
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.tables import CURVES, SPEECH_CURVES, is_live_link, read_speech_curves, timecode
+from lipmotion.formats.tables import CURVES, SPEECH_CURVES, is_live_link_file, read_speech_curves, timecode
 from lipmotion.meshes.fitting.blendshape_motion import arkit_weights, with_mouth
 from lipmotion.meshes.model.shape_names import ARKIT_52, ARKIT_MOUTH, ARKIT_OTHERS
 from lipmotion.types import WEIGHT, Channel, Generation, Motion
@@ -54,38 +55,32 @@ WRONG = [
 ]
 
 
-def test_what_is_wrong_is_said(tmp_path):
-    path = tmp_path / "a.csv"
-    for text, message in WRONG:
-        path.write_text(text, encoding="utf-8")
+def test_what_is_wrong_is_said(write):
+    without_end = ("time_s," + "a," * 600_000 + "b\n0,1\n", "fields, required")  # such a line is not read whole
+    for text, message in (*WRONG, without_end):
         with pytest.raises(InputError, match=message):
-            read_motion(path)
-    path.write_text("time_s," + "a," * 600_000 + "b\n0,1\n")  # a line without end is not read whole
-    with pytest.raises(InputError, match="fields, required"):
-        read_motion(path)
+            read_motion(write(text, "a.csv"))
 
 
 def test_names_that_other_separators_would_part_are_refused_and_odd_ones_come_back(tmp_path, generation):
     path = tmp_path / "a.csv"
 
-    def write(name: str) -> None:
+    def write_channel(name: str) -> None:
         written(path, of_motion(Motion(generation.motion.values[:, :1], 100.0, (Channel(name),))))
 
     for name in ("a,b", 'a"b', "a\nb", "a;b", "a\tb", "a\u2028b", "a\x1bb", " a"):
         with pytest.raises(ExportError, match=r"does not fit in a table; write .json or .npz"):
-            write(name)
+            write_channel(name)
         assert not list(tmp_path.iterdir())
     for name in ("jaw open", "Mouth (L)", "a=b", "p1.x", "öffnen", "a|b", "x-y", "'x"):
-        write(name)
+        write_channel(name)
         path.write_text(path.read_text().replace("\n", ",\n"))  # as spreadsheets write it
         assert read_motion(path)[0].names == (name,)
 
 
-def test_uneven_times_of_other_programs_are_evened_out(tmp_path):
+def test_uneven_times_of_other_programs_are_evened_out(write):
     times_s = np.sort(np.arange(300) / 60 + np.random.default_rng(4).uniform(-0.004, 0.004, 300))
-    path = tmp_path / "a.csv"
-    path.write_text("time,jaw\n" + "".join(f"{t},{t - times_s[0]}\n" for t in times_s))
-    motion, _ = read_motion(path)
+    motion, _ = read_motion(write("time,jaw\n" + "".join(f"{t},{t - times_s[0]}\n" for t in times_s), "a.csv"))
     assert motion.rate_hz == 60
     np.testing.assert_allclose(motion["jaw"][:-1], motion.time_s[:-1], atol=1e-9)
 
@@ -154,11 +149,6 @@ def row(code: str, *values: object, count: int = 61) -> str:
     return ",".join(map(str, [code, count, *held]))
 
 
-def read(tmp_path: Path, text: str) -> Motion:
-    (tmp_path / "take.csv").write_text(text, encoding="utf-8")
-    return read_motion(tmp_path / "take.csv")[0]
-
-
 def test_a_take_comes_back(tmp_path, curves):
     write_take(tmp_path / "take.csv", curves)
     motion, units = read_motion(tmp_path / "take.csv")
@@ -180,9 +170,9 @@ def test_the_rate_of_the_timecode_is_found_and_midnight_passed(tmp_path, curves,
 
 @pytest.mark.parametrize("form", ["00:{0:02d}:{1:02d}.0", "00:{0:02d}:{1:02d}", "00:00:{0:02d}.0", "00:00:{0:02d}"])
 @pytest.mark.parametrize("rate", [24, 60])
-def test_frames_that_a_spreadsheet_made_seconds_of_are_frames(tmp_path, caplog, form, rate):
+def test_frames_that_a_spreadsheet_made_seconds_of_are_frames(write, caplog, form, rate):
     rows = [row(form.format(n // rate, n % rate), n / 1000) for n in range(4 * rate)]
-    motion = read(tmp_path, "\n".join([HEAD, *rows]))
+    motion, _ = read_motion(write("\n".join([HEAD, *rows]), "take.csv"))
     assert (motion.rate_hz, len(motion.values)) == (pytest.approx(rate), 4 * rate)
     assert "frames" in caplog.text
 
@@ -209,11 +199,11 @@ def test_curves_that_speech_moves(curves, tmp_path):
         read_speech_curves(Motion(np.zeros((3, 1)), 60.0, (Channel("browInnerUp", WEIGHT),)))
 
 
-def test_what_is_a_table_of_the_app():
+def test_what_is_a_table_of_the_app(write):
     for head in (HEAD, "timecode,BlendshapeCount,x", "Timecode,JawOpen"):
-        assert is_live_link(head.split(","))
+        assert is_live_link_file(write(f"{head}\n", "a.csv"))
     for head in ("time_s,jawOpen", "Timecode,text", "timeCode,blendShapes.JawOpen"):
-        assert not is_live_link(head.split(","))
+        assert not is_live_link_file(write(f"{head}\n", "a.csv"))
 
 
 GOOD_ROWS = [row(f"10:00:00:{n:02d}.000") for n in range(10)]
@@ -233,13 +223,12 @@ WRONG_TAKES = [
 ]
 
 
-def test_what_is_wrong_in_a_take_is_said(tmp_path):
+def test_what_is_wrong_in_a_take_is_said(write):
     for lines, message in WRONG_TAKES:
         with pytest.raises(InputError, match=message):
-            read(tmp_path, "\n".join([HEAD, *lines]))
-    (tmp_path / "take.csv").write_bytes(HEAD.encode() + b"\n\xff\xfe\x00")
+            read_motion(write("\n".join([HEAD, *lines]), "take.csv"))
     with pytest.raises(InputError, match="not a table of"):
-        read_motion(tmp_path / "take.csv")
+        read_motion(write(HEAD.encode() + b"\n\xff\xfe\x00", "take.csv"))
 
 
 OWN = {"exportFps": 30, "trackPath": "talk.wav", "numPoses": 4, "numFrames": 2}
@@ -247,12 +236,7 @@ OWN |= {"facsNames": ["jawDrop", "jawDropLipTowards", "lipCornerPullerL", "eyesC
 OWN |= {"weightMat": [[0.0, 0.0, 0.25, 0.0], [0.5, 0.25, 0.0, 1.0]], "rotations": [[[0, 0, 0, 1]], [[0, 0, 0, 1]]]}
 
 
-def file(folder: Path, document: object, name: str = "a.json") -> Path:
-    (folder / name).write_text(json.dumps(document), encoding="utf-8")
-    return folder / name
-
-
-def test_its_members_are_those_of_the_program(tmp_path: Path) -> None:
+def test_its_members_are_those_of_the_program(tmp_path: Path, write: Any) -> None:
     draw = np.random.default_rng(3)
     moved = Motion(draw.random((61, 2)), 60.0, (Channel("jawOpen", WEIGHT), Channel("eyeBlinkLeft", WEIGHT)))
     path = written(tmp_path / "a.a2f.json", of_motion(moved), path="b/talk.wav")
@@ -264,14 +248,13 @@ def test_its_members_are_those_of_the_program(tmp_path: Path) -> None:
     assert (document["facsNames"][0], document["facsNames"][17], len(set(ARKIT_52))) == ("eyeBlinkLeft", "jawOpen", 52)
     assert np.array(document["weightMat"])[:, 17] == pytest.approx(moved["jawOpen"], abs=1e-5)
     for name in ("a.a2f.json", "talk_bsweight.json"):
-        (tmp_path / name).write_text(json.dumps(document), encoding="utf-8")
-        again, units = read_motion(tmp_path / name)
+        again, units = read_motion(write(document, name))
         assert (again.rate_hz, len(units), again.names) == (60.0, 0, ARKIT_52)
         assert again["eyeBlinkLeft"] == pytest.approx(moved["eyeBlinkLeft"], abs=1e-5)
 
 
-def test_the_names_of_its_own_solver_are_understood(tmp_path: Path) -> None:
-    motion, _ = read_motion(file(tmp_path, OWN))
+def test_the_names_of_its_own_solver_are_understood(write: Any) -> None:
+    motion, _ = read_motion(write(OWN))
     known = arkit_weights(motion)
     assert {name: curve.tolist() for name, curve in known.items() if curve.any()} == {
         "jawOpen": [0.0, 0.75], "mouthClose": [0.0, 0.25], "mouthSmileLeft": [0.25, 0.0], "eyeBlinkRight": [0.0, 1.0],
@@ -290,10 +273,9 @@ ERRORS = {
 
 
 @pytest.mark.parametrize("name", ERRORS)
-def test_damaged_files_are_refused(tmp_path: Path, name: str) -> None:
+def test_damaged_files_are_refused(write: Any, name: str) -> None:
     document, message = ERRORS[name]
     with pytest.raises(InputError, match=message):
-        read_motion(file(tmp_path, document))
-    (tmp_path / "b.a2f.json").write_text(json.dumps(OWN).replace('"exportFps"', '"fps"'), encoding="utf-8")
+        read_motion(write(document))
     with pytest.raises(InputError, match="exportFps is missing"):
-        read_motion(tmp_path / "b.a2f.json")
+        read_motion(write(json.dumps(OWN).replace('"exportFps"', '"fps"'), "b.a2f.json"))

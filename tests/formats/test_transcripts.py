@@ -1,5 +1,6 @@
 import json
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from formats import timing_samples as timings
+from formats.examples import timed
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import find_labels, holds_timings, read_labels, read_phones, read_transcript
 from lipmotion.pipeline.analysis.read_request import read_units
@@ -23,13 +25,7 @@ HELLO_WORDS = [("hello", 1.0, 1.75), ("there", 1.75, 2.5), ("how", 2.75, 3.0), (
 @pytest.fixture
 def read(write: Any) -> Read:
     """Return the transcript in time of a file with some content."""
-
-    def reader(content: str | bytes) -> TimedTranscript:
-        found = read_transcript(write(content, "a.txt"))
-        assert isinstance(found, TimedTranscript)
-        return found
-
-    return reader
+    return lambda content: timed(write(content, "a.txt"))
 
 
 def lines(transcript: TimedTranscript) -> Lines:
@@ -283,10 +279,9 @@ def test_other_encodings(read: Read, caplog: pytest.LogCaptureFixture) -> None:
     assert "a.txt: not UTF-8; read as Windows-1252" in record.getMessage()
 
 
-def test_plain_text_stays_as_it_is(tmp_path: Path) -> None:
+def test_plain_text_stays_as_it_is(write: Any, tmp_path: Path) -> None:
     for text in ("Hello, [you] (all)\n", "The 5:30 - 6:00 train", "5:30 - 6:00", "a -> b", "3 - 4 -> 5"):
-        (tmp_path / "a.txt").write_text(text)
-        assert read_transcript(tmp_path / "a.txt") == text
+        assert read_transcript(write(text, "a.txt")) == text
     with pytest.raises(InputError, match=r"b\.txt: no such transcript file"):
         read_transcript(tmp_path / "b.txt")
 
@@ -337,15 +332,12 @@ def test_what_is_written_is_read(folder: Path, rows: list[tuple[float, float, li
         cues = [f"{clock(a, mark)} --> {clock(b, mark)}\n{' '.join(said)}\n" for a, b, said in spans]
         text = ("WEBVTT\n\n" if form == "vtt" else "") + "\n".join(cues)
     (folder / "a").write_text(text)
-    found = read_transcript(folder / "a")
-    assert isinstance(found, TimedTranscript)
-    got = [(line.start_s, line.end_s, [each.word for each in line.words]) for line in found.lines]
+    got = [(line.start_s, [each.word for each in line.words]) for line in timed(folder / "a").lines]
     assert [line[0] for line in got] == pytest.approx([a for a, *_ in spans], abs=1e-6)
-    assert sorted(line[2] for line in got) == sorted(said for *_, said in spans)
+    assert sorted(line[1] for line in got) == sorted(said for *_, said in spans)
 
 
-def test_times_are_never_spoken(tmp_path: Path) -> None:
-    path = tmp_path / "a.txt"
+def test_times_are_never_spoken(read: Read) -> None:
     for content, message in (
         (SRT.replace("-->", "/"), "two times as in subtitles; required: times as in 00:00:01,000 --> 00:00:02,500, or"),
         (SRT.replace("-->", "", 1), "line 2 is '00:00:01,000  00:00:02,500'; required times as in"),
@@ -356,10 +348,8 @@ def test_times_are_never_spoken(tmp_path: Path) -> None:
         (ASS[: ASS.index("Dialogue")], "the transcript holds no word"),
         ("{25}{63}Hello there\n", "is MicroDVD, whose times are in frames, and says no rate"),
     ):
-        path.write_text(content)
-        with pytest.raises(InputError) as refused:
-            read_transcript(path)
-        assert message in str(refused.value)
+        with pytest.raises(InputError, match=re.escape(message)):
+            read(content)
 
 
 def test_an_empty_file_is_no_transcript(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -369,10 +359,7 @@ def test_an_empty_file_is_no_transcript(tmp_path: Path, caplog: pytest.LogCaptur
 
 
 def words_of(path: Path) -> list[tuple[str, float | None, float | None]]:
-    found = read_transcript(path)
-    assert isinstance(found, TimedTranscript)
-    rows = [(word.word, word.start_s, word.end_s) for line in found.lines for word in line.words]
-    return [(word, start and round(start, 6), end and round(end, 6)) for word, start, end in rows]
+    return [(word, start and round(start, 6), end and round(end, 6)) for word, start, end in words(timed(path))]
 
 
 def phones(path: Path) -> list[tuple[float, float, str, str]]:
@@ -438,11 +425,8 @@ def test_a_textgrid_in_ipa(write: Any) -> None:
 def test_beside_a_recording_and_other_suffixes(write: Any, tmp_path: Path) -> None:
     write(timings.POLLY, "take.json")
     assert find_labels(tmp_path / "take.wav").words == ("mama", "bites")
-    assert (
-        phones(write(timings.POLLY, "take.marks"))
-        == phones(write(timings.POLLY, "take.jsonl"))
-        == phones(tmp_path / "take.json")
-    )
+    for name in ("take.marks", "take.jsonl"):
+        assert phones(write(timings.POLLY, name)) == phones(tmp_path / "take.json")
     assert phones(write(timings.MFA_CSV, "take.csv")) == phones(write(timings.MFA_CSV, "b.txt"))
     assert read_labels(write(timings.CARTESIA)).phones is not None
     assert read_phones(write(timings.MFA_CSV, "b.txt"))[0].label.word == "my"

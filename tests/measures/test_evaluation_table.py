@@ -12,37 +12,30 @@ def figures():
         printed.append(format(value, form))
         return value
 
+    def shares(*names: str):
+        return {name: figure(".3f") for name in names}
+
+    def counts(*names: str):
+        return {name: int(figure(".0f", 1)) for name in names}
+
     def channel():
-        return {
-            "acc": figure(".3f"),
-            "acc_per_clip": figure(".3f"),
-            "nrmse": figure(".3f"),
-            "global_variance": figure(".2f", 0.01),
-            "jerk": figure(".2f", 0.01),
-        }
+        ranges = {name: figure(".2f", 0.01) for name in ("global_variance", "jerk")}
+        return shares("acc", "acc_per_clip", "nrmse") | ranges
 
     def closing():
+        closures = shares("score", "precision", "f1") | {"timing_ms": figure("+.0f", 1)}
+        rates = {name: figure(".1f", 0.1) for name in ("false_per_minute", "original_per_minute")}
         return {
-            "closures": {
-                "score": figure(".3f"),
-                "precision": figure(".3f"),
-                "f1": figure(".3f"),
-                "timing_ms": figure("+.0f", 1),
-                "original": int(figure(".0f", 1)),
-                "generated": int(figure(".0f", 1)),
-            },
-            "closures_p_b_m": {
-                "recall": figure(".3f"),
-                "intervals": int(figure(".0f", 1)),
-                "false_per_minute": figure(".1f", 0.1),
-                "original_per_minute": figure(".1f", 0.1),
-            },
+            "closures": closures | counts("original", "generated"),
+            "closures_p_b_m": shares("recall") | counts("intervals") | rates,
         }
 
     def unpinned():
-        opening = {"acc": figure(".3f")}
         interval = (figure(".3f"), figure(".3f"))
-        return {"channels": {"opening": opening}, "opening_acc_95": interval, "acc": figure(".3f")} | closing()
+        return {"channels": {"opening": shares("acc")}, "opening_acc_95": interval} | shares("acc") | closing()
+
+    def silence():
+        return {name: figure(".4f", 0.0001) for name in ("mean", "std")}
 
     def condition():
         return {
@@ -54,14 +47,7 @@ def figures():
             "lag_ms": figure("+.1f", 0.1),
             **closing(),
             "unpinned": unpinned(),
-            "silence": {
-                "generated": {
-                    "mean": figure(".4f", 0.0001),
-                    "std": figure(".4f", 0.0001),
-                    "frames": int(figure(".0f", 1)),
-                },
-                "original": {"mean": figure(".4f", 0.0001), "std": figure(".4f", 0.0001), "frames": 0},
-            },
+            "silence": {"generated": silence() | counts("frames"), "original": silence() | {"frames": 0}},
         }
 
     return {

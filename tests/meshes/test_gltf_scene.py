@@ -193,8 +193,12 @@ NAMES = ["jawOpen", "mouthWide"]
 
 def animated(tmp_path: Path, time_s: list[float], values: Any, *how: Any, name: str = "a.glb") -> Path:
     """Write the square of two targets with one animation, of some interpolation and target."""
-    (tmp_path / name).write_bytes(gltf.glb(*gltf.animated_document(time_s, values, *how)))
-    return tmp_path / name
+    return written(tmp_path / name, *gltf.animated_document(time_s, values, *how))
+
+
+def written(path: Path, content: dict[str, Any], binary: bytes) -> Path:
+    path.write_bytes(glb(content, binary))
+    return path
 
 
 @pytest.mark.parametrize("kind", ["LINEAR", "STEP"])
@@ -251,8 +255,7 @@ def test_what_moves_no_face_or_is_damaged_is_refused(tmp_path: Path) -> None:
         r"c\.glb: an array of 2 elements, required 4": animated(tmp_path, [0, 1], [[0, 0]], name="c.glb"),
         r"d\.glb: no glTF document": tmp_path / "d.glb",
     }
-    content, binary = gltf.document()
-    (tmp_path / "a.glb").write_bytes(gltf.glb(content, binary))
+    written(tmp_path / "a.glb", *document())
     (tmp_path / "d.glb").write_bytes(b"no")
     for message, file in cases.items():
         with pytest.raises(errors.InputError, match=message):
@@ -276,13 +279,12 @@ def test_turns_of_neck_and_head_are_against_their_rest(tmp_path: Path) -> None:
     animation = content["animations"][1]
     for number, parent, at_rest, turn in zip((neck, head), (Rotation.identity(), world[0]), world, turns, strict=True):
         local = (parent.inv() * turn * at_rest).as_quat().astype("<f4")
-        binary, output = gltf.with_array(content, binary, local, "VEC4")
+        binary, output = with_array(content, binary, local, "VEC4")
         animation["samplers"].append({"input": 4, "output": output})
         target = {"node": number, "path": "rotation"}
         animation["channels"].append({"sampler": len(animation["samplers"]) - 1, "target": target})
     content["buffers"] = [{"byteLength": len(binary)}]
-    (tmp_path / "a.vrma").write_bytes(gltf.glb(content, binary))
-    motion, _ = read_motion(tmp_path / "a.vrma")
+    motion, _ = read_motion(written(tmp_path / "a.vrma", content, binary))
     assert motion["headYaw"] == pytest.approx([0, 0.3, 0.6], abs=1e-5)
     assert motion.values[:, -2:] == pytest.approx(np.zeros((3, 2)), abs=1e-5)
 
@@ -293,8 +295,7 @@ def test_pointers_name_weights(tmp_path: Path, pointer: str) -> None:
     content, binary = gltf.animated_document([n / 30 for n in range(25)], rows)
     pointed = {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": pointer}}}
     content["animations"][1]["channels"][0]["target"] = pointed
-    (tmp_path / "a.glb").write_bytes(gltf.glb(content, binary))
-    motion, _ = read_motion(tmp_path / "a.glb")
+    motion, _ = read_motion(written(tmp_path / "a.glb", content, binary))
     assert motion.names == tuple(NAMES[: rows.shape[1]])
     assert motion.values == pytest.approx(rows, abs=1e-6)
 
@@ -313,19 +314,17 @@ def test_names_of_targets(tmp_path: Path) -> None:
         ({}, {}, ("jawOpen", "mouthPucker")),
     ):
         content["meshes"][0] = {"primitives": [bare, mesh["primitives"][0] | own], "extras": extras}
-        (tmp_path / "a.glb").write_bytes(gltf.glb(content, binary))
-        assert read_motion(tmp_path / "a.glb")[0].names == expected
+        assert read_motion(written(tmp_path / "a.glb", content, binary))[0].names == expected
 
 
 def test_the_animation_that_moves_the_mouth_is_read(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     rows = np.random.default_rng(5).random((5, 2))
     content, binary = gltf.animated_document([n / 30 for n in range(5)], rows)
     talk = content["animations"][1]
-    binary, still = gltf.with_array(content, binary, np.zeros(10, "<f4"), "SCALAR")
+    binary, still = with_array(content, binary, np.zeros(10, "<f4"), "SCALAR")
     idle = {"name": "idle", "channels": talk["channels"], "samplers": [{"input": 4, "output": still}]}
     content["animations"] = [idle, talk]
-    (tmp_path / "a.glb").write_bytes(gltf.glb(content, binary))
-    assert read_motion(tmp_path / "a.glb")[0].values == pytest.approx(rows, abs=1e-6)
+    assert read_motion(written(tmp_path / "a.glb", content, binary))[0].values == pytest.approx(rows, abs=1e-6)
     assert "2 animations move the face: idle, talk; read: talk" in caplog.text
 
 
@@ -386,13 +385,8 @@ def original(tmp_path: Path) -> Path:
     document["images"] = [{"name": "skin", "mimeType": "image/png", "bufferView": 0}]
     document["asset"]["extras"] = {"by": "somebody – Größe"}
     document["animations"][0]["name"] = "dance"
-    text = json.dumps(document).encode()
-    text += b" " * (-len(text) % 4)
-    body = content[20 + size :]
-    header = struct.pack("<4sII", b"glTF", 2, 20 + len(text) + len(body))
-    path = tmp_path / "original.glb"
-    path.write_bytes(header + struct.pack("<II", len(text), 0x4E4F534A) + text + body)
-    return path
+    (tmp_path / "original.glb").write_bytes(glb(document, content[28 + size :]))
+    return tmp_path / "original.glb"
 
 
 def test_everything_stays_and_the_animation_comes_first(original: Path, tmp_path: Path) -> None:
@@ -439,8 +433,8 @@ def test_held_weights_change_at_once(original: Path, tmp_path: Path) -> None:
 
 
 def test_what_is_no_morph_target_and_buffers_elsewhere_are_left_to_another_writer(original, tmp_path):
-    content, binary = gltf.document()
-    content["buffers"][0]["uri"] = gltf.data_uri(binary)
+    content, binary = document()
+    content["buffers"][0]["uri"] = data_uri(binary)
     (tmp_path / "elsewhere.gltf").write_text(json.dumps(content))
     for path, moved in ((original, weights("jawOpen", "vowel_aa")), (tmp_path / "elsewhere.gltf", weights("target 0"))):
         assert not gltf_writer.write_animated_gltf(tmp_path / "a.glb", path, moved)

@@ -60,9 +60,8 @@ def test_states_mirror_in_time(start, length, edge):
 
 
 def test_silence_rests_away_from_speech_only():
-    states = frame_labels.label_full_context(
-        said((0, 0.595, "sil"), (0.595, 0.695, "aa"), (0.695, 1.5, "sil")), 151, LAYOUT
-    )
+    units = said((0, 0.595, "sil"), (0.595, 0.695, "aa"), (0.695, 1.5, "sil"))
+    states = frame_labels.label_full_context(units, 151, LAYOUT)
     rests = np.array([state == REST for state in states])
     margin = round(LAYOUT.rest_s * 100)
     assert margin == 30
@@ -91,11 +90,9 @@ def test_it_is_farther_than_the_margin_from_every_interval(edges: list[int], mar
 
 
 def test_intervals_are_those_of_phones() -> None:
-    units = timeline(("t", "aa"))
-    assert frame_labels.list_speech_intervals(units) == [(0.6, 0.7), (0.7, 0.8)]
-    away = frame_labels.is_away_from_speech(
-        np.array([0.0, 0.2, 0.45, 0.65, 1.0, 1.2]), frame_labels.list_speech_intervals(units), 0.3
-    )
+    speech_s = frame_labels.list_speech_intervals(timeline(("t", "aa")))
+    assert speech_s == [(0.6, 0.7), (0.7, 0.8)]
+    away = frame_labels.is_away_from_speech(np.array([0.0, 0.2, 0.45, 0.65, 1.0, 1.2]), speech_s, 0.3)
     assert away.tolist() == [True, True, False, False, False, True]
     assert frame_labels.is_away_from_speech(np.arange(3.0), [], 1.0).all()
 

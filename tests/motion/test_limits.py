@@ -17,6 +17,7 @@ from lipmotion.motion.modulation_filter import ModulationFilter
 from lipmotion.stats.pca import Pca
 from lipmotion.testing import PHONES, examples, speech, timeline
 from lipmotion.types import GREY, WEIGHT, Channel, Constraints, Pin, Span, Timeline, Unit, silent_monitor
+from meshes.speech import said
 
 POSES = np.array([[0.0, 0.5], [0.3, 0.6], [0.1, 0.55]])
 REACH = space.measure_limits(POSES)
@@ -65,17 +66,12 @@ def test_rest_is_near_the_poses_and_dimensions_may_not_move() -> None:
 
 
 def test_poses_of_no_face() -> None:
-    for low, high, closed in (
-        ([-40.0, 0.5], [60.0, 0.6], 0.0),
-        ([90.0, 0.5], [91.0, 0.6], 0.0),
-        ([-60.0, 0.5], [0.0, 0.6], 0.0),
-        ([0.0, 0.5], [0.3, 0.6], 20.0),
-        ([0.0, 0.5], [0.3, 1e5], 0.0),
-    ):
+    for low, high, closed in ((-40, 60, 0), (90, 91, 0), (-60, 0, 0), (0, 0.3, 20)):
+        limits = space.MotionLimits(np.array([low, 0.5]), np.array([high, 0.6]))
         with pytest.raises(ValueError, match=r"opening|width"):
-            space.check_poses(
-                space.MotionLimits(np.array(low), np.array(high)), FACE, closure.Closure(0, closed, np.zeros(2))
-            )
+            space.check_poses(limits, FACE, closure.Closure(0, closed, np.zeros(2)))
+    with pytest.raises(ValueError, match=r"opening|width"):
+        space.check_poses(space.MotionLimits(REACH.low, np.array([0.3, 1e5])), FACE, CLOSURE)
 
 
 def test_each_unit_has_its_largest_value() -> None:
@@ -109,17 +105,14 @@ MODEL = ENGINE.fit(examples(), silent_monitor).model
 
 def spoken(phones, durations) -> Timeline[Unit]:
     """Phones of given lengths (10 ms frames) between half seconds of silence."""
-    edges = (50 + np.cumsum([0, *durations])) / 100
-    inner = [Span(a, b, Unit(p)) for a, b, p in zip(edges.tolist(), edges[1:].tolist(), phones, strict=False)]
-    end_s = float(edges[-1])
-    return Timeline((Span(0.0, 0.5, Unit("sil")), *inner, Span(end_s, end_s + 0.5, Unit("sil"))))
+    edges = (np.cumsum([0, 50, *durations, 50]) / 100).tolist()
+    return said(*zip(edges, edges[1:], ("sil", *phones, "sil"), strict=False))
 
 
-SPOKEN = st.lists(
-    st.tuples(st.one_of(st.sampled_from("pbm"), st.sampled_from(PHONES[1:])), st.integers(2, 15)),
-    min_size=1,
-    max_size=8,
-).map(lambda pairs: spoken(*zip(*pairs, strict=True)))
+PHONE = st.one_of(st.sampled_from("pbm"), st.sampled_from(PHONES[1:]))
+SPOKEN = st.lists(st.tuples(PHONE, st.integers(2, 15)), min_size=1, max_size=8).map(
+    lambda pairs: spoken(*zip(*pairs, strict=True))
+)
 PINS = st.lists(st.tuples(st.integers(40, 120), st.floats(0, 0.4)), max_size=3)
 
 
@@ -187,14 +180,13 @@ def test_how_closed_is_the_median_of_the_least_openings():
 def test_lips_that_a_wrong_phone_shows_open_are_closed_as_far_as_the_frames_say():
     rng = np.random.default_rng(0)
     frames = np.concatenate([rng.uniform(0.0, 0.01, 40), rng.uniform(0.05, 0.2, 960)])
-    assert closure.estimate_closed_opening([0.126], frames) <= 0.01
-    assert closure.estimate_closed_opening([], frames) <= 0.01
-    assert closure.estimate_closed_opening([0.003, 0.004, 0.005], frames) == 0.004
-    assert closure.estimate_closed_opening([0.126], frames + 0.1, frames) == closure.estimate_closed_opening(
-        [0.126], frames
-    )
-    assert closure.estimate_closed_opening([-0.02], frames) == 0
-    assert closure.estimate_closed_opening([], np.empty(0)) == 0
+    estimate = closure.estimate_closed_opening
+    assert estimate([0.126], frames) <= 0.01
+    assert estimate([], frames) <= 0.01
+    assert estimate([0.003, 0.004, 0.005], frames) == 0.004
+    assert estimate([0.126], frames + 0.1, frames) == estimate([0.126], frames)
+    assert estimate([-0.02], frames) == 0
+    assert estimate([], np.empty(0)) == 0
 
 
 CHANNELS = tuple(map(Channel, ("x_1", "opening", "y_1", "jaw_open", "z_1")))
@@ -268,11 +260,7 @@ def test_curvature_does_not_jump():
 
 
 SENTENCE = speech(timeline(["sil", *(list(PHONES) * 30)[:40], "sil"]), seed=5)
-
-
 PINNED = Constraints((Pin(3.3, "opening", 0.2), Pin(5.01, "opening", 0.1)))
-
-
 BEFORE = 5750  # frames of silence after which the sentence lies on the border of two blocks
 
 
@@ -365,13 +353,10 @@ def test_the_full_range_is_nearer_to_the_original(noisy_clips):
     engines = [engine_named("trajectory", {**options, "variance_scaling": on}) for on in (False, True)]
     learned = engines[0].fit(noisy_clips, silent_monitor).model
     assert 1 < learned.variance_factors[0] <= LARGEST_FACTOR
-    spreads = [
-        np.mean([engine.generate(learned, one.speech).motion["opening"].std() for one in noisy_clips])
-        for engine in engines
-    ]
-    original = np.mean([one.motion["opening"].std() for one in noisy_clips])
-    assert spreads[0] < spreads[1]
-    assert abs(spreads[1] - original) < abs(spreads[0] - original)
+    made = [[engine.generate(learned, one.speech) for one in noisy_clips] for engine in engines]
+    plain, full, original = (np.mean([one.motion["opening"].std() for one in each]) for each in (*made, noisy_clips))
+    assert plain < full
+    assert abs(full - original) < abs(plain - original)
 
 
 def test_pins_and_rest_stay_where_they_are(noisy_clips):

@@ -93,10 +93,8 @@ def test_what_never_moves_is_left_as_it_is() -> None:
 
 
 def test_it_is_stored() -> None:
-    assert np.array_equal(
-        modulation_filter.filter_from_arrays(modulation_filter.filter_to_arrays(FILTER), 2).taps, FILTER.taps
-    )
-    nothing = modulation_filter.filter_to_arrays(None)
+    stored, nothing = (modulation_filter.filter_to_arrays(each) for each in (FILTER, None))
+    assert np.array_equal(modulation_filter.filter_from_arrays(stored, 2).taps, FILTER.taps)
     assert modulation_filter.filter_from_arrays(nothing, 2) is None
     too_large = np.full_like(FILTER.taps, modulation_filter.MODULATION["modulation"].maximum + 1)
     damaged = [modulation_filter.ModulationFilter(taps) for taps in (FILTER.taps[:-1], FILTER.taps[:, :1], too_large)]

@@ -153,9 +153,7 @@ def test_posteriors_of_another_version_or_of_none_are_refused(network: Posterior
         (0, 0.5, 0.1, 0),
     ],
 )
-def test_its_share_depends_on_voice_recogniser_and_noise(
-    network: PosteriorNetwork, voice: float, mean: float, distortion: float, share: float
-) -> None:
+def test_its_share_depends_on_voice_recogniser_and_noise(network, voice, mean, distortion, share):
     shipped = load_model().learned.network
     assert isinstance(shipped, AcousticNetwork)
     dimensions = len(shipped.mean)
@@ -170,8 +168,7 @@ def test_its_share_depends_on_voice_recogniser_and_noise(
     widened = output._replace(weights=weights, biases=np.resize(output.biases, dimensions))
     convolutional = replace(network.network, output=widened)
     beside = replace(network, network=convolutional, centre=0 * ones, scale=ones, recurrent=None)
-    spoken = speech(0, voice=voice)
-    spoken = replace(spoken, posteriors=replace(posteriors(0), mean=mean))
+    spoken = replace(speech(0, voice=voice), posteriors=replace(posteriors(0), mean=mean))
     without, same = alone.predict(spoken)
     motion, distortions = replace(alone, posterior_network=beside).predict(spoken)
     assert distortions == pytest.approx(same)

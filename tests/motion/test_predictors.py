@@ -4,6 +4,7 @@ import re
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -79,9 +80,8 @@ def test_the_trajectory_engine_relies_on_a_predictor_more_than_on_the_table() ->
 
 def test_a_model_whose_predictor_is_not_installed_says_so() -> None:
     arrays = {f"{PREFIX}coefficients": np.zeros((40, 2))}
-    with pytest.raises(
-        ModelFormatError, match=r"^no predictor 'frames'; there are: network, posteriors, prior, encoding; install"
-    ):
+    known = "network, posteriors, prior, encoding"
+    with pytest.raises(ModelFormatError, match=rf"^no predictor 'frames'; there are: {known}; install"):
         predictors.predictor_from_arrays(arrays, 2)
     with pytest.raises(ValueError, match="prior and frames, required one of them"):
         predictors.predictor_from_arrays({**arrays, "prior_sizes": np.zeros(4)}, 2)
@@ -103,21 +103,18 @@ def test_the_recordings_choose_where_no_name_is_given() -> None:
     steps = -(-len(one.valid) // 4)
     prior = PriorOutput(np.zeros((steps, 1)), np.zeros((steps, 0), np.float32), np.zeros(steps))
     standing = replace(one, speech=replace(one.speech, prior=prior))
-    heard = replace(
-        one,
-        valid=np.ones(12_000, bool),
-        condition_spectra=(ConditionSpectrum(np.zeros((len(one.valid), 40), np.float16), 1.0, 0.0),),
-    )
-    much = replace(standing, valid=np.ones(48_000, bool), condition_spectra=heard.condition_spectra)
-    assert predictors.choose_predictor(predictors.AUTOMATIC, [one]) is None
-    assert predictors.choose_predictor(predictors.AUTOMATIC, [standing]) is PriorRegression
-    assert predictors.choose_predictor(predictors.AUTOMATIC, [heard]) is AcousticNetwork
-    assert predictors.choose_predictor(predictors.AUTOMATIC, [much]) is AcousticNetwork
-    assert predictors.choose_predictor("prior", [heard]) is PriorRegression
-    assert predictors.choose_predictor(predictors.AUTOMATIC, [replace(heard, valid=np.ones(11_999, bool))]) is None
+    spectra = (ConditionSpectrum(np.zeros((len(one.valid), 40), np.float16), 1.0, 0.0),)
+    heard = replace(one, valid=np.ones(12_000, bool), condition_spectra=spectra)
+    much = replace(standing, valid=np.ones(48_000, bool), condition_spectra=spectra)
     spoken = replace(one, speech=replace(one.speech, posteriors=TokenPosteriors(np.zeros((9, 3), np.float16), "", 1)))
-    assert predictors.choose_predictor(predictors.AUTOMATIC, [spoken]) is PosteriorNetwork
-    assert predictors.choose_predictor(predictors.AUTOMATIC, [spoken, one]) is None
+    choose = partial(predictors.choose_predictor, predictors.AUTOMATIC)
+    assert choose([one]) is None
+    assert choose([standing]) is PriorRegression
+    assert choose([heard]) is choose([much]) is AcousticNetwork
+    assert choose([replace(heard, valid=np.ones(11_999, bool))]) is None
+    assert choose([spoken]) is PosteriorNetwork
+    assert choose([spoken, one]) is None
+    assert predictors.choose_predictor("prior", [heard]) is PriorRegression
     assert [predictors.count_conditions(predictors.AUTOMATIC, motion_s, 4) for motion_s in (119.9, 120)] == [1, 4]
     assert predictors.count_conditions(predictors.AUTOMATIC, 1, 0) == 0
     assert [predictors.count_conditions(name, 1, 4) for name in ("network", "posteriors", "prior")] == [0, 1, 4]

@@ -164,10 +164,8 @@ def test_unseen_frames_change_nothing() -> None:
 
     _, one = both([with_unseen(each, 0.0) for each in anna()], ben())
     _, other = both([with_unseen(each, 9.0) for each in anna()], ben())
-    for array, same in zip(
-        speaker_maps.speakers_to_arrays(one).values(), speaker_maps.speakers_to_arrays(other).values(), strict=True
-    ):
-        assert np.array_equal(array, same)
+    stored = (speaker_maps.speakers_to_arrays(each).values() for each in (one, other))
+    assert all(np.array_equal(array, same) for array, same in zip(*stored, strict=True))
 
 
 def test_speakers_by_name_and_channels_in_another_order() -> None:

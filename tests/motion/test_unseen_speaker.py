@@ -136,11 +136,8 @@ def test_a_model_that_stands_on_another_gets_the_same_of_it_whoever_speaks(welco
 def test_motion_follows_the_sound_in_speech_the_less_phones_are_relied_on(voice, reliability, share):
     prior = load_model().learned.motion.prior
     units = Timeline((Span(0.0, 1.0, Unit("sil")), Span(1.0, 2.0, Unit("aa")), Span(2.0, 3.0, Unit("sil"))))
-    speaker, heard = (
-        UnseenSpeaker(prior, units, 300, reliability, voice),
-        np.tile(np.eye(len(ARTICULATORS))[0], (300, 1)),
-    )
-    made = changed("follow_sound", speaker, slice(10, 300), heard)
+    heard = np.tile(np.eye(len(ARTICULATORS))[0], (300, 1))
+    made = changed("follow_sound", UnseenSpeaker(prior, units, 300, reliability, voice), slice(10, 300), heard)
     assert made[150 - 10, 0] == pytest.approx(share * (prior.centre + prior.matrix[0]), rel=1e-3)
     assert np.abs(made[[10, 280]]).max() < 1e-3
 

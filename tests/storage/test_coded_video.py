@@ -145,8 +145,6 @@ class TestDamage:
                 coded_video.stored_video_from_arrays(wrong)
 
     def test_larger_pictures_than_allowed_are_not_decoded(self, monkeypatch):
-        from lipmotion_faces import coded_video
-
         data = coded_video.encode_pictures(film(4))
         monkeypatch.setattr(coded_video, "MAX_PICTURE_BYTES", 4 * 48 * 64 * 3 - 1)
         with pytest.raises(ModelFormatError, match="4 pictures of 9216 bytes"):

@@ -23,13 +23,14 @@ from testing.toy import toy_utterances
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links as POSIX has them")
 Verb = Callable[[Path], object]
+LEFT = f"{files.TEMPORARY}left"
 
 
 def outside_of(tmp_path: Path) -> Path:
     """Return a folder that belongs to somebody else, with whatever names the verbs may look for."""
     outside = tmp_path / "outside"
     (outside / "folder").mkdir(parents=True)
-    for name in ("file", f"{files.TEMPORARY}left", "folder/file", "line.edits.json", "old.lipmotion.unfinished"):
+    for name in ("file", LEFT, "folder/file", "line.edits.json", "old.lipmotion.unfinished"):
         (outside / name).write_text("precious")
     (outside / "empty").touch()
     return outside
@@ -96,10 +97,7 @@ def train(folder: Path) -> None:
         *((pronounce, name) for name in ("lexicon.txt",)),
         *((train_voice, f"training/{name}") for name in ("", "recordings", "corpus", f"corpus/{LOCK}")),
         *((train_voice, name) for name in ("voices", "recordings")),
-        *(
-            (add_to_corpus, name)
-            for name in ("corpus.json", "utterances", "utterances/toy00", f"{files.TEMPORARY}left")
-        ),
+        *((add_to_corpus, name) for name in ("corpus.json", "utterances", "utterances/toy00", LEFT)),
         *((sync_corpus, name) for name in (LOCK, "utterances")),
         *((begin_batch, name) for name in (".batch", f".batch/{LOCK}", ".batch/work", "batch.jsonl", "report.csv")),
         *((answer_study, f"{ANSWERS}{suffix}") for suffix in ("", "-wal", "-shm", "-journal")),

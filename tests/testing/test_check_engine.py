@@ -79,34 +79,28 @@ def label_phones(speech: Any) -> Any:
     return rows
 
 
-class Broken:
-    """Ways to break the contract: what each of them changes, and the check that must notice."""
-
-    def half(self, result: Generation) -> Generation:
-        return replace(result, motion=replace(result.motion, values=result.motion.values[::2]))
-
-    def still(self, result: Generation) -> Generation:
-        return replace(result, motion=replace(result.motion, values=np.zeros_like(result.motion.values)))
-
-    def noisy(self, result: Generation) -> Generation:
-        noise = np.random.default_rng().normal(0, 1e-9, result.motion.values.shape)
-        return replace(result, motion=replace(result.motion, values=result.motion.values + noise))
-
-    def traceless(self, result: Generation) -> Generation:
-        return replace(result, trace=StateTrace(("",), result.trace.frames))
-
-    def nameless(self, result: Generation) -> Generation:
-        spans = tuple(replace(span, label=replace(span.label, unit="")) for span in result.units)
-        return replace(result, units=replace(result.units, spans=spans))
+def with_values(result: Generation, values: Any) -> Generation:
+    return replace(result, motion=replace(result.motion, values=values))
 
 
-RESULTS: list[tuple[Callable[[Broken, Generation], Generation], str]] = [
-    (Broken.half, "motion has a row for every frame"),
-    (Broken.still, "motion is learned"),
-    (Broken.noisy, "the same input gives the same bytes"),
-    (Broken.traceless, "every frame has a state"),
-    (Broken.nameless, "units keep their times"),
+def make_noisy(result: Generation) -> Generation:
+    values = result.motion.values
+    return with_values(result, values + np.random.default_rng().normal(0, 1e-9, values.shape))
+
+
+def take_names(result: Generation) -> Generation:
+    spans = tuple(replace(span, label=replace(span.label, unit="")) for span in result.units)
+    return replace(result, units=replace(result.units, spans=spans))
+
+
+RESULTS: list[tuple[Callable[[Generation], Generation], str]] = [
+    (lambda result: with_values(result, result.motion.values[::2]), "motion has a row for every frame"),
+    (lambda result: with_values(result, np.zeros_like(result.motion.values)), "motion is learned"),
+    (make_noisy, "the same input gives the same bytes"),
+    (lambda result: replace(result, trace=StateTrace(("",), result.trace.frames)), "every frame has a state"),
+    (take_names, "units keep their times"),
 ]
+"""Ways to break the contract, and the check that must notice."""
 
 
 def test_an_engine_that_keeps_the_contract_passes():
@@ -117,7 +111,7 @@ def test_an_engine_that_keeps_the_contract_passes():
 def test_a_wrong_result_is_noticed(change, check):
     class Changed(MeanPoses):
         def generate(self, *arguments: Any) -> Generation:
-            return change(Broken(), super().generate(*arguments))
+            return change(super().generate(*arguments))
 
     with pytest.raises(ContractError):
         ENGINE_CHECKS[check](TrainedEngine(Changed(Settings())))
@@ -154,11 +148,7 @@ def learning_from_all(self: Any, examples: Any, monitor: Any, checkpoint: Any = 
 BROKEN: list[tuple[dict[str, Any], str, str | None]] = [
     ({"generate": ignoring_pins}, "pins are exact", None),
     ({"generate": ignoring_pins}, "wrong pins are input errors", None),
-    (
-        {"from_arrays": unchecked},
-        "damaged arrays are format errors",
-        r"'means' missing: KeyError .* required ModelFormatError",
-    ),
+    ({"from_arrays": unchecked}, "damaged arrays are format errors", r"'means' missing: KeyError .* required Model"),
     ({"from_arrays": ignoring_others}, "damaged arrays are format errors", "an unknown array"),
     ({"to_arrays": changing}, "a model comes back from arrays", None),
     ({"fit": learning_from_all}, "frames that are not valid teach nothing", None),
@@ -218,8 +208,8 @@ def test_faces_that_break_it():
         (draw(lambda frames: [frame.astype(float) for frame in frames]), "not uint8"),
         (draw(lambda frames: [frames[0]] * len(frames)), "does not move"),
         (
-            draw(lambda frames: [np.random.default_rng().integers(0, 255, x.shape).astype(np.uint8) for x in frames]),
-            "other pixels",
+            draw(lambda frames: [np.random.default_rng().integers(0, 255, x.shape, np.uint8) for x in frames]),
+            "other pix",
         ),
         (draw(lambda frames: frames, checked=False), "not finite: no error"),
     ):

@@ -151,15 +151,15 @@ def sample_pictures(rows: Curve, contact: Mask, rate_hz: float, time_s: Curve) -
     """
     table = rows.reshape(len(rows), -1)
     values = interpolate_rows(table, rate_hz, time_s)
-    shown = show_contact(contact, rate_hz, time_s)
+    touching = show_contact(contact, rate_hz, time_s)
     position = time_s * rate_hz
     low = np.clip(np.floor(position + 1e-6).astype(int), 0, len(rows) - 1)
     at_frame = position - low <= 1e-6
     values[at_frame] = table[low[at_frame]]
     high = np.where(at_frame, low, np.minimum(low + 1, len(rows) - 1))
-    mixed = np.flatnonzero((contact[low] != shown) | (contact[high] != shown))
+    mixed = np.flatnonzero((contact[low] != touching) | (contact[high] != touching))
     for kind in (True, False):
-        frames, chosen = np.flatnonzero(contact == kind), mixed[shown[mixed] == kind]
+        frames, chosen = np.flatnonzero(contact == kind), mixed[touching[mixed] == kind]
         if len(frames) and len(chosen):
             after = np.clip(np.searchsorted(frames, position[chosen]), 0, len(frames) - 1)
             before = np.maximum(after - 1, 0)

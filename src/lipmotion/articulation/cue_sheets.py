@@ -105,10 +105,10 @@ def list_frame_shapes(sheet: CueSheet) -> list[str]:
     """Return the shape of every frame of the animation, to the end of the sheet."""
     frames = max(1, int(sheet.fps * sheet.duration_s + 1 - 1e-9))
     starts = [min(int(sheet.fps * cue.start_s), frames) for cue in sheet.cues] + [frames]
-    shown: list[str] = []
+    shapes: list[str] = []
     for cue, end in zip(sheet.cues, starts[1:], strict=True):
-        shown += [cue.label] * (end - len(shown))
-    return shown
+        shapes += [cue.label] * (end - len(shapes))
+    return shapes
 
 
 @dataclass(frozen=True)

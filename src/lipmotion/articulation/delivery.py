@@ -100,13 +100,12 @@ def shift_in_time(generation: Generation, delivery: Delivery) -> Generation:
             at = round(frame + by_s * rate_hz)
             if 0 <= at < len(values):
                 values[at] = motion.values[frame]
+    end_s = max(duration_s, _find_end(generation.units) + delivery.offset_ms / 1000)
     return replace(
         generation,
         motion=Motion(values, rate_hz, motion.channels),
         spread=generation.change_frames(lambda rows: rows[nearest]),
-        units=shift_units(
-            generation.units, by_s, max(duration_s, _find_end(generation.units) + delivery.offset_ms / 1000)
-        ),
+        units=shift_units(generation.units, by_s, end_s),
         trace=StateTrace(generation.trace.states, generation.trace.frames[nearest]),
         curve_edits=_shift_edits(generation.curve_edits, by_s, duration_s),
     )
@@ -154,8 +153,8 @@ def intensify(
     """
     motion = generation.motion
     factor = intensity = np.broadcast_to(np.asarray(intensity, np.float64), len(motion.values))
-    moved = np.flatnonzero(intensity != 1)
-    if not len(moved):
+    changed = np.flatnonzero(intensity != 1)
+    if not len(changed):
         return generation
     if opening is None and "opening" in motion.names:
         opening = motion["opening"].astype(np.float64)
@@ -177,7 +176,7 @@ def intensify(
             still = np.median(curve[rest])
             curve = still + factor * (curve - still)
             curve = np.clip(curve, 0, 1) if channel.unit == WEIGHT else curve
-        values[moved, column] = curve[moved]
+        values[changed, column] = curve[changed]
     spread = generation.change_frames(lambda rows: (rows * factor[:, None] ** 2).astype(rows.dtype))
     return replace(generation, motion=replace(motion, values=values), spread=spread)
 

@@ -278,12 +278,12 @@ def _articulate(gap: Curve, weights: dict[str, Curve], time_s: Curve) -> Curve:
     """Return a gap that suits what is said beside p, b and m: teeth on the lip, the tongue out, a round hole."""
     press, tuck, pursed = weights["lip_press"], weights["lip_tuck"], weights["pursed"]
     free = (1 - press) * np.clip(gap / 0.03, 0, 1)
-    shown = np.maximum(2 * weights["teeth"] - 1, 0)
-    for weight, low in ((shown, TEETH_GAPS[0]), (weights["protrusion"] ** 2 * (1 - pursed), ROUND_GAPS[0])):
+    bared = np.maximum(2 * weights["teeth"] - 1, 0)
+    for weight, low in ((bared, TEETH_GAPS[0]), (weights["protrusion"] ** 2 * (1 - pursed), ROUND_GAPS[0])):
         gap = gap + free * weight * (np.maximum(gap, low) - gap)
     spread = np.clip((weights["spread"] - SPREAD_FROM) / (1 - SPREAD_FROM), 0, 1) * (1 - weights["protrusion"])
     protruded = np.clip(4 * weights["protrusion"] - 3, 0, 1)  # oo, not oh
-    for weight, high in ((spread * 2 / 3, SPREAD_GAP), (protruded, ROUND_GAPS[1]), (shown**2, TEETH_GAPS[1])):
+    for weight, high in ((spread * 2 / 3, SPREAD_GAP), (protruded, ROUND_GAPS[1]), (bared**2, TEETH_GAPS[1])):
         gap = gap - weight * np.maximum(gap - high, 0)
     between = np.clip((weights["tongue"] - TIP_UP) / (TIP_OUT - TIP_UP), 0, 1)
     apart = np.clip((0.75 - press) / 0.15, 0, 1)  # also where they were tracked as closed

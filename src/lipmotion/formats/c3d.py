@@ -469,14 +469,14 @@ def check_bvh(motion: Motion) -> None:
 def write_bvh(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write the points; of motion with distances alone, they move as mouths do (``fitting.blendshape_motion``)."""
     motion, template = generation.motion, build_mouth()
-    moved = move_points(motion, generation.units).expressed
+    displacements = move_points(motion, generation.units).expressed
     offsets = [" ".join(f"{value:.5f}" for value in place * CENTIMETRES) for place in template.places]
     lines = ["HIERARCHY", "ROOT head", "{", "  OFFSET 0 0 0", f"  CHANNELS 6 {ROOT_CHANNELS}"]
     for point, jaw, offset in zip(template.points, template.jaw, offsets, strict=True):
         lines += [f"  JOINT {'JAW' if jaw else 'LIP'}_{point}", "  {", f"    OFFSET {offset}"]
         lines += [f"    CHANNELS 3 {POINT_CHANNELS}", "    End Site", "    {", "      OFFSET 0 0 0.5", "    }", "  }"]
     lines += ["}", "MOTION", f"Frames: {len(motion.values)}", f"Frame Time: {1 / motion.rate_hz:.9f}"]
-    places = ((template.places + moved) * CENTIMETRES).reshape(len(moved), -1)
+    places = ((template.places + displacements) * CENTIMETRES).reshape(len(displacements), -1)
     with path.open("w", encoding="ascii", newline="\n") as file:
         file.write("\n".join(lines) + "\n")
         for row in format_rows(places):

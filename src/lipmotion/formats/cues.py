@@ -175,20 +175,20 @@ def format_project(sheet: CueSheet, sound_file: str) -> str:
     """Return the content of a ``.pgo``: one voice; a phrase lasts from rest to rest."""
     # Papagayo knows whole rates alone: 29.97 becomes 30 at the same times, so that frames do not drift from the sound
     sheet = replace(sheet, fps=float(math.ceil(sheet.fps - WHOLE_RATE_TOLERANCE)))
-    shown = list_frame_shapes(sheet)
-    moving = [False, *(shape != REST for shape in shown), False]
-    starts = [frame for frame in range(len(shown)) if moving[frame + 1] and not moving[frame]]
-    ends = [frame for frame in range(len(shown)) if moving[frame + 1] and not moving[frame + 2]]
+    names = list_frame_shapes(sheet)
+    moving = [False, *(shape != REST for shape in names), False]
+    starts = [frame for frame in range(len(names)) if moving[frame + 1] and not moving[frame]]
+    ends = [frame for frame in range(len(names)) if moving[frame + 1] and not moving[frame + 2]]
     phrases = [find_words_of_run(sheet, first, last) for first, last in zip(starts, ends, strict=True)]
     texts = [" ".join(word for *_, word in phrase) for phrase in phrases]
-    lines = [MARK, _one_line(" ".join(sound_file.split())) or "sound.wav", f"{sheet.fps:.0f}", f"{len(shown)}"]
+    lines = [MARK, _one_line(" ".join(sound_file.split())) or "sound.wav", f"{sheet.fps:.0f}", f"{len(names)}"]
     lines += ["1", "\tVoice 1", f"\t{'|'.join(texts)}", f"\t{len(phrases)}"]
     for phrase, words in zip(phrases, texts, strict=True):
         lines += [f"\t\t{words}", f"\t\t{phrase[0][0]}", f"\t\t{phrase[-1][1]}", f"\t\t{len(phrase)}"]
         for first, last, word in phrase:
-            changes = [frame for frame in range(first, last + 1) if frame == first or shown[frame] != shown[frame - 1]]
+            changes = [frame for frame in range(first, last + 1) if frame == first or names[frame] != names[frame - 1]]
             lines.append(f"\t\t\t{word} {first} {last} {len(changes)}")
-            lines += [f"\t\t\t\t{frame} {SHAPES[shown[frame]].blair}" for frame in changes]
+            lines += [f"\t\t\t\t{frame} {SHAPES[names[frame]].blair}" for frame in changes]
     return "\n".join(lines) + "\n"
 
 
@@ -279,7 +279,7 @@ PIXELS = 256  # width and height of a mouth until Spine has its picture
 def format_skeleton(sheet: CueSheet, sound_file: str) -> str:
     """Return the content of the file, in ASCII; the last key is the end, with the shape at rest."""
     shapes = {shape: {"width": PIXELS, "height": PIXELS} for shape in sheet.drawn}
-    moved: dict[str, Any] = {
+    animation: dict[str, Any] = {
         "slots": {SLOT: {"attachment": [{"time": round(time_s, 2), "name": shape} for time_s, shape in sheet.rows]}}
     }
     document: dict[str, Any] = {
@@ -290,8 +290,8 @@ def format_skeleton(sheet: CueSheet, sound_file: str) -> str:
     }
     if sound_file:
         document["events"] = {ANIMATION: {"audio": sound_file}}
-        moved["events"] = [{"time": 0, "name": ANIMATION}]
-    return as_json({**document, "animations": {ANIMATION: moved}}, indent=1) + "\n"
+        animation["events"] = [{"time": 0, "name": ANIMATION}]
+    return as_json({**document, "animations": {ANIMATION: animation}}, indent=1) + "\n"
 
 
 class CueFormat(NamedTuple):

@@ -134,10 +134,10 @@ def move_faps(motion: Motion, units: Timeline[Unit]) -> Motion:
     Where the lips touch, ``lower_t_midlip`` and ``raise_b_midlip`` add up to 0.
     Raises InputError: as ``move_points``.
     """
-    moved, template = move_points(motion, units).expressed, build_mouth()
+    shifts, template = move_points(motion, units).expressed, build_mouth()
     lengths = {"N": MOUTH_TO_NOSE, "W": template.width}
     columns = [
-        np.rint(sign * moved[:, template.row(point), axis] / lengths[unit] * STEPS)
+        np.rint(sign * shifts[:, template.row(point), axis] / lengths[unit] * STEPS)
         for _, _, point, axis, sign, unit in PARAMETERS
     ]
     return Motion(np.stack(columns, axis=1), motion.rate_hz, tuple(Channel(name, FAP) for name in NAMES.values()))

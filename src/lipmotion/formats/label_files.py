@@ -173,9 +173,8 @@ def read_phones(path: Path, tier: str = "", speaker: str = "") -> Timeline[Unit]
         wanted = "a motion file (.json, .npz), a TextGrid with a tier of phones, or labels with times, one phone a line"
         raise InputError(f"{where}: {held}required {wanted}")
     _name_speakers(phones, where)
-    units = merge_timelines(
-        [with_words(read_phone_tier(each, (), where, with_gaps=True), _choose_words(each, tiers)) for each in phones]
-    )
+    spoken = [(read_phone_tier(each, (), where, with_gaps=True), _choose_words(each, tiers)) for each in phones]
+    units = merge_timelines([with_words(*each) for each in spoken])
     recognised = next((each.labels for each in tiers if each.role == RECOGNISED_PHONES), None)
     pairs = [(each, RECOGNISED_LABEL.fullmatch(each.text)) for each in recognised or ()]
     rows = (RecognisedPhone(each.start_s, each.end_s, match[1], float(match[2])) for each, match in pairs if match)
@@ -374,8 +373,8 @@ def _check_no_labels(text: str, where: str) -> None:
 def _check_plain(text: str, path: Path) -> None:
     """Raise InputError for a text that is no plain text, or more than a transcript has."""
     if len(text) > LARGEST_TRANSCRIPT_BYTES:
-        most = f"required at most {LARGEST_TRANSCRIPT_BYTES}"
-        raise InputError(f"{path}: {len(text)} characters, {most}: is it a transcript?")
+        limit = f"required at most {LARGEST_TRANSCRIPT_BYTES}"
+        raise InputError(f"{path}: {len(text)} characters, {limit}: is it a transcript?")
     if is_json(text):
         raise InputError(f"{path}: {describe_json(text, str(path))}")
     _check_no_labels(remove_known_tags(text), str(path))

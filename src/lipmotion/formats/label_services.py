@@ -416,7 +416,11 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
         return [] if lists and not any(lists) else None
     phones = _extend_to_next([row for row in rows if row.role == PHONE_LABELS], [])
     silences = [row.start for row in phones if row.text == SILENCE]
-    spoken = _drop_first_pass(_extend_to_next([row for row in rows if row.role != PHONE_LABELS], silences))
+    spoken = _extend_to_next([row for row in rows if row.role != PHONE_LABELS], silences)
+    half = len(spoken) // 2  # Google's last result repeats the first half, with speakers
+    first, again = ([(row.text, row.start) for row in part] for part in (spoken[:half], spoken[half:]))
+    if half and first == again and spoken[0].speaker != spoken[-1].speaker:
+        spoken = spoken[half:]
     if any(len({part.speaker for part in row.parts}) > 1 for row in spoken):
         spoken = [part for row in spoken for part in row.parts or (row,)]
     tiers = [LabelTier(PHONE_LABELS, tuple(_scale_rows(phones, PHONE_LABELS, where)), PHONE_LABELS)] if phones else []
@@ -430,13 +434,6 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     if not phones and all(each.role != WORDS and not each.parts for each in spoken):
         role = PHONE_LABELS if all(holds_phones(LabelTier("", tuple(each))) for each in by_speaker.values()) else role
     return tiers + [LabelTier(who or role, tuple(labels), role, who) for who, labels in by_speaker.items()]
-
-
-def _drop_first_pass(rows: list[Row]) -> list[Row]:
-    """Return rows without their first half, where the second repeats it with speakers, as Google's last result does."""
-    half = len(rows) // 2
-    first, again = ([(row.text, row.start) for row in part] for part in (rows[:half], rows[half:]))
-    return rows[half:] if half and first == again and rows[0].speaker != rows[-1].speaker else rows
 
 
 def _extend_to_next(rows: list[Row], silences: Iterable[float]) -> list[Row]:

@@ -117,12 +117,8 @@ def _read_span(row: Any) -> Span[Unit]:
 
 
 _TEXT, _TIME = text(10_000), number()
-_UNITS = items(
-    members(
-        {"start_s": _TIME, "end_s": _TIME, "phone": _TEXT, "unit": _TEXT, "word": _TEXT, "again": truth},
-        ("start_s", "end_s", "phone"),
-    )
-)
+_UNIT = {"start_s": _TIME, "end_s": _TIME, "phone": _TEXT, "unit": _TEXT, "word": _TEXT, "again": truth}
+_UNITS = items(members(_UNIT, ("start_s", "end_s", "phone")))
 _ROWS = items(items(lambda value: value, 4, 4))
 _CHANNEL = {"name": _TEXT, "unit": _TEXT}
 _DOCUMENT = members(

@@ -182,12 +182,12 @@ def choose_columns(names: Sequence[str], values: Array) -> list[int]:
     if len(set(names)) == len(names):
         return list(range(len(names)))
     with np.errstate(invalid="ignore"):
-        moved = np.nanmax(values, axis=0, initial=-np.inf) - np.nanmin(values, axis=0, initial=np.inf)
+        ranges = np.nanmax(values, axis=0, initial=-np.inf) - np.nanmin(values, axis=0, initial=np.inf)
     best: dict[str, int] = {}
     for column, name in enumerate(names):
-        if name not in best or moved[column] > moved[best[name]]:
+        if name not in best or ranges[column] > ranges[best[name]]:
             best[name] = column
-    twice = [name for name in best if sum(moved[c] > 0 for c, other in enumerate(names) if other == name) > 1]
+    twice = [name for name in best if sum(ranges[c] > 0 for c, other in enumerate(names) if other == name) > 1]
     if twice:
         LOG.warning("%d curves are there more than once: the one that moves most counts: %s", len(twice), twice[:8])
     return sorted(best.values())

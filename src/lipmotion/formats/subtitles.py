@@ -86,8 +86,8 @@ def _convert_counts(text: str, where: str) -> str:
     """Return lines that begin with counts of frames or tenths of a second with times instead, as those of lyrics."""
     stated = RATE.match(text)
     if text[0] == "{" and not stated:
-        found = "is MicroDVD, whose times are in frames, and says no rate"
-        raise InputError(f"{where}: {found}; required: frames a second in the first line, as {{1}}{{1}}25.000")
+        problem = "is MicroDVD, whose times are in frames, and says no rate"
+        raise InputError(f"{where}: {problem}; required: frames a second in the first line, as {{1}}{{1}}25.000")
 
     def time_line(line: re.Match[str]) -> str:
         per_s = float(stated[1].replace(",", ".")) if stated and line[1] == "{" else 10.0
@@ -151,13 +151,13 @@ def _join_shown(lines: list[str]) -> str:
     blank = [number for number, line in enumerate(lines) if not line]
     if lines and (lines[-1].strip().isdecimal() or (blank and blank[-1] == len(lines) - 2)):
         lines = lines[:-1]  # the number or the name of the next cue
-    shown: list[str] = []
+    parts: list[str] = []
     hidden = False
     for before, line in zip(["-", *lines], lines, strict=False):
         hidden = (hidden and bool(line)) or (not before and NO_CUE.match(line) is not None)
         if line.strip() and not hidden:
-            shown.append(line)
-    return "\n".join(shown)
+            parts.append(line)
+    return "\n".join(parts)
 
 
 def _drop_repetitions(cues: list[TimedLabel]) -> list[TimedLabel]:
@@ -241,7 +241,7 @@ def write_subtitles(path: Path, units: Timeline[Unit]) -> None:
     if path.suffix.lower() == ".srt":
         lines = [f"{n}\n{clock(a, ',')} --> {clock(b, ',')}\n{text}\n\n" for n, (a, b, text) in enumerate(cues, 1)]
     else:
-        shown = (f"\n{clock(a, '.')} --> {clock(b, '.')}\n{text.translate(_ESCAPES)}\n" for a, b, text in cues)
-        lines = ["WEBVTT\n", *shown]
+        blocks = (f"\n{clock(a, '.')} --> {clock(b, '.')}\n{text.translate(_ESCAPES)}\n" for a, b, text in cues)
+        lines = ["WEBVTT\n", *blocks]
     with atomic_file(path) as temporary:
         temporary.write_text("".join(lines), encoding="utf-8", newline="\n")

@@ -15,7 +15,7 @@ from __future__ import annotations
 import logging
 import re
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from itertools import chain
 from pathlib import Path
 
@@ -141,19 +141,15 @@ def write_take(path: Path, generation: Generation, _source: Mapping[str, str], _
             file.write(f"{timecode(time_s)},{len(CURVES)},{form % tuple(row.tolist())}\n")
 
 
-def is_live_link(names: Sequence[str]) -> bool:
-    """Return whether the columns of a table are those of Live Link Face."""
-    lower = [name.lower() for name in names[:2]]
-    return lower[:1] == [FIRST] and (lower[1:] in ([], [COUNT]) or (is_known(names[1]) and "." not in names[1]))
-
-
 def is_live_link_file(path: Path) -> bool:
-    """Return whether a file is such a table; a file that cannot be read is none."""
+    """Return whether a file is a table with the columns of Live Link Face; a file that cannot be read is none."""
     try:
         with open_table(path) as table:
-            return is_live_link(table.names)
+            names = table.names
     except (OSError, ValueError):
         return False
+    lower = [name.lower() for name in names[:2]]
+    return lower[:1] == [FIRST] and (lower[1:] in ([], [COUNT]) or (is_known(names[1]) and "." not in names[1]))
 
 
 def read_speech_curves(motion: Motion) -> Motion:
@@ -299,8 +295,8 @@ def _read_timecodes(codes: list[tuple[int, float, str]]) -> Array:
         last = int(frames[passed].max() if len(passed) == 1 else frames.max())
         if last >= TIMECODE_RATES[-1]:
             raise InputError(f"a timecode has frame {last}, required less than {TIMECODE_RATES[-1]}")
-        shown = next(rate for rate in TIMECODE_RATES if rate > last)
-        rate = shown if len(passed) else max(shown, APP_RATE)
+        counted = next(rate for rate in TIMECODE_RATES if rate > last)
+        rate = counted if len(passed) else max(counted, APP_RATE)
         time_s = seconds + frames / rate
         # every full minute but each tenth follows the last frame of a second with frame 2 (4 of 60)
         first = np.flatnonzero((np.diff(seconds) == 1) & (seconds[1:] % 60 == 0) & (seconds[1:] % 600 != 0)) + 1

@@ -121,8 +121,8 @@ def _read_starts(text: str, first: str, where: str) -> list[LabelTier] | None:
     if not (all(map(POINTS.fullmatch, lines)) if in_seconds else float(last[1]) >= SHORTEST_TICKS):
         return None
     if in_seconds and late and classify_label(point[2]) is not SpokenAs.SILENCE:
-        found = f"has one time a line, {point[1]} in the first"
-        raise InputError(f"{where}: {found}, which may be its start or its end; required: start end label in each")
+        problem = f"has one time a line, {point[1]} in the first"
+        raise InputError(f"{where}: {problem}, which may be its start or its end; required: start end label in each")
     return _read_points(text, where, ends=in_seconds and late)
 
 

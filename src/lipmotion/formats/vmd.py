@@ -43,12 +43,7 @@ LINEAR = (
 LARGEST_FILE_BYTES = 1 << 28
 LAST_FRAME = 86_400 * 30  # frames of a day
 MORPHS: Mapping[str, tuple[str, ...]] = {
-    "あ": ("aa",),
-    "い": ("ih",),
-    "う": ("ou",),
-    "え": ("ee",),
-    "お": ("oh",),
-    "ん": (CLOSED,),
+    **{morph: (name,) for morph, name in zip("あいうえおん", (*VRM_VOWELS, CLOSED), strict=True)},
     "まばたき": ("eyeBlinkLeft", "eyeBlinkRight"),
     "上": ("browInnerUp",),
     "下": ("browDownLeft", "browDownRight"),
@@ -102,8 +97,8 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     of MikuMikuDance, or none of its morphs is one of the mouth.
     """
     morphs, bones, camera = _read_keys(path, lambda name: bool(_find_channels(name)) or name in {HEAD, EYES})
-    moved = {name for morph in morphs for name in _find_channels(morph)}
-    if not moved & {*VRM_VOWELS, *ARKIT_MOUTH}:
+    channels = {name for morph in morphs for name in _find_channels(morph)}
+    if not channels & {*VRM_VOWELS, *ARKIT_MOUTH}:
         named = ", ".join([*morphs][:8]) or "none"
         raise InputError(
             f"the motion has none of the morphs あ い う え お; its morphs are: {named}; "

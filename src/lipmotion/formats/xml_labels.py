@@ -93,9 +93,9 @@ def _read_captions(root: Element, where: str) -> LabelTier:
                 text, times_s = parts[-1].text + text, (parts.pop().start_s, times_s[1])
             parts.append(TimedLabel(*times_s, text, place))
             glued = not f"{text}{child.tail or ''}"[-1:].isspace()
-        shown = "".join(element.itertext())
-        whole = "".join(shown.split()) == "".join("".join(part.text for part in parts).split())
-        labels.append(TimedLabel(start_s, end_s, shown, place, tuple(parts) if whole else ()))
+        content = "".join(element.itertext())
+        whole = "".join(content.split()) == "".join("".join(part.text for part in parts).split())
+        labels.append(TimedLabel(start_s, end_s, content, place, tuple(parts) if whole else ()))
 
     visit(root, 0.0, math.inf)
     return LabelTier("captions", tuple(labels), LINES)

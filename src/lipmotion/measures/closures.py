@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Curve = NDArray[np.float64]
+Frames = NDArray[np.intp]
 Clips = Sequence[Curve]
 CLOSED_SHARE = 0.10
 """The mouth is closed at openings below this share of the 95th percentile of opening on the training list."""
@@ -54,15 +55,13 @@ def find_threshold(openings: Sequence[Curve], share: float = CLOSED_SHARE) -> fl
     return float(share * np.percentile(np.concatenate(openings), 95))
 
 
-def find_closings(opening: Curve, threshold: float) -> NDArray[np.intp]:
+def find_closings(opening: Curve, threshold: float) -> Frames:
     """Return the frames of all closings; a closing is the first closed frame after an open one."""
     closed = opening < threshold
     return np.nonzero(closed[1:] & ~closed[:-1])[0] + 1
 
 
-def match_closings(
-    generated: NDArray[np.intp], original: NDArray[np.intp], reach: int = REACH
-) -> list[tuple[int, int]]:
+def match_closings(generated: Frames, original: Frames, reach: int = REACH) -> list[tuple[int, int]]:
     """Return pairs of a generated and an original closing within ``reach`` frames: as many as possible, one to one.
 
     Of all matchings with most pairs, one with the smallest sum of distances; in the order of time. No pair crosses a
@@ -82,7 +81,7 @@ def match_closings(
     return pairs
 
 
-def count_matches(some: NDArray[np.intp], others: NDArray[np.intp], reach: int = REACH) -> int:
+def count_matches(some: Frames, others: Frames, reach: int = REACH) -> int:
     """Return the number of closings that have any of the others within ``reach`` frames."""
     return int((np.abs(some[:, None] - others) <= reach).any(axis=1).sum())
 

@@ -103,9 +103,16 @@ def measure_lag(generated: Clips, original: Clips, rate_hz: float, reach_s: floa
     It is the maximum of the cross-correlation within ``reach_s`` seconds, refined by a parabola.
     """
     reach = round(reach_s * rate_hz)
-    shifts = range(-reach, reach + 1)
-    position, _ = refine_peak(np.array([_correlate_shifted(generated, original, shift) for shift in shifts]))
-    return (position - reach) / rate_hz * 1000
+    scores = np.zeros(2 * reach + 1)  # of generated[t + shift] with original[t]; 0 where no clip is long enough
+    for number, shift in enumerate(range(-reach, reach + 1)):
+        pairs = [
+            (g[max(shift, 0) : len(g) + min(shift, 0), :1], o[max(-shift, 0) : len(o) - max(shift, 0), :1])
+            for g, o in zip(generated, original, strict=True)
+            if len(g) > abs(shift) + 1
+        ]
+        if pairs:
+            scores[number] = correlate_pooled([g for g, _ in pairs], [o for _, o in pairs])[0]
+    return (refine_peak(scores)[0] - reach) / rate_hz * 1000
 
 
 def refine_peak(scores: Array) -> tuple[float, float]:
@@ -114,16 +121,6 @@ def refine_peak(scores: Array) -> tuple[float, float]:
     before, peak, after = scores[best - 1 : best + 2].tolist()
     curvature = before - 2 * peak + after
     return best + (0.5 * (before - after) / curvature if curvature < 0 else 0.0), peak
-
-
-def _correlate_shifted(generated: Clips, original: Clips, shift: int) -> float:
-    """Return the correlation of generated[t + shift] with original[t] over all clips; 0 where none is long enough."""
-    pairs = [
-        (g[max(shift, 0) : len(g) + min(shift, 0), :1], o[max(-shift, 0) : len(o) - max(shift, 0), :1])
-        for g, o in zip(generated, original, strict=True)
-        if len(g) > abs(shift) + 1
-    ]
-    return float(correlate_pooled([g for g, _ in pairs], [o for _, o in pairs])[0]) if pairs else 0.0
 
 
 DRAWS = 2000  # bootstrap samples of an interval

@@ -29,7 +29,7 @@ from lipmotion.motion.prior_regression import EncodingRegression
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence
 from lipmotion.stats.networks import ConvolutionalNetwork
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
-from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Speech, sub_monitor
+from lipmotion.types import SPECTRUM_BANDS, Speech, sub_monitor
 
 Array = NDArray[np.float64]
 SHAPE = ConvolutionalShape("network", "network", STEP * SPECTRUM_BANDS, 192, (1, 2, 4, 8, 1, 2, 4, 8))
@@ -141,8 +141,8 @@ class AcousticNetwork(Predictor):
         output = self.network.output
         distortion = np.clip(hidden @ output.weights[:, -1].astype(float) + output.biases[-1], 0, 1)
         if self.posterior_network is not None and speech.posteriors is not None:
-            beside = self.posterior_network.hidden_units(speech.posteriors, len(hidden))
-            hidden = np.concatenate([hidden, beside], axis=1)
+            inner = self.posterior_network.hidden_units(speech.posteriors, len(hidden))
+            hidden = np.concatenate([hidden, inner], axis=1)
         return hidden, distortion
 
     def arrays(self) -> dict[str, NDArray[Any]]:
@@ -177,23 +177,19 @@ def _train(training: PredictorTraining, mean: Array, scale: Array) -> Convolutio
     steps = max(training.epochs * -(-len(training.examples) // BATCH_SIZE), MIN_STEPS)
 
     @cache
-    def pieces() -> list[list[TrainingSequence]]:  # not needed where the network comes from its checkpoint
-        return [
-            [_sequence(version, (x - mean) / scale, example.valid) for version in example.condition_spectra]
-            for example, x in zip(training.examples, training.values, strict=True)
-        ]
+    def versions_of(number: int) -> list[TrainingSequence]:  # whole, in time steps, inputs at half precision
+        example, targets = training.examples[number], (training.values[number] - mean) / scale
+        versions = []
+        for version in example.condition_spectra:
+            inputs = stack_spectrum(version.values).astype(np.float16)
+            frames = np.minimum(np.round(np.arange(len(inputs)) * STEP * version.tempo).astype(int), len(targets) - 1)
+            distortion = np.full((len(inputs), 1), version.distortion)
+            outputs = np.concatenate([targets[frames], distortion], axis=1).astype(np.float32)
+            versions.append(TrainingSequence(inputs, outputs, example.valid[frames]))
+        return versions
 
     def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
-        versions = pieces()[number]
+        versions = versions_of(number)
         return cut_random_piece(versions[int(rng.integers(len(versions)))], rng)
 
     return SHAPE.train(training, len(mean) + 1, draw, TrainingPlan(steps, BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED))
-
-
-def _sequence(version: ConditionSpectrum, targets: Array, valid: NDArray[np.bool_]) -> TrainingSequence:
-    """Return inputs and targets of a whole recording in time steps; inputs at half precision."""
-    inputs = stack_spectrum(version.values).astype(np.float16)
-    frames = np.minimum(np.round(np.arange(len(inputs)) * STEP * version.tempo).astype(int), len(targets) - 1)
-    distortion = np.full((len(inputs), 1), version.distortion)
-    outputs = np.concatenate([targets[frames], distortion], axis=1).astype(np.float32)
-    return TrainingSequence(inputs, outputs, valid[frames])

@@ -96,12 +96,8 @@ def fit_eigenlips(images: Images, components: int = COMPONENTS) -> Eigenlips:
 
 def eigenlips_to_arrays(eigenlips: Eigenlips) -> dict[str, NDArray[Any]]:
     """Return eigenlips serialised as arrays (``SIZE``, ``SPACES``)."""
-    return {
-        "mean": eigenlips.mean,
-        "basis": eigenlips.basis,
-        "explained": eigenlips.explained,
-        "size": np.array(eigenlips.size),
-    }
+    parts = {name: getattr(eigenlips, name) for name in SPACES}
+    return parts | {"size": np.array(eigenlips.size)}
 
 
 def eigenlips_from_arrays(arrays: Arrays, remedy: str = "train the model again") -> Eigenlips:

@@ -112,12 +112,12 @@ def fit_modulation_filter(
         wanted = np.maximum(wanted - noise, MIN_SHARE * wanted)
     with np.errstate(divide="ignore", invalid="ignore"):
         gains = np.where(made > 0, np.sqrt(wanted / made), 1.0)
-    shown = frequencies <= HIGHEST_HZ
-    logs = np.log(np.clip(gains[shown], MIN_GAIN, MAX_GAIN))
+    passed = frequencies <= HIGHEST_HZ
+    logs = np.log(np.clip(gains[passed], MIN_GAIN, MAX_GAIN))
     padded = np.pad(logs, ((1, 1), (0, 0)), mode="edge")
     smooth = 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
     size, window = 256, np.hanning(2 * REACH + 3)[1:-1]  # the window method of filter design
-    grid, known = np.fft.rfftfreq(size, 1 / FRAME_RATE_HZ), np.array([0.0, *frequencies[shown], UNCHANGED_HZ])
+    grid, known = np.fft.rfftfreq(size, 1 / FRAME_RATE_HZ), np.array([0.0, *frequencies[passed], UNCHANGED_HZ])
     columns = []
     for log_gains in smooth.T:
         response = np.fft.irfft(np.exp(np.interp(grid, known, np.array([0.0, *log_gains, 0.0]))), size)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, final
+from typing import Any, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,6 +112,7 @@ def stack_encoding(speech: Speech, reach: int = REACH, components: int | None = 
 
 
 Array = NDArray[np.float64]
+Fold = tuple[Array, Array]  # regressors and motion, in time steps, of some examples
 WINDOW = 4  # time steps of 40 ms before and after a frame whose spectrum is used: 160 ms
 ENCODING_REACH, ENCODING_COMPONENTS = 3, 32
 """Time steps before and after a frame whose encoding is used, and its principal components: a minute of speech says no
@@ -175,11 +176,9 @@ class PriorRegression(Predictor):
         mean, scale = rows.mean(axis=0), rows.std(axis=0) + MIN_DEVIATION
         if sizes[-1]:  # principal components keep their proportions
             scale[-sizes[-1] :] = scale[-sizes[-1] :].max()
-        data = [
-            _Fold((x[mask] - mean) / scale, motion[::STEP][mask])
-            for x, motion, mask in zip(everything, values, known, strict=True)
-        ]
-        spread = np.maximum(np.concatenate([each.motion for each in data]).std(axis=0), 1e-6)
+        measured = zip(everything, values, known, strict=True)
+        data = [((x[mask] - mean) / scale, motion[::STEP][mask]) for x, motion, mask in measured]
+        spread = np.maximum(np.concatenate([motion for _, motion in data]).std(axis=0), 1e-6)
         penalty = np.repeat(_choose_ridges(data, sizes, (1 / spread**2)[: training.direct]), sizes)
         predictions: list[Array] = [np.zeros(0)] * len(data)
         for inside, outside in split_folds(len(data)):
@@ -240,13 +239,6 @@ class PriorRegression(Predictor):
         return cls(sizes, mean, scale, stored["prior_coefficients"], stored["prior_centre"], stored["prior_variances"])
 
 
-class _Fold(NamedTuple):
-    """Regressors and motion, in time steps, of some examples."""
-
-    regressors: Array
-    motion: Array
-
-
 def _regressors(speech: Speech) -> list[Array]:
     """Return the regressors of each of ``KINDS`` in every time step of 40 ms [each shape=(ceil(T / 4), ...)]."""
     frames = len(speech.features.values)
@@ -264,10 +256,9 @@ def _regressors(speech: Speech) -> list[Array]:
     return [np.asarray(x, float) for x in kinds]
 
 
-def _solve(data: Sequence[_Fold], penalty: Array) -> tuple[Array, Array]:
+def _solve(data: Sequence[Fold], penalty: Array) -> tuple[Array, Array]:
     """Return coefficients [shape=(R, Q)] and centre [shape=(Q,)] of a ridge regression with a penalty a regressor."""
-    x = np.concatenate([each.regressors for each in data])
-    y = np.concatenate([each.motion for each in data])
+    x, y = (np.concatenate(arrays) for arrays in zip(*data, strict=True))
     centre, shift = y.mean(axis=0), x.mean(axis=0)
     scaled = (x - shift) / np.sqrt(penalty)
     if len(x) < x.shape[1]:  # the dual form has fewer equations
@@ -279,9 +270,9 @@ def _solve(data: Sequence[_Fold], penalty: Array) -> tuple[Array, Array]:
     return coefficients, centre - shift @ coefficients
 
 
-def _choose_ridges(data: Sequence[_Fold], sizes: Sequence[int], weights: Array) -> Array:
+def _choose_ridges(data: Sequence[Fold], sizes: Sequence[int], weights: Array) -> Array:
     """Return the ridge parameter of each kind of regressors with the least error, by ``weights`` of dimensions."""
-    data = [_Fold(each.regressors, each.motion[:, : len(weights)]) for each in data]
+    data = [(regressors, motion[:, : len(weights)]) for regressors, motion in data]
     ridges = np.full(len(sizes), INITIAL_RIDGE)
 
     def error(candidate: Array) -> float:
@@ -289,7 +280,8 @@ def _choose_ridges(data: Sequence[_Fold], sizes: Sequence[int], weights: Array) 
         for inside, outside in split_folds(len(data)):
             coefficients, centre = _solve([data[n] for n in inside], np.repeat(candidate, sizes))
             for number in outside:
-                missed = data[number].regressors @ coefficients + centre - data[number].motion
+                regressors, motion = data[number]
+                missed = regressors @ coefficients + centre - motion
                 total += float((np.square(missed) * weights).sum())
         return total
 

@@ -209,15 +209,9 @@ def map_to_mean_person(examples: Sequence[Example], speakers: Sequence[str]) -> 
 
 def speakers_to_arrays(maps: SpeakerMaps) -> dict[str, NDArray[Any]]:
     """Serialise maps."""
-    return {
-        "channels": np.array([(channel.name, channel.unit) for channel in maps.channels]),
-        "names": np.array(maps.names),
-        "gain": maps.gain,
-        "offset": maps.offset,
-        "rest": maps.rest,
-        "habits": maps.habits,
-        "lips": np.array(maps.lips),
-    }
+    channels = np.array([(channel.name, channel.unit) for channel in maps.channels])
+    parts = {name: getattr(maps, name) for name in ("gain", "offset", "rest", "habits")}
+    return {"channels": channels, "names": np.array(maps.names), **parts, "lips": np.array(maps.lips)}
 
 
 def speakers_from_arrays(arrays: Arrays) -> SpeakerMaps:
@@ -227,11 +221,7 @@ def speakers_from_arrays(arrays: Arrays) -> SpeakerMaps:
         stored = check_arrays(arrays, SPEAKERS, V=len(VISEME_NAMES))
         channels = tuple(Channel(name, unit) for name, unit in stored["channels"].tolist())
         names = tuple(stored["names"].tolist())
-        if (
-            len({channel.name for channel in channels}) < len(channels)
-            or len(set(names)) < len(names)
-            or not all(names)
-        ):
+        if len({channel.name for channel in channels}) < len(channels) or len({*names} - {""}) < len(names):
             raise ValueError("names of speakers or channels that are empty or repeat")
         closed, opened = stored["lips"].tolist()
         parts = (stored["gain"], stored["offset"], stored["rest"], stored["habits"])
@@ -298,12 +288,10 @@ def estimate_rest_poses(people: Sequence[PersonStatistics]) -> Array:
     return np.where(known[:, None], rests, spoken + usual)
 
 
-def estimate_gains(
-    people: Sequence[PersonStatistics], channels: Sequence[Channel], max_gain: float = MAX_GAIN
-) -> Array:
+def estimate_gains(people: Sequence[PersonStatistics], channels: Sequence[Channel], limit: float = MAX_GAIN) -> Array:
     """Return the range of each person as a multiple of the mean person's [shape=(S, P)].
 
-    max_gain : gains lie between its inverse and itself
+    limit : gains lie between its inverse and itself
     Points share one gain for each axis. Of people who say little, gains are drawn towards 1 (``RANGE_PRIOR_S``).
     """
     ranges = np.stack([person.range for person in people])
@@ -320,7 +308,7 @@ def estimate_gains(
     trust = speech_s / (speech_s + RANGE_PRIOR_S)
     shrunk = np.exp(np.log(ratio) * trust[:, None])
     shrunk /= np.exp(np.log(shrunk).mean(axis=0))  # the geometric mean of all gains is 1
-    return np.clip(shrunk, 1 / max_gain, max_gain)
+    return np.clip(shrunk, 1 / limit, limit)
 
 
 SPEAKERS = {

@@ -67,8 +67,8 @@ def read_header_of(path: Path, form: str, version: int, what: str, remedy: str) 
     if not isinstance(header, dict) or header.get("format") != form:
         raise ModelFormatError(f"{path}: not a {what}; {remedy}")
     if header.get("version") != version:
-        found = f"{path}: {what.rsplit(maxsplit=1)[-1]} version {shorten(str(header.get('version')))}"
-        raise ModelFormatError(f"{found}, this lipmotion reads version {version}; upgrade lipmotion, or {remedy}")
+        stated = f"{path}: {what.rsplit(maxsplit=1)[-1]} version {shorten(str(header.get('version')))}"
+        raise ModelFormatError(f"{stated}, this lipmotion reads version {version}; upgrade lipmotion, or {remedy}")
     return header
 
 

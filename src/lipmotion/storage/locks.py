@@ -122,12 +122,12 @@ def open_temporary() -> Iterator[Path]:
                     if path != left:
                         files.remove(path)
             left.parent.rmdir()
-    with ExitStack() as kept:
+    with ExitStack() as stack:
         for is_last in (False, False, True):
             folder = Path(tempfile.mkdtemp(prefix=FOLDER_PREFIX))
-            kept.callback(shutil.rmtree, folder, ignore_errors=True)
+            stack.callback(shutil.rmtree, folder, ignore_errors=True)
             try:
-                kept.enter_context(lock_folder(folder))
+                stack.enter_context(lock_folder(folder))
                 break
             except ExportError:  # another process took it for one that was left, before it was locked
                 if is_last:

@@ -219,8 +219,8 @@ def motion_is_learned(trained: TrainedEngine) -> None:
     recorded = motion(spoken.units, len(spoken.features.values), seed=99)["opening"]
     generated = trained.generate(spoken).motion["opening"]
     require(float(np.ptp(generated)) > 1e-6, "the opening does not move")
-    found = float(np.corrcoef(generated, recorded)[0, 1])
-    require(found > MIN_CORRELATION, f"the opening correlates by {found:.2f}, required {MIN_CORRELATION}")
+    likeness = float(np.corrcoef(generated, recorded)[0, 1])
+    require(likeness > MIN_CORRELATION, f"the opening correlates by {likeness:.2f}, required {MIN_CORRELATION}")
 
 
 def every_frame_has_a_state(trained: TrainedEngine) -> None:

@@ -199,16 +199,16 @@ def check_value(option_field: Field[Any], value: Any) -> None:
     in_range = not fits or kind not in (int, float) or -LARGEST_NUMBER <= value <= LARGEST_NUMBER
     if fits and rule.most is not None and not (in_range and rule.allows(value)):
         what = option_field.metadata.get("what", option_field.name)
-        found = describe_value(value) if type(value) is int else f"{value:g}"
-        raise InputError(f"the {what} is {found}{rule.unit}, required {rule.words}")
+        described = describe_value(value) if type(value) is int else f"{value:g}"
+        raise InputError(f"the {what} is {described}{rule.unit}, required {rule.words}")
     if not in_range:
         raise InputError(f"{option_field.name} is {describe_value(value)}, required at most {LARGEST_NUMBER:g} in size")
     if not fits or not rule.allows(value):
         is_complete = rule.odd or rule.power_of_two or bool(rule.choices) or rule.most is not None
         words = _WORDS.get(kind, "a table of options")
         required = rule.words if is_complete and fits else words + ("" if is_complete else rule.words)
-        found = describe_value(str(value) if isinstance(value, Path) else value)
-        raise InputError(f"{option_field.name} is {found}, required {required}")
+        described = describe_value(str(value) if isinstance(value, Path) else value)
+        raise InputError(f"{option_field.name} is {described}, required {required}")
 
 
 def kind_of(option_field: Field[Any]) -> type[Any]:

@@ -85,7 +85,7 @@ def parse_moods(text: str) -> tuple[MoodKey, ...]:
     >>> parse_moods("sad at 2.5, happy:0.7")
     (MoodKey(time_s=0.0, mood='happy', strength=0.7), MoodKey(time_s=2.5, mood='sad', strength=1.0))
     """
-    found = []
+    keys = []
     for part in filter(None, map(str.strip, text.split(","))):
         key = _KEY.fullmatch(part)
         if key is None:
@@ -93,8 +93,8 @@ def parse_moods(text: str) -> tuple[MoodKey, ...]:
                 f"the mood is {shorten(repr(part))}, required MOOD, MOOD:STRENGTH or MOOD:STRENGTH at SECONDS, "
                 "as happy:0.7 at 2.5; several with commas"
             )
-        found.append(MoodKey(float(key[3] or 0.0), key[1].lower(), float(key[2] or 1.0)))
-    return sort_moods(found)
+        keys.append(MoodKey(float(key[3] or 0.0), key[1].lower(), float(key[2] or 1.0)))
+    return sort_moods(keys)
 
 
 def format_moods(keys: Iterable[MoodKey]) -> str:

@@ -79,9 +79,9 @@ class Speech:
         """Return the same with an array in place of all ``JoinedRows``, for an engine that takes it as one passage."""
         features = replace(self.features, values=np.asarray(self.features.values))
         spectrum = None if self.spectrum is None else np.asarray(self.spectrum)
-        said = self.posteriors and replace(self.posteriors, values=np.asarray(self.posteriors.values))
+        posteriors = self.posteriors and replace(self.posteriors, values=np.asarray(self.posteriors.values))
         encoding = None if self.encoding is None else np.asarray(self.encoding)
-        return replace(self, features=features, spectrum=spectrum, posteriors=said, encoding=encoding)
+        return replace(self, features=features, spectrum=spectrum, posteriors=posteriors, encoding=encoding)
 
     @property
     def units_decide(self) -> bool:

@@ -102,9 +102,9 @@ def _displace_points(name: str) -> Array:
         moving = regions.jaw + 0.6 * regions.lower if name.startswith("jaw") else regions.lips
         return np.outer(moving, [way, 0, 0])
     base = name.removesuffix("Left").removesuffix("Right")
-    moved = _FORMS[base](regions) if base in _FORMS else np.zeros_like(regions.places)
+    displaced = _FORMS[base](regions) if base in _FORMS else np.zeros_like(regions.places)
     side = regions.left if name.endswith("Left") else regions.right
-    return moved if name == base else moved * side[:, None]
+    return displaced if name == base else displaced * side[:, None]
 
 
 def _open_jaw(regions: _Regions) -> Array:
@@ -112,10 +112,10 @@ def _open_jaw(regions: _Regions) -> Array:
     share = regions.jaw + regions.lips * (0.45 + 0.55 * regions.lower - 0.45 * regions.upper)
     arm = regions.places[:, 1:] - HINGE
     cosine, sine = np.cos(JAW_ANGLE_RAD), np.sin(JAW_ANGLE_RAD)
-    moved = np.zeros_like(regions.places)
-    moved[:, 1:] = share[:, None] * (arm @ np.array([[cosine, sine], [-sine, cosine]]) - arm)
-    moved[:, 0] = -0.06 * regions.across * (regions.lips - regions.upper) * (1 - regions.jaw)
-    return moved
+    displacements = np.zeros_like(regions.places)
+    displacements[:, 1:] = share[:, None] * (arm @ np.array([[cosine, sine], [-sine, cosine]]) - arm)
+    displacements[:, 0] = -0.06 * regions.across * (regions.lips - regions.upper) * (1 - regions.jaw)
+    return displacements
 
 
 def _close_before_jaw(regions: _Regions) -> Array:
@@ -130,10 +130,10 @@ def _close_before_jaw(regions: _Regions) -> Array:
     order = np.argsort(where, kind="stable")
     gap = np.interp(regions.across, np.array(where)[order], np.array(gaps)[order])
     lower, upper = template.lower.astype(float), template.upper.astype(float)
-    moved = np.zeros_like(jaw)
-    moved[:, 1] = gap * np.where(template.inner, 1.0, 0.9) * ((1 - UPPER_PART) * lower - UPPER_PART * upper)
-    moved[:, 2] = -0.9 * jaw[:, 2] * lower
-    return moved
+    displacements = np.zeros_like(jaw)
+    displacements[:, 1] = gap * np.where(template.inner, 1.0, 0.9) * ((1 - UPPER_PART) * lower - UPPER_PART * upper)
+    displacements[:, 2] = -0.9 * jaw[:, 2] * lower
+    return displacements
 
 
 def _form(x: Real, y: Real, z: Real, regions: _Regions) -> Array:
@@ -273,20 +273,20 @@ def move_points(motion: Motion, units: Timeline[Unit]) -> PointMotion:
     names = [[f"{axis}_{point}" for axis in "xyz"] for point in template.points]
     if all(name in motion.names for row in names for name in row):
         places = np.stack([np.stack([motion[name] for name in row], axis=1) for row in names], axis=1)
-        moved = places.astype(np.float64) - np.median(places[rest], axis=0)
+        shifts = places.astype(np.float64) - np.median(places[rest], axis=0)
     else:
-        moved = _invent_points(motion, rest, mouth)
+        shifts = _invent_points(motion, rest, mouth)
     # now with gap, width and protrusion of the mouth: the lips of a person at rest are not wholly closed
     across = np.clip(template.places[:, 0] / (template.width / 2), -1, 1)
     lips, right, left = ~template.jaw, template.row(RIGHT_CORNER), template.row(LEFT_CORNER)
-    wider = (mouth.width - 1) * template.width - (moved[:, left, 0] - moved[:, right, 0])
-    moved[:, lips, 0] += np.outer(wider / 2, across[lips])
-    forward = np.maximum(MIN_PROTRUSION * mouth.protrusion - moved[:, lips, 2].mean(axis=1), 0) * mouth.protrusion
-    moved[:, lips, 2] += forward[:, None]
-    moved[:, :, 1] += _separate_lips(moved[:, :, 1], across, mouth.gap)
-    higher = moved[:, template.row(CHIN), 1] + MIN_CHIN_DROP_SHARE * measure_jaw_drop(mouth.gap) * (1 - mouth.tuck)
-    moved[:, template.jaw, 1] -= np.maximum(higher, 0)[:, None]
-    return PointMotion(moved, mouth)
+    wider = (mouth.width - 1) * template.width - (shifts[:, left, 0] - shifts[:, right, 0])
+    shifts[:, lips, 0] += np.outer(wider / 2, across[lips])
+    forward = np.maximum(MIN_PROTRUSION * mouth.protrusion - shifts[:, lips, 2].mean(axis=1), 0) * mouth.protrusion
+    shifts[:, lips, 2] += forward[:, None]
+    shifts[:, :, 1] += _separate_lips(shifts[:, :, 1], across, mouth.gap)
+    higher = shifts[:, template.row(CHIN), 1] + MIN_CHIN_DROP_SHARE * measure_jaw_drop(mouth.gap) * (1 - mouth.tuck)
+    shifts[:, template.jaw, 1] -= np.maximum(higher, 0)[:, None]
+    return PointMotion(shifts, mouth)
 
 
 def _separate_lips(heights: Array, across: Array, gap: Array) -> Array:
@@ -306,10 +306,10 @@ def _separate_lips(heights: Array, across: Array, gap: Array) -> Array:
     right = np.clip(np.searchsorted(places, across[lips]), 1, len(places) - 1)
     share = (across[lips] - places[right - 1]) / (places[right] - places[right - 1])
     parted = (lacking[:, right - 1] * (1 - share) + lacking[:, right] * share) / 2
-    moved = np.zeros_like(heights)
-    moved[:, lips] = np.where(template.upper[lips], parted, -parted)
-    moved[:, pairs[:, 0]], moved[:, pairs[:, 1]] = lacking[:, 1:-1] / 2, -lacking[:, 1:-1] / 2
-    return moved
+    displacements = np.zeros_like(heights)
+    displacements[:, lips] = np.where(template.upper[lips], parted, -parted)
+    displacements[:, pairs[:, 0]], displacements[:, pairs[:, 1]] = lacking[:, 1:-1] / 2, -lacking[:, 1:-1] / 2
+    return displacements
 
 
 def _invent_points(motion: Motion, rest: NDArray[np.bool_], mouth: SpokenMouth) -> Array:

@@ -206,8 +206,8 @@ class DrivenCharacter:
         for name, shape in self._expressions.items():
             if name in moods:
                 curve = self.table.get(shape, make_plain_row(shape, name)).alone(moods[name])
-                moved = self.placement.to_motion(self.mesh.displacements(np.array([upper, lower]), (shape,)))[0]
-                curves[shape] = curve * mouth.free if moved[0, 1] - moved[1, 1] > MIN_GAP / 2 else curve
+                shifts = self.placement.to_motion(self.mesh.displacements(np.array([upper, lower]), (shape,)))[0]
+                curves[shape] = curve * mouth.free if shifts[0, 1] - shifts[1, 1] > MIN_GAP / 2 else curve
         return curves
 
     @cached_property

@@ -136,8 +136,8 @@ def compute_living_curves(
     prosody : of the speech, for accents of brows and head; None: they follow the opening
     They are those of all faces with the same seed. Channels are blendshapes (weights), and ``ANGLES`` in radians.
     """
-    moved = stage_liveliness(motion.time_s[frames], motion, units, staging, prosody)
-    curves = eye_and_brow_weights(moved) | dict(zip(ANGLES, moved.turn.T, strict=True))
+    liveliness = stage_liveliness(motion.time_s[frames], motion, units, staging, prosody)
+    curves = eye_and_brow_weights(liveliness) | dict(zip(ANGLES, liveliness.turn.T, strict=True))
     channels = tuple(Channel(name, RADIAN if name in ANGLES else WEIGHT) for name in curves)
     return Motion(np.stack(list(curves.values()), axis=1), motion.rate_hz, channels)
 

@@ -19,25 +19,13 @@ from lipmotion.meshes.fitting.blendshape_motion import find_own_weights, move_po
 from lipmotion.meshes.model.face_shapes import NOT_FROM_POINTS, FaceShapes
 from lipmotion.meshes.model.shape_names import SIDES, VISEMES_15
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
+from lipmotion.units.spelling import parse_table
 
 Array = NDArray[np.float64]
-VISEME_PHONES = {
-    "sil": "sil sp",
-    "PP": "p b m em",
-    "FF": "f v",
-    "TH": "th dh",
-    "DD": "t d",
-    "kk": "k g hh",
-    "CH": "ch jh sh zh",
-    "SS": "s z",
-    "nn": "n l ng en el",
-    "RR": "r er axr",
-    "aa": "aa ay aw ah",
-    "E": "eh ey ae ax",
-    "ih": "ih iy ix y",
-    "oh": "ao ow oy",
-    "ou": "uw uh w",
-}
+VISEME_PHONES = parse_table(
+    "sil=sil_sp PP=p_b_m_em FF=f_v TH=th_dh DD=t_d kk=k_g_hh CH=ch_jh_sh_zh SS=s_z nn=n_l_ng_en_el RR=r_er_axr "
+    "aa=aa_ay_aw_ah E=eh_ey_ae_ax ih=ih_iy_ix_y oh=ao_ow_oy ou=uw_uh_w"
+)
 """The phones of each viseme (the groups of the Oculus LipSync reference, in the project's phones)."""
 VISEME_OF_PHONE = {phone: viseme for viseme, phones in VISEME_PHONES.items() for phone in phones.split()}
 VISEME_CHANNELS = tuple(f"viseme_{name}" for name in VISEMES_15)

@@ -98,8 +98,8 @@ def find_life_scale(mesh: Mesh, placement: LipPlacement) -> float:
 def measure_lip_parting(mesh: Mesh, placement: LipPlacement) -> Array:
     """Return how far each blendshape of a mesh parts the middle of the inner lips, eye distances [shape=(S,)]."""
     rows = [[placement.vertices[placement.row(point)] for point in pair] for pair in FACING[:3]]
-    moved = placement.to_motion(mesh.displacements(np.ravel(rows))).reshape(len(mesh.shapes), -1, 2, 3)
-    gap = (moved[:, :, 0, 1] - moved[:, :, 1, 1]).mean(axis=1)
+    shifts = placement.to_motion(mesh.displacements(np.ravel(rows))).reshape(len(mesh.shapes), -1, 2, 3)
+    gap = (shifts[:, :, 0, 1] - shifts[:, :, 1, 1]).mean(axis=1)
     return np.asarray(gap * placement.scale / find_life_scale(mesh, placement))
 
 

@@ -152,9 +152,9 @@ class Blendshape:
     @classmethod
     def between(cls, name: str, neutral: Array, shape: Array, *, smallest: float = 0.0) -> Blendshape:
         """Return the blendshape that moves the vertices ``neutral`` to ``shape`` [shape=(V, 3), both]."""
-        moved = shape - neutral
-        rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > smallest)
-        return cls(name, rows, moved[rows])
+        change = shape - neutral
+        rows = np.flatnonzero(np.abs(change).max(axis=1, initial=0.0) > smallest)
+        return cls(name, rows, change[rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,13 +221,13 @@ class Mesh:
         """Return how far blendshapes move the vertices ``rows`` [shape=(N,)] at weight 1 [shape=(S, N, 3)]."""
         by_name = {shape.name: shape for shape in self.shapes}
         shapes = self.shapes if names is None else [by_name[name] for name in names]
-        moved = np.zeros((len(shapes), len(rows), 3))
+        result = np.zeros((len(shapes), len(rows), 3))
         dense = np.zeros_like(self.vertices)
-        for shape, chosen in zip(shapes, moved, strict=True):
+        for shape, chosen in zip(shapes, result, strict=True):
             dense[shape.rows] = shape.displacements
             chosen[:] = dense[rows]
             dense[shape.rows] = 0.0
-        return moved
+        return result
 
 
 def _check_places(what: str, values: NDArray[np.float64]) -> None:

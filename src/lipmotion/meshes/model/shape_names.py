@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.types import Motion
+from lipmotion.units.spelling import parse_table
 
 ARKIT_MOUTH = (
     *("jawForward", "jawLeft", "jawRight", "jawOpen", "mouthClose", "mouthFunnel", "mouthPucker"),
@@ -133,48 +134,28 @@ FACEGOOD: Sources = {
     "mouthRollUpper": (("mouth_suck_ul", 0.5), ("mouth_suck_ur", 0.5)),
     **{
         f"{known}{side}": ((f"mouth_{name}_{side[0].lower()}", 1.0),)
-        for known, name in (
-            ("mouthSmile", "lipCornerPull"),
-            ("mouthFrown", "lipCornerDepress"),
-            ("mouthStretch", "lipStretch"),
-            ("mouthLowerDown", "lowerLipDepress"),
-            ("mouthUpperUp", "upperLipRaise"),
-            ("mouthPress", "press"),
-        )
+        for known, name in parse_table(
+            "mouthSmile=lipCornerPull mouthFrown=lipCornerDepress mouthStretch=lipStretch "
+            "mouthLowerDown=lowerLipDepress mouthUpperUp=upperLipRaise mouthPress=press"
+        ).items()
         for side in SIDES
     },
 }
 """The blendshapes of FACEGOOD-Audio2Face as ARKit's: their weights, times these, added up. Set by eye."""
-_OF_BOTH_SIDES = {
-    "mouthSmile": "lipCornerPuller",
-    "mouthFrown": "lipCornerDepressor",
-    "mouthStretch": "lipStretcher",
-    "mouthDimple": "dimpler",
-    "mouthUpperUp": "upperLipRaiser",
-    "mouthLowerDown": "lowerLipDepressor",
-    "eyeBlink": "eyesClose",
-    "eyeWide": "eyesUpperLidRaiser",
-    "eyeSquint": "squint",
-    "browDown": "browLower",
-    "browOuterUp": "outerBrowRaiser",
-    "cheekSquint": "cheekRaiser",
-    "noseSneer": "noseWrinkler",
-}
+_OF_BOTH_SIDES = parse_table(
+    "mouthSmile=lipCornerPuller mouthFrown=lipCornerDepressor mouthStretch=lipStretcher mouthDimple=dimpler "
+    "mouthUpperUp=upperLipRaiser mouthLowerDown=lowerLipDepressor eyeBlink=eyesClose eyeWide=eyesUpperLidRaiser "
+    "eyeSquint=squint browDown=browLower browOuterUp=outerBrowRaiser cheekSquint=cheekRaiser noseSneer=noseWrinkler"
+)
+_OF_ONE = parse_table(
+    "mouthPucker=pucker mouthFunnel=funneler mouthRollUpper=lipSuck mouthRollLower=lipSuck mouthShrugLower=chinRaiser "
+    "mouthPressLeft=lipPressor mouthPressRight=lipPressor jawForward=jawThrust jawLeft=jawSlideLeft "
+    "jawRight=jawSlideRight mouthLeft=mouthSlideLeft mouthRight=mouthSlideRight"
+)
 AUDIO2FACE: Sources = {
     "jawOpen": (("jawDrop", 1.0), ("jawDropLipTowards", 1.0)),
     "mouthClose": (("jawDropLipTowards", 1.0),),
-    "mouthPucker": (("pucker", 1.0),),
-    "mouthFunnel": (("funneler", 1.0),),
-    "mouthRollUpper": (("lipSuck", 1.0),),
-    "mouthRollLower": (("lipSuck", 1.0),),
-    "mouthShrugLower": (("chinRaiser", 1.0),),
-    "mouthPressLeft": (("lipPressor", 1.0),),
-    "mouthPressRight": (("lipPressor", 1.0),),
-    "jawForward": (("jawThrust", 1.0),),
-    "jawLeft": (("jawSlideLeft", 1.0),),
-    "jawRight": (("jawSlideRight", 1.0),),
-    "mouthLeft": (("mouthSlideLeft", 1.0),),
-    "mouthRight": (("mouthSlideRight", 1.0),),
+    **{known: ((name, 1.0),) for known, name in _OF_ONE.items()},
     "browInnerUp": (("innerBrowRaiserL", 0.5), ("innerBrowRaiserR", 0.5)),
     "cheekPuff": (("cheekPuffL", 0.5), ("cheekPuffR", 0.5)),
     **{f"{known}{side}": ((f"{name}{side[0]}", 1.0),) for known, name in _OF_BOTH_SIDES.items() for side in SIDES},
