@@ -211,7 +211,7 @@ def test_the_trials_of_hofer_2008():
     assert set(firsts.values()) == {12}
 
 
-def test_every_video_once_for_opinions_and_the_condition_in_step_is_expected_first_and_second():
+def test_every_video_once_for_opinions_and_the_anchor_first_and_second():
     late = SHOWN | {("one", answers.ANCHOR): 100, ("two", answers.ANCHOR): 101}
     trials = manifest.make_main_trials(answers.MOS, CONDITIONS, SENTENCES, late)
     assert sorted(trial.videos[0] for trial in trials) == sorted(late.values())
