@@ -127,12 +127,12 @@ def _loop(options: Any) -> tuple[Any, Any, list[np.ndarray]]:
     builder = NetworkBuilder()
     for state, stay in enumerate(np.diag(model["A"])):
         builder.state(state, float(np.log(stay)))
-        builder.final(state)
+        builder.final[state] = 0.0
     for source, target in zip(*np.nonzero(model["A"]), strict=True):
         if source != target:
             builder.arc(int(source), int(target), float(np.log(model["A"][source, target])))
     for state in np.flatnonzero(model["pi"]):
-        builder.initial(int(state), float(np.log(model["pi"][state])))
+        builder.initial[int(state)] = float(np.log(model["pi"][state]))
     values = (np.log(model["w"]), model["mu"], model["var"])
     return Mixtures(*(v.astype(np.float32) for v in values)), builder.build(), list(data.astype(np.float32))
 

@@ -55,7 +55,7 @@ from lipmotion_faces.registry import make_face  # noqa: E402
 from lipmotion_studio.folder import open_folder  # noqa: E402
 from lipmotion_studio.recording import OpenRecording, analyse_recording, open_recording  # noqa: E402
 from meshes.heads import head, write_glb  # noqa: E402
-from studio.hostile import attacked  # noqa: E402
+from studio.hostile import attack  # noqa: E402
 from studio.served import Served, lost_edits, random_edit, served, undone_edits  # noqa: E402
 from studio.two_clients import walk  # noqa: E402
 from testing.toy import toy_sentences  # noqa: E402
@@ -212,7 +212,7 @@ def timed_edit(line: OpenRecording, step: str) -> tuple[dict[str, float] | None,
 
 def kills(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     errors = sound.with_name("errors.txt")
-    found = lost_edits(sound, None, errors, options.count or 100, 2.0, options.seed, told)
+    found = lost_edits(sound, errors, options.count or 100, 2.0, seed=options.seed, report=told)
     return found | {"tracebacks": errors.read_text(encoding="utf-8").count("Traceback")}
 
 
@@ -274,7 +274,7 @@ def hostile(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     errors, count = sound.with_name("errors.txt"), options.count or 2000
     with served(sound, errors) as server:
         server.ready()
-        statuses = attacked(server, sound.parent, count)
+        statuses = attack(server, sound.parent, count)
         server.ready()
         server.kill()
     tracebacks = errors.read_text(encoding="utf-8").count("Traceback")
@@ -284,7 +284,7 @@ def hostile(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
 def undo(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     """Make random edits over HTTP, take all back after a restart, and make all again: the bytes are the same."""
     started_s, errors = time.monotonic(), sound.with_name("errors.txt")
-    found = undone_edits(sound, None, errors, options.count or 1000, options.seed, UNDO_LIMIT_S)
+    found = undone_edits(sound, errors, options.count or 1000, seed=options.seed, limit_s=UNDO_LIMIT_S)
     tracebacks = errors.read_text(encoding="utf-8").count("Traceback")
     return found | {"tracebacks": tracebacks, "minutes": round((time.monotonic() - started_s) / 60, 1)}
 

@@ -193,21 +193,19 @@ def _measure_channels(
 def _measure_points(made: Motion, original: Motion, points: Mapping[str, tuple[str, ...]]) -> dict[str, Any]:
     """Return the figures of points in mm (None: no points); at rest, points above the eyes are at their median."""
 
-    def select(side: Motion, wanted: Sequence[str]) -> Array:
+    def select(side: Motion, wanted: Sequence[str]) -> list[Array]:
         coordinates = _select_values(side, [axis for point in wanted for axis in points[point]])
-        return coordinates.reshape(len(coordinates), -1, 3) * MILLIMETRES
-
-    def select_both(wanted: Sequence[str]) -> tuple[list[Array], list[Array]]:
-        return [select(made, wanted)], [select(original, wanted)]
+        return [coordinates.reshape(len(coordinates), -1, 3) * MILLIMETRES]
 
     lips = [point for point in points if point.isdecimal() and int(point) in LIP_POINTS]
     upper = [point for point in points if np.median(original[f"y_{point}"]) > 0]
-    rest = np.median(select(original, upper), axis=0)
+    everything, of_lips, of_upper = ((select(made, some), select(original, some)) for some in ([*points], lips, upper))
+    rest = np.median(of_upper[1][0], axis=0)
     return {
         "points": len(points),
         "lip_points": len(lips),
         "upper_points": len(upper),
-        "landmark_distance_mm": curves.measure_landmarks(*select_both(list(points))),
-        "lip_vertex_error_mm": curves.measure_lip_error(*select_both(lips)) if lips else None,
-        "upper_face_deviation_mm": curves.measure_upper_face(*select_both(upper), rest) if upper else None,
+        "landmark_distance_mm": curves.measure_landmarks(*everything),
+        "lip_vertex_error_mm": curves.measure_lip_error(*of_lips) if lips else None,
+        "upper_face_deviation_mm": curves.measure_upper_face(*of_upper, rest) if upper else None,
     }

@@ -456,12 +456,6 @@ class League:
     recordings: Sequence[Recording]
     about: Mapping[str, str]
 
-    @property
-    def best_rival(self) -> Standing | None:
-        """The best that is not ours and hears sound alone; None: there is none."""
-        others = [each for each in self.standings if not each.rival.ours and each.rival.given == "sound"]
-        return others[0] if others else None
-
 
 def run_rivals(  # noqa: PLR0913
     corpus: Corpus,
@@ -535,7 +529,8 @@ PART, INSTANTS, SHOWN_S = "league", 6, 6.0
 def describe_league(league: League) -> Section:
     """Return what is said of a league: its table, against the best rival, and what was found."""
     rows: dict[str, dict[str, Any]] = {}
-    best = league.best_rival
+    rivals = (each for each in league.standings if not each.rival.ours and each.rival.given == "sound")
+    best = next(rivals, None)  # of those that hear sound alone
     for each in league.standings:
         row: dict[str, Any] = {"given": each.rival.given}
         for name, figure in each.figures.items():

@@ -23,15 +23,7 @@ from lipmotion.errors import ExportError, InputError, LipMotionError
 from lipmotion.pipeline.batch.lines import file_key, is_recording, read_lines
 from lipmotion.pipeline.edit_files import EditFile, check_sound, read_edits, write_edits
 from lipmotion.speech.voices.espeak import LanguageLexicon
-from lipmotion.storage.files import (
-    atomic_file,
-    create_folders,
-    is_link,
-    make_folder,
-    make_portable,
-    remove,
-    sound_reference,
-)
+from lipmotion.storage import files
 from lipmotion.storage.json_text import as_json, as_json_rows, from_json
 from lipmotion.storage.locks import lock_folder, remove_unfinished
 from lipmotion.storage.sources import hash_file, read_text_file
@@ -216,7 +208,7 @@ class ProjectFolder:
     def write_edits(self, recording: ProjectRecording, file: EditFile) -> None:
         """Write a recording's file of edits, and the copy of it. Raises ExportError: it cannot be written."""
         path, copy = self.locate_edits(recording), self._copy(recording)
-        with self.lock, create_folders([path.parent, copy.parent]):
+        with self.lock, files.create_folders([path.parent, copy.parent]):
             write_with_copy(path, copy, lambda first: write_edits(file, first))
             self._summaries[recording.number] = self._read_file_state(recording), summarise_edits(file)
 
@@ -236,7 +228,7 @@ class ProjectFolder:
             file = replace(file, sha256=digest)
             self.write_edits(recording, file)
         elif not copy.exists() or copy.read_bytes() != path.read_bytes():  # others may have edited it
-            with self.lock, create_folders([copy.parent]):
+            with self.lock, files.create_folders([copy.parent]):
                 copy_file(path, copy)
         return file
 
@@ -244,7 +236,7 @@ class ProjectFolder:
         """Remove a recording's file of edits, and its copy. Raises ExportError: it cannot be removed."""
         with self.lock:
             for path in (self._copy(recording), self.locate_edits(recording)):  # a copy without its file is a damage
-                remove(path)
+                files.remove(path)
                 if path.exists():
                     raise ExportError(f"{path}: cannot be removed")
 
@@ -294,7 +286,7 @@ class ProjectFolder:
         """Write the project. Raises ExportError: it cannot be written."""
         with self.lock:
             text = as_json_rows(describe_project(self.project), ensure_ascii=False)
-            with atomic_file(self.path / PROJECT) as temporary:
+            with files.atomic_file(self.path / PROJECT) as temporary:
                 temporary.write_text(text, encoding="utf-8")
 
     def add(self, source: Path) -> list[int]:
@@ -305,10 +297,10 @@ class ProjectFolder:
             known = {os.path.realpath(self.locate_sound(each)) for each in self.project.lines.values()}
             taken = {file_key(each.name) for each in self.project.lines.values()}
             added: list[ProjectRecording] = []
-            for sound, name, transcript in sources or [(source, make_portable(source.stem), "")]:
+            for sound, name, transcript in sources or [(source, files.make_portable(source.stem), "")]:
                 if os.path.realpath(sound) not in known:
                     number = self.project.next_number + len(added)
-                    reference = sound_reference(sound.absolute(), self.path.absolute() / PROJECT)
+                    reference = files.sound_reference(sound.absolute(), self.path.absolute() / PROJECT)
                     recording = ProjectRecording(number, name, reference, hash_file(sound), transcript)
                     added.append(self._choose_name(recording, taken))
             project = self.project.with_recordings(added)
@@ -327,7 +319,7 @@ class ProjectFolder:
         digest, suffix = hash_file(content), Path(name).suffix.lower()
         with self.lock:
             folder = self.path / SOUNDS
-            make_folder(folder)
+            files.make_folder(folder)
             taken = {file_key(each.name) for each in self.project.lines.values()}
             taken |= {file_key(each.stem) for each in folder.iterdir()}  # also of what was removed
             number = self.project.next_number
@@ -335,7 +327,7 @@ class ProjectFolder:
             recording = self._choose_name(recording, taken)
             recording = replace(recording, sound=f"{SOUNDS}/{recording.name}{suffix}")
             check_recordings(self.project.with_recordings([recording]))
-            with atomic_file(self.locate_sound(recording)) as temporary:
+            with files.atomic_file(self.locate_sound(recording)) as temporary:
                 content.replace(temporary)
             self.change(lambda project: project.with_recordings([recording]))
             return number
@@ -346,9 +338,9 @@ class ProjectFolder:
         def is_free(named: ProjectRecording) -> bool:
             if file_key(named.name) in taken:
                 return False
-            files = [path for path in (self.locate_edits(named), self._copy(named)) if path.exists()]
+            paths = [path for path in (self.locate_edits(named), self._copy(named)) if path.exists()]
             try:
-                return all(read_edits(path, phones=False).sha256 == recording.sha256 for path in files)
+                return all(read_edits(path, phones=False).sha256 == recording.sha256 for path in paths)
             except InputError:
                 return False
 
@@ -405,7 +397,7 @@ class ProjectFolder:
             known = self.load_lexicon().user
             user = {**known, word: tuple(dict.fromkeys((phones, *known.get(word, ()))))}
             rows = [f"{each} {' '.join(variant)}\n" for each, variants in sorted(user.items()) for variant in variants]
-            with atomic_file(self.path / LEXICON) as temporary:
+            with files.atomic_file(self.path / LEXICON) as temporary:
                 temporary.write_text("".join(rows), encoding="utf-8")
 
 
@@ -424,8 +416,8 @@ def find_project_path(source: Path | None, out: Path | None = None) -> Path:
     if _is_project(source):
         return source.parent if source.name == PROJECT else source
     place = source.absolute()
-    usual = place.with_name(make_portable(f"{place.name if place.is_dir() else place.stem}{SUFFIX}"))
-    if out is None and is_link(usual):
+    usual = place.with_name(files.make_portable(f"{place.name if place.is_dir() else place.stem}{SUFFIX}"))
+    if out is None and files.is_link(usual):
         raise InputError(f"{usual}: is a link, required a folder beside {source}; open {usual} itself, or give -o")
     return out or usual
 
@@ -455,7 +447,7 @@ def open_folder(source: Path | None, out: Path | None = None) -> Iterator[Projec
 
 def copy_file(source: Path, target: Path) -> None:
     """Copy a file, whole or not at all. Raises ExportError: it cannot be written."""
-    with atomic_file(target) as temporary:
+    with files.atomic_file(target) as temporary:
         shutil.copyfile(source, temporary)
 
 
@@ -468,7 +460,7 @@ def write_with_copy(path: Path, copy: Path, write: Callable[[Path], object]) -> 
 
 def restore_copy(path: Path, copy: Path) -> None:
     """Put a copy in the place of a damaged file, which stays beside it under another name. Raises ExportError."""
-    with atomic_file(path) as temporary:
+    with files.atomic_file(path) as temporary:
         shutil.copyfile(copy, temporary)
         if path.exists():
             path.replace(path.with_name(f"{path.name}.damaged-{uuid4().hex[:8]}"))
@@ -482,4 +474,4 @@ def clean_name(name: str, default: str = "line") -> str:
     ('Anna_s take', 'voice')
     """
     plain = re.sub(r"[^\w .+()-]", "_", unicodedata.normalize("NFC", name)).strip(" ._")
-    return make_portable(plain[:MAX_NAME]) or default
+    return files.make_portable(plain[:MAX_NAME]) or default

@@ -126,7 +126,7 @@ class OpenRecording:
         """Make the full motion, where it is not yet; return what moved. Raises RevisionError: as ``edit``."""
         check_revision("the recording", self.revision, revision)
         before, self.settled = self._styled, True
-        return {"changed": find_moved(before, self._styled)}
+        return {"changed": find_change(before, self._styled)}
 
     def edit(self, revision: int, steps: tuple[str | Step, ...], instead: int = 0) -> dict[str, Any]:
         """Make some edits; return what moved, and the words whose pronunciation is a guess.
@@ -203,7 +203,7 @@ class OpenRecording:
                     self.folder.write_edits(recording, file)
                     self.file, self.summary = file, self.folder.summarise(recording)
         self.settled = settled
-        return {"changed": find_moved(before, after)}
+        return {"changed": find_change(before, after)}
 
     def describe(self) -> dict[str, Any]:
         """Return what the page shows of the recording, but for what the project says of it."""
@@ -321,16 +321,16 @@ class OpenRecording:
         }
 
 
-def find_moved(before: Motion, after: Motion) -> dict[str, float] | None:
+def find_change(before: Motion, after: Motion) -> dict[str, float] | None:
     """Return from when to when two motions differ in their common channels; None: nowhere."""
     names = [name for name in before.names if name in after.names]
     was, now = before.selected(names).values, after.selected(names).values
     if was.shape != now.shape or not names:
         return {"start_s": 0.0, "end_s": float(max(len(was), len(now)) / after.rate_hz)}
-    moved = np.flatnonzero((np.abs(was - now) > MIN_MOVE).any(axis=1))
-    if not len(moved):
+    frames = np.flatnonzero((np.abs(was - now) > MIN_MOVE).any(axis=1))
+    if not len(frames):
         return None
-    return {"start_s": float(moved[0] / after.rate_hz), "end_s": float(moved[-1] / after.rate_hz)}
+    return {"start_s": float(frames[0] / after.rate_hz), "end_s": float(frames[-1] / after.rate_hz)}
 
 
 def list_phones(units: Timeline[Unit], plain: Timeline[Unit]) -> list[dict[str, Any]]:

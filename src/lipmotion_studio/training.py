@@ -19,7 +19,7 @@ from lipmotion.errors import LipMotionError
 from lipmotion.extensions import load_provided
 from lipmotion.formats.label_files import find_label_files
 from lipmotion.pipeline.edit_files import check_sound
-from lipmotion.pipeline.model import Model, load_model, save_model
+from lipmotion.pipeline.model import load_model, save_model
 from lipmotion.pipeline.training.train import Run, train
 from lipmotion.storage.files import atomic_file, confine, create_folders, remove
 from lipmotion.storage.locks import keep_unfinished
@@ -170,7 +170,18 @@ def _train_voice(order: TrainingOrder, recordings: Path, monitor: Monitor) -> di
             prior=load_model() if order.options.prior and engine.inputs().prior else None,
             run=Run(sub_monitor(monitor, PREPARED_SHARE, TRAINED_SHARE), work, order.workers),
         )
-        measures = _measure(model, corpus, held_out, sub_monitor(monitor, TRAINED_SHARE, 1, "measuring: "))
+        measures: dict[str, Any] = {}
+        if held_out:
+            measuring, selection = sub_monitor(monitor, TRAINED_SHARE, 1, "measuring: "), Selection(names=held_out)
+            try:
+                figures = load_provided("evaluate")(model, corpus, selection=selection, monitor=measuring)
+                rows = [
+                    {"condition": name, "acc": row["acc"], "opening": row["channels"].get("opening", {}).get("acc")}
+                    for name, row in figures["conditions"].items()
+                ]
+                measures = {"figures": rows, "table": load_provided("format_figures")(figures)}
+            except LipMotionError as error:
+                LOG.warning("the voice could not be measured: %s", error)
         save_model(model, order.target)
     for name, reason in result.skipped.items():
         monitor(Item(name, "skipped", reason))
@@ -188,19 +199,3 @@ def split_names(corpus: Corpus, names: Sequence[str], *, held_out: bool) -> tupl
         return lists["train"], lists["test"]
     count = round(HELD_OUT_SHARE * len(names)) if len(names) >= MIN_SPLIT_UTTERANCES else 0
     return names[: len(names) - count], names[len(names) - count :]
-
-
-def _measure(model: Model, corpus: Corpus, names: Sequence[str], monitor: Monitor) -> dict[str, Any]:
-    """Return the figures of recordings that were not learned from; empty: there are none, or a warning says why."""
-    if not names:
-        return {}
-    try:
-        figures = load_provided("evaluate")(model, corpus, selection=Selection(names=names), monitor=monitor)
-    except LipMotionError as error:
-        LOG.warning("the voice could not be measured: %s", error)
-        return {}
-    rows = [
-        {"condition": name, "acc": row["acc"], "opening": row["channels"].get("opening", {}).get("acc")}
-        for name, row in figures["conditions"].items()
-    ]
-    return {"figures": rows, "table": load_provided("format_figures")(figures)}

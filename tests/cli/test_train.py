@@ -16,7 +16,7 @@ from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.types import Audio
 from lipmotion.units import load_unit_set
 from pipeline.made import features_of, write_sound
-from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
+from speech.made_voices import RATE_HZ, clap, recorded_twice, speech_like
 from studio.toy_recordings import SENTENCES, write_recordings
 from testing.toy import toy_sentences
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.copies import SETTINGS, copied, renamed
+from experiments.conftest import SETTINGS, copied, renamed
 from lipmotion import Corpus, Selection, evaluate, load_model, train
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.testing import CHANNELS, speech, timeline

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.copies import SETTINGS, copied, renamed
+from experiments.conftest import SETTINGS, copied, renamed
 from lipmotion import Corpus, Selection, errors, train
 from lipmotion.measures import closures, curves
 from lipmotion.speech.recognition.recogniser import open_recogniser

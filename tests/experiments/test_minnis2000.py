@@ -9,24 +9,15 @@ import numpy as np
 import pytest
 
 from engines.selection.drawn_units import PHONE_S, costs_of, inventory, target_of
-from experiments.conftest import few_sets, states
-from experiments.copies import SETTINGS, copied, renamed
+from experiments.conftest import SETTINGS, copied, few_sets, renamed, states
 from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import create_engine
 from lipmotion.engines.selection.concatenation import to_pieces
 from lipmotion.engines.selection.costs import SelectionConfig
 from lipmotion.errors import CorpusError
+from lipmotion_lab import minnis2000
 from lipmotion_lab.evaluation.held_out import ComparedClip, HeldOutRecordings
 from lipmotion_lab.hofer2008 import PhoneticTableOptions, run_hofer2008
-from lipmotion_lab.minnis2000 import (
-    ADDITIONS,
-    EVERYTHING,
-    PRINTED,
-    list_overlaps,
-    list_rows,
-    measure_velocity_change,
-    run_minnis2000,
-)
 from lipmotion_lab.report.sections import build_hofer_section
 from testing.toy import SMALL
 
@@ -35,29 +26,29 @@ LONG = pytest.mark.long
 
 def test_all_additions_together_are_the_default():
     """Each row has an option of its own; without a row, an addition would be hidden in another one."""
-    printed, everything = list_rows()[PRINTED], list_rows()[EVERYTHING]
+    printed, everything = minnis2000.list_rows()[minnis2000.PRINTED], minnis2000.list_rows()[minnis2000.EVERYTHING]
     pair = ("candidates", "beam")
-    options = {key for keys in ADDITIONS.values() if len(keys) == 1 or keys == pair for key in keys}
+    options = {key for keys in minnis2000.ADDITIONS.values() if len(keys) == 1 or keys == pair for key in keys}
     alone = {key: getattr(everything, key) for key in options}
     assert replace(printed, **alone) == everything == SelectionConfig(closures=False)
-    assert len({str(config) for config in list_rows().values()}) == len(list_rows())
-    unguided = list_rows(guided=False)  # nothing is learned from the sound
-    assert (PRINTED in unguided, EVERYTHING in unguided) == (True, False)
+    assert len({str(config) for config in minnis2000.list_rows().values()}) == len(minnis2000.list_rows())
+    unguided = minnis2000.list_rows(guided=False)  # nothing is learned from the sound
+    assert (minnis2000.PRINTED in unguided, minnis2000.EVERYTHING in unguided) == (True, False)
     assert {(config.guide, config.joint_recogniser) for config in unguided.values()} == {(0.0, False)}
-    assert unguided.items() <= list_rows().items()
+    assert unguided.items() <= minnis2000.list_rows().items()
 
 
 def test_overlaps_count_where_table_1_leaves_the_middle():
     costs = costs_of(inventory("s aa f", "f aa m", levels=(0, 1)), hard=1.0)
     for text, inside in (("s aa m", [(PHONE_S, 2 * PHONE_S)]), ("m aa m", [])):
         target = target_of(costs, text)
-        found = list_overlaps(costs, target, to_pieces(costs, target, np.array([0, 1, 5])))
+        found = minnis2000.list_overlaps(costs, target, to_pieces(costs, target, np.array([0, 1, 5])))
         assert found == pytest.approx(np.reshape(inside, (-1, 2))), text
 
 
 def test_a_bend_is_the_change_of_the_velocity():
     curve = np.maximum(np.arange(30.0) - 12, 0)
-    change = measure_velocity_change(curve)
+    change = minnis2000.measure_velocity_change(curve)
     assert change[12] == pytest.approx(4)
     assert change[[3, 25]] == pytest.approx(0)
 
@@ -69,7 +60,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus, folder: Path) -> dict[str, Any]:
-    return run_minnis2000(toy_corpus, models=folder, settings=SETTINGS)
+    return minnis2000.run_minnis2000(toy_corpus, models=folder, settings=SETTINGS)
 
 
 @LONG
@@ -77,8 +68,10 @@ def test_the_row_as_printed_is_the_preset(figures, toy_corpus):
     model, _ = train(toy_corpus, recogniser=SMALL, engine=create_engine(preset="minnis2000"))
     wanted = evaluate(model, toy_corpus)["conditions"]
     for condition, systems in figures["lists"]["test"]["conditions"].items():
-        assert systems[PRINTED]["acc"] == pytest.approx(wanted[condition]["channels"]["opening"]["acc"], abs=1e-6)
-        assert systems[PRINTED]["acc_gain_95"] == pytest.approx((0, 0))
+        assert systems[minnis2000.PRINTED]["acc"] == pytest.approx(
+            wanted[condition]["channels"]["opening"]["acc"], abs=1e-6
+        )
+        assert systems[minnis2000.PRINTED]["acc_gain_95"] == pytest.approx((0, 0))
 
 
 @LONG
@@ -89,9 +82,11 @@ def test_a_second_run_does_not_train(figures, toy_corpus, folder):
         received.append((recordings.utterances[0].split, condition, system, len(clips)))
 
     settings = replace(SETTINGS, receive=receive)
-    again = run_minnis2000(toy_corpus, models=folder, settings=settings)
+    again = minnis2000.run_minnis2000(toy_corpus, models=folder, settings=settings)
     conditions = {(split, c, 2) for split, found in again["lists"].items() for c in found["conditions"]}
-    assert sorted(received) == sorted((split, c, row, n) for split, c, n in conditions for row in list_rows())
+    assert sorted(received) == sorted(
+        (split, c, row, n) for split, c, n in conditions for row in minnis2000.list_rows()
+    )
     assert (figures["seconds"] > 0, again["seconds"]) == (True, None)
     assert again["lists"] == figures["lists"]
 
@@ -106,9 +101,9 @@ def test_a_run_that_was_stopped_goes_on(figures, toy_corpus, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_minnis2000(toy_corpus, work=tmp_path, settings=replace(SETTINGS, receive=stop))
+        minnis2000.run_minnis2000(toy_corpus, work=tmp_path, settings=replace(SETTINGS, receive=stop))
     before = states(tmp_path)
-    again = run_minnis2000(toy_corpus, work=tmp_path, settings=SETTINGS)
+    again = minnis2000.run_minnis2000(toy_corpus, work=tmp_path, settings=SETTINGS)
     assert (again["seconds"], again["lists"]) == (None, figures["lists"])  # the model was kept, too
     assert before.items() <= states(tmp_path).items()
 

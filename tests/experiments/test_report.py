@@ -19,8 +19,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from experiments.conftest import few_sets
-from experiments.copies import SETTINGS, copied, renamed
+from experiments.conftest import SETTINGS, copied, few_sets, renamed
 from lipmotion import Corpus, errors, units
 from lipmotion_lab import hofer2008, learning_curve, minnis2000, runner
 from lipmotion_lab.report import report

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.conftest import states
-from experiments.copies import SETTINGS, copied
+from experiments.conftest import SETTINGS, copied, states
 from lipmotion import Corpus, engines, evaluate, train
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError
 from lipmotion.measures import curves

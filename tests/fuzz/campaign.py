@@ -84,7 +84,9 @@ def campaign(
         first = bool(queue)
         files = queue.pop(0) if first else next(planned, None) if record.made % 2 else None
         if files is None:
-            files = mutated(chance, _chosen(chance, accepted, refused), chance.choice(accepted + refused))
+            pool = accepted if not refused or (accepted and chance.random() < ACCEPTED_SHARE) else refused
+            chosen = chance.choice(pool[-10:] if chance.random() < RECENT_SHARE else pool)
+            files = mutated(chance, chosen, chance.choice(accepted + refused))
         record.made += 1
         if digest(files) in seen:
             continue
@@ -97,11 +99,6 @@ def campaign(
             (accepted if result.kind == READ else refused).append(files)
     record.kept, record.seconds = len(accepted + refused), time.monotonic() - start_s
     return record
-
-
-def _chosen(chance: Random, accepted: list[Files], refused: list[Files]) -> Files:
-    pool = accepted if not refused or (accepted and chance.random() < ACCEPTED_SHARE) else refused
-    return chance.choice(pool[-10:] if chance.random() < RECENT_SHARE else pool)
 
 
 PATIENCE_S = 30.0

@@ -1,15 +1,16 @@
 """Known unit models, and utterances drawn from them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lipmotion.hmm import network, unit_training
-from lipmotion.hmm.align import align_units, choose_pronunciations
+from lipmotion.hmm.align import align_units, place_words
 from lipmotion.hmm.model import HmmConfig, UnitHmm, make_plain_states
 from lipmotion.stats.bigram import Bigram, estimate_bigram
 from lipmotion.stats.mixture import Mixtures
+from oracles.statistics import random_mixtures
 
 SILENCE, PAUSE = "sil", "sp"
 INVENTORY = unit_training.UnitInventory(SILENCE, PAUSE, energy=0)
@@ -34,13 +35,9 @@ def random_hmm(
             if table.side(unit, state)
         }
     )
-    table = table.extend(tuple(draw.permutation(possible)[:contexts].tolist()))
+    table = replace(table, names=(*table.names, *draw.permutation(possible)[:contexts].tolist()))
     shape = (len(table.names), 2, 2)
-    mixtures = Mixtures(
-        np.log(draw.dirichlet((2, 2), shape[0])).astype(np.float32),
-        draw.normal(0, 1.5, shape).astype(np.float32),
-        draw.uniform(0.3, 2, shape).astype(np.float32),
-    )
+    mixtures = random_mixtures(draw, shape, 2.0, 1.5, (0.3, 2))
     bigram = Bigram(names, np.log(draw.dirichlet(np.ones(len(names)), len(names))).astype(np.float32))
     stay = np.log(draw.uniform(0.2, 0.9, plain)).astype(np.float32)
     return UnitHmm(config or HmmConfig(states, bigram_weight=1.3, insertion=-0.4), table, mixtures, stay, bigram)
@@ -112,7 +109,8 @@ def decode(hmm: UnitHmm, features: np.ndarray, inventory: Sequence[str]) -> tupl
 
 
 def choose(hmm: UnitHmm, features: np.ndarray, words: Sequence[Sequence[Sequence[str]]]):
-    return choose_pronunciations(hmm, network.compute_log_likelihoods(hmm, features), words, PAUSE)
+    placed = place_words(hmm, network.compute_log_likelihoods(hmm, features), words, PAUSE)
+    return [item.spoken for item in placed]
 
 
 def chosen_units(hmm: UnitHmm, features: np.ndarray, words: Sequence[Sequence[Sequence[str]]]) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ def line(before: int = 60, after: int = 60, seed: int = 1) -> np.ndarray:
 
 @given(offset=st.floats(-50, 50))
 def test_loud_is_relative_to_the_recording(offset):
-    loud = np.nonzero(loudness.find_loud_frames(energy() + offset, smoothing=5))[0]
+    loud = np.nonzero(loudness.find_loud_frames(energy() + offset))[0]
     assert (loud[0], loud[-1]) == pytest.approx((40, 99), abs=1)
     assert len(loud) == loud[-1] - loud[0] + 1
 
@@ -33,13 +33,12 @@ def test_loud_is_relative_to_the_recording(offset):
 def test_clicks_shorter_than_the_smoothing_are_not_loud():
     clicks = energy()
     clicks[[10, 120]] = 12.0
-    assert loudness.find_loud_frames(clicks, smoothing=1)[[10, 120]].all()
-    assert not loudness.find_loud_frames(clicks, smoothing=5)[[10, 120]].any()
+    assert not loudness.find_loud_frames(clicks)[[10, 120]].any()
 
 
 def test_nothing_is_loud_in_the_shortest_recordings_and_where_nothing_changes():
     for frames in (1, 2, 3):
-        assert not loudness.find_loud_frames(np.full(frames, -3.0), smoothing=21).any()
+        assert not loudness.find_loud_frames(np.full(frames, -3.0)).any()
     for level in (-69.0, 20.0):
         steady = (level * (1 + 1e-7 * np.random.default_rng(0).uniform(-1, 1, 300))).astype(np.float32)
         assert not loudness.find_loud_frames(steady).any()
@@ -84,12 +83,12 @@ def test_loud_frames_are_neither_aligned_with_silence_nor_chosen_as_pauses():
     hmm, features, edges, loud = stranger()
     units, words = (SILENCE, "a", "b", SILENCE), ((("a",),), (("b",),))
     free = network.compute_log_likelihoods(hmm, features)
-    bound = network.penalise_silence(hmm, free, loud)
+    bound = network.penalise(hmm, free, loud, silent=True)
     without, bounds = align.align_units(hmm, free, units), align.align_units(hmm, bound, units)
     assert without[3] - without[1] < 8
     assert (bounds[1], bounds[3]) == (edges[1], edges[3])
     for densities, pauses in ((free, True), (bound, False)):
-        parts = align.choose_pronunciations(hmm, densities, words, PAUSE)
+        parts = [item.spoken for item in align.place_words(hmm, densities, words, PAUSE)]
         assert (PAUSE in [unit for part in parts for unit in part.units]) == pauses
 
 
@@ -107,7 +106,8 @@ def test_quiet_frames_are_silence_whatever_they_sound_like():
     hmm, features, _, _loud = stranger()
     quiet = np.zeros(len(features), bool)
     quiet[:4] = True
-    values = network.penalise_speech(hmm, network.compute_log_likelihoods(hmm, features), quiet).log_density(2, 6, None)
+    free_of_speech = network.penalise(hmm, network.compute_log_likelihoods(hmm, features), quiet, silent=False)
+    values = free_of_speech.log_density(2, 6, None)
     free = [hmm.table.density(SILENCE, 0), hmm.table.density(PAUSE, 0)]
     assert set(values[:2].argmax(axis=1)) <= {hmm.table.density(SILENCE, k) for k in range(3)} | set(free)
     plain = network.compute_log_likelihoods(hmm, features).log_density(2, 6, None)

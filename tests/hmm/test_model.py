@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -23,7 +24,8 @@ from lipmotion.hmm.network import compute_log_likelihoods
 from lipmotion.kernels.paths import Windows
 from oracles import sequences
 
-TABLE = make_plain_states(("sil", "sp", "b", "ih"), (3, 1, 3, 3), free=("sil", "sp")).extend(("b.0<ih", "b.2>sil"))
+PLAIN = make_plain_states(("sil", "sp", "b", "ih"), (3, 1, 3, 3), free=("sil", "sp"))
+TABLE = replace(PLAIN, names=(*PLAIN.names, "b.0<ih", "b.2>sil"))
 
 
 def test_models_come_back_from_arrays():

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from kernels.conftest import load_numba
 from lipmotion.kernels.banded import build_equations, pin, solve, solve_mlpg
-from oracles.statistics import generate_trajectory, window_matrix
+from oracles.statistics import generate_trajectory
 
 SEEDS = st.integers(0, 2**32 - 1)
 LENGTHS = st.integers(1, 24)
@@ -49,25 +49,6 @@ def test_pins_agree_with_elimination(seed, frames, data):
         assert values[:, channel] == pytest.approx(wanted, abs=1e-10)
         assert variance[free, channel] == pytest.approx(spread[free], abs=1e-10)
     assert all(values[t, c] == value for t, c, value in pins)
-
-
-@given(seed=SEEDS, frames=LENGTHS)
-@settings(max_examples=25)
-def test_static_windows_alone_generate_the_means(seed, frames):
-    mean, precision = statistics(seed, frames)
-    precision[:, 1:] = 0
-    values, variance = solve(build_equations(mean, precision))
-    assert values == pytest.approx(mean[:, 0], abs=1e-12)
-    assert variance == pytest.approx(1 / precision[:, 0], rel=1e-12)
-
-
-@given(seed=SEEDS, frames=st.integers(3, 24))
-@settings(max_examples=25)
-def test_means_of_a_real_curve_generate_that_curve(seed, frames):
-    curve = np.random.default_rng(seed).normal(0, 1, frames)
-    mean = (window_matrix(frames) @ curve).reshape(3, frames).T[:, :, None]
-    values, _ = solve(build_equations(mean, statistics(seed, frames, 1)[1]))
-    assert values[:, 0] == pytest.approx(curve, abs=1e-10)
 
 
 def forms(monkeypatch, compute) -> list:

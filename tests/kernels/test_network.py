@@ -5,7 +5,9 @@ from hypothesis import strategies as st
 
 from kernels.networks import network_posteriors, phone_loop, random_network
 from lipmotion.kernels.arcs import lay_out_arcs
+from lipmotion.kernels.forward_backward import log_forward_backward
 from lipmotion.kernels.network import ForwardBackwardNetwork
+from oracles import paths
 
 SEEDS = st.integers(0, 2**32 - 1)
 SHARED = settings(max_examples=30)
@@ -36,6 +38,20 @@ def test_single_precision_is_close_however_loud(seed, spread):
     exact, _, wanted = network_posteriors(log_emission.astype(float), **arrays)
     assert posterior == pytest.approx(exact, abs=1e-4)
     assert log_likelihood == pytest.approx(wanted, rel=1e-6)
+
+
+@given(seed=SEEDS, frames=st.integers(1, 6), spread=st.sampled_from([1.0, 30.0, 1e3]))
+@settings(max_examples=25)
+def test_the_definition_agrees_with_the_enumeration_of_all_paths(seed, frames, spread):
+    draw = np.random.default_rng(seed)
+    emission, ends = draw.normal(0, spread, (frames, 3)), np.log(draw.dirichlet(np.ones(3), 2))
+    arcs = {(a, b): np.log(draw.uniform()) for a in range(3) for b in range(3) if draw.uniform() < 0.6}
+    arrays = *np.array(list(arcs), np.intp).reshape(-1, 2).T, np.array(list(arcs.values()))
+    log_posterior, counts, log_likelihood = log_forward_backward(ends[0], emission, *arrays, ends[1])
+    wanted, wanted_counts, wanted_log_likelihood = paths.posteriors(emission, np.arange(3), arcs, *ends)
+    assert np.exp(log_posterior) == pytest.approx(wanted, abs=1e-9)
+    assert counts == pytest.approx(list(wanted_counts.values()), abs=1e-9)
+    assert log_likelihood == pytest.approx(wanted_log_likelihood, abs=1e-9)
 
 
 def test_no_path_says_so():

@@ -116,3 +116,12 @@ def _one_way(layer: RecurrentLayer, way: int, inputs: np.ndarray) -> np.ndarray:
 
 def sigmoid(x: np.ndarray) -> np.ndarray:
     return 1 / (1 + np.exp(-x))
+
+
+def random_mixtures(draw, shape, weight=1.0, spread=2.0, variances=(0.3, 1.5)) -> Mixtures:
+    """Return mixtures [shape=(G, M, D)] of random weights, of random means about 0, and of random variances."""
+    return Mixtures(
+        np.log(draw.dirichlet(np.full(shape[1], weight), shape[0])).astype(np.float32),
+        draw.normal(0, spread, shape).astype(np.float32),
+        draw.uniform(*variances, shape).astype(np.float32),
+    )

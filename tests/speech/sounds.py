@@ -1,7 +1,11 @@
-"""Recordings in any container, made on the spot."""
+"""Recordings in any container, made on the spot, and which of them a piece of code opens."""
 
+import ctypes
+import os
+import struct
 import wave
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -161,3 +165,27 @@ def _crc(content: bytes, polynomial: int, bits: int) -> int:
         for _ in range(8):
             value = (value << 1) ^ (polynomial | top if value << 1 & top else 0)
     return value
+
+
+OPENED = 0x20
+"""``IN_OPEN`` of ``inotify``."""
+HEADER = struct.Struct("iIII")
+
+
+@contextmanager
+def opened_in(folder: Path) -> Iterator[set[str]]:
+    """Give a set that holds, at the end of the block, the names of the files of a folder that were opened in it."""
+    names: set[str] = set()
+    system = ctypes.CDLL(None, use_errno=True)
+    watch = system.inotify_init1(os.O_NONBLOCK)
+    try:
+        assert system.inotify_add_watch(watch, os.fsencode(folder), OPENED) > 0, os.strerror(ctypes.get_errno())
+        yield names
+        with suppress(BlockingIOError):  # nothing was
+            events, start = os.read(watch, 1 << 20), 0
+            while start < len(events):
+                length = HEADER.unpack_from(events, start)[3]
+                start += HEADER.size + length
+                names.add(os.fsdecode(events[start - length : start].rstrip(b"\0")))
+    finally:
+        os.close(watch)

@@ -8,6 +8,7 @@ from lipmotion.speech.features import analysed_audio, speaker_similarity
 from lipmotion.speech.features.mfcc import HOP, log_energy, mfcc, spectrum
 from lipmotion.speech.recognition.general import general_features
 from lipmotion.speech.sound.voice_activity import find_passages
+from speech.made_voices import hiss, spoken
 from testing.toy import ToySentence, toy_sentences
 
 
@@ -18,15 +19,6 @@ def sentence() -> ToySentence:
 
 def of_samples(*parts: np.ndarray) -> analysed_audio.AnalysedAudio:
     return analysed_audio.analysed(types.Audio(np.concatenate(parts).astype(np.float32), 16_000))
-
-
-def whole_frames(number: int) -> np.ndarray:
-    samples = toy_sentences(3)[number].audio.samples
-    return samples[: len(samples) // HOP * HOP]
-
-
-def silence(seconds: float, units: float = 0.0) -> np.ndarray:
-    return np.random.default_rng(0).uniform(-units, units, round(16_000 * seconds)) / 32768
 
 
 def kinds(audio: analysed_audio.AnalysedAudio) -> list[np.ndarray]:
@@ -51,7 +43,7 @@ def test_every_kind_is_that_of_the_passage_at_its_level(sentence: ToySentence) -
 
 
 def test_features_are_normalised_over_the_passage_alone() -> None:
-    audio = of_samples(silence(5), whole_frames(0), silence(20))
+    audio = of_samples(hiss(5), spoken(0), hiss(20))
     (passage,) = audio.passages
     ((first, end),) = find_passages(log_energy(audio.samples))
     values = passage.audio.mfcc().values[first - passage.first :][: end - first + 1]
@@ -69,9 +61,9 @@ def test_features_are_normalised_over_the_passage_alone() -> None:
 )  # fmt: skip
 def test_silence_and_gain_change_no_features(before_s: float, after_s: float, units: float, decibels: float) -> None:
     """But that two frames at either end are left out, whose windows reach into it, and those of a noise as loud."""
-    line = whole_frames(0)
+    line = spoken(0)
     alone = of_samples(line)
-    padded = of_samples(silence(before_s, units), line * 10 ** (decibels / 20), silence(after_s, units))
+    padded = of_samples(hiss(before_s, units), line * 10 ** (decibels / 20), hiss(after_s, units))
     (passage,), (found,) = alone.passages, padded.passages
     place = round(100 * before_s)
     assert found.first - place == pytest.approx(passage.first, abs=25 if units > 4 else 5)
@@ -84,10 +76,10 @@ def test_silence_and_gain_change_no_features(before_s: float, after_s: float, un
 @pytest.mark.parametrize("decibels", [0, -30])
 def test_features_are_joined_from_those_of_passages(decibels: float) -> None:
     """As long as the recording, each passage in its place, and those of silence between and around them."""
-    one, other = whole_frames(1) * 10 ** (decibels / 20), whole_frames(0)
-    audio = of_samples(silence(2), one, silence(3), other, silence(4))
+    one, other = spoken(1) * 10 ** (decibels / 20), spoken(0)
+    audio = of_samples(hiss(2), one, hiss(3), other, hiss(4))
     first, second = audio.passages
-    alone = of_samples(other, silence(4))
+    alone = of_samples(other, hiss(4))
     place = 500 + len(one) // HOP
     assert 200 < first.own.stop == second.own.start < place
     assert (first.own.start, second.own.stop) == (0, audio.frames)
@@ -104,7 +96,7 @@ def test_features_are_joined_from_those_of_passages(decibels: float) -> None:
 
 
 def test_silence_between_passages_takes_no_memory() -> None:
-    audio = of_samples(whole_frames(1), silence(120), whole_frames(0))
+    audio = of_samples(spoken(1), hiss(120), spoken(0))
     sizes = [passage.audio.spectrum.nbytes for passage in audio.passages]
     tracemalloc.start()
     rows = audio.joined_rows(lambda sound: sound.spectrum)
@@ -120,7 +112,7 @@ def test_silence_between_passages_takes_no_memory() -> None:
 
 
 def test_where_nothing_is_said_all_features_are_0() -> None:
-    hours = of_samples(silence(120))
+    hours = of_samples(hiss(120))
     tracemalloc.start()
     bands = hours.spectrum
     _, most = tracemalloc.get_traced_memory()
@@ -160,9 +152,9 @@ def test_a_passage_is_not_divided_further_what_keeps_its_features_stays_itself_a
 @pytest.mark.parametrize("offset", [0.004, -0.02, 0.1])
 def test_a_constant_offset_hides_no_pause(offset: float) -> None:
     """Not even an offset of the line alone, between zeros; what has none stays as it is, to the bit."""
-    sound = np.concatenate([whole_frames(0), silence(1, 3), whole_frames(1)])
-    plain = of_samples(silence(2), sound)
-    for samples in (np.concatenate([silence(2), sound]) + offset, np.concatenate([silence(2), sound + offset])):
+    sound = np.concatenate([spoken(0), hiss(1, 3), spoken(1)])
+    plain = of_samples(hiss(2), sound)
+    for samples in (np.concatenate([hiss(2), sound]) + offset, np.concatenate([hiss(2), sound + offset])):
         audio = of_samples(samples)
         assert [(p.first, p.own) for p in audio.passages] == [(p.first, p.own) for p in plain.passages]
         assert audio.mfcc().values == pytest.approx(plain.mfcc().values, abs=0.02)

@@ -16,12 +16,12 @@ from lipmotion import errors, types
 from lipmotion.errors import InputError
 from lipmotion.speech.sound.audio_files import _TrackDecoder, read_audio
 from speech.made_voices import pulses, vowels
-from speech.opened import opened_in
 from speech.sounds import (
     LEVEL,
     ONSET_S,
     babble,
     late_by,
+    opened_in,
     tone,
     write_constant_flac,
     write_sound,

@@ -173,7 +173,7 @@ def test_a_short_first_piece_makes_no_click() -> None:
 
 @pytest.mark.long
 def test_fewer_samples_are_what_scipy_computes_and_a_sound_at_the_same_rate_stays():
-    for factor, length in ((2, 1), (3, 5), (6, 100), (3, 2401), (3, 4 * resampling.KEPT_BLOCK)):
+    for factor, length in ((2, 1), (3, 5), (6, 100), (3, 2401), (3, 4 * resampling.DECIMATED_BLOCK)):
         sound = np.random.default_rng(length).normal(0, 0.1, length).astype(np.float32)
         found, expected = resampling.decimate(sound, factor), resample_poly(sound, 1, factor)
         assert found.dtype == np.float32

@@ -3,7 +3,7 @@ import pytest
 
 from lipmotion import errors, types
 from lipmotion_faces.corpus.sound_offset import ALIKE, BEEP, CLAP, find_marks, measure_offset
-from speech.recorded_twice import RATE_HZ, beep, clap, recorded_twice, speech_like
+from speech.made_voices import RATE_HZ, beep, clap, recorded_twice, speech_like
 
 MARK_S = 1.2
 

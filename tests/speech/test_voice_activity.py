@@ -9,10 +9,10 @@ from lipmotion.hmm.loudness import DECIBEL, MIN_FRAMES, average_power, find_spok
 from lipmotion.speech.features import analysed_audio, mfcc
 from lipmotion.speech.sound import acoustic_conditions, pauses, voice_activity
 from lipmotion.types import Audio
+from speech.made_voices import RATE_HZ, hiss, spoken
 from testing.toy import toy_sentences
 
 QUIET_ENERGY, CLOSURE_ENERGY, LOUD_ENERGY = -8.0, -5.0, 2.0
-RATE_HZ = 16_000
 Samples = NDArray[np.float32]
 
 
@@ -66,18 +66,6 @@ def test_stretches_are_in_order_bounded_and_hold_all_sound() -> None:
         assert inside[middle].all()
 
 
-def spoken(number: int) -> Samples:
-    """Return a sentence of the toy corpus, in whole frames."""
-    samples = toy_sentences(12)[number].audio.samples
-    return samples[: len(samples) // mfcc.HOP * mfcc.HOP]
-
-
-def noise(seconds: float, units: float) -> Samples:
-    """Return noise of so many units of 16 bits; 0: digital silence."""
-    values = np.random.default_rng(0).uniform(-units, units, round(seconds * RATE_HZ))
-    return (values / 32768).astype(np.float32)
-
-
 def louder(samples: Samples, decibels: float) -> Samples:
     return (samples * 10 ** (decibels / 20)).astype(np.float32)
 
@@ -96,15 +84,15 @@ def moved(found: list[voice_activity.Stretch], frames: int) -> list[voice_activi
 )
 def test_a_passage_is_the_same_whatever_silence_is_around_it(before_s: float, after_s: float, units: float) -> None:
     """But for the frames whose windows reach into the silence."""
-    (alone,) = moved(passages(noise(0.5, 0), spoken(0), noise(0.5, 0)), -50)
-    (found,) = moved(passages(noise(before_s, units), spoken(0), noise(after_s, units)), -round(100 * before_s))
+    (alone,) = moved(passages(hiss(0.5, 0), spoken(0), hiss(0.5, 0)), -50)
+    (found,) = moved(passages(hiss(before_s, units), spoken(0), hiss(after_s, units)), -round(100 * before_s))
     assert found == pytest.approx(alone, abs=3)
     if before_s and after_s and not units:
         assert found == alone
 
 
 def test_a_noise_as_loud_as_the_room_may_be_its_margin_and_nothing_more() -> None:
-    (found,) = moved(passages(noise(5, 25), spoken(0), noise(5, 25)), -500)
+    (found,) = moved(passages(hiss(5, 25), spoken(0), hiss(5, 25)), -500)
     sound = np.flatnonzero(find_spoken_frames(mfcc.log_energy(spoken(0))))
     assert sound[0] - voice_activity.PASSAGE_MARGIN - 2 <= found.first <= sound[0] - 10
     assert sound[-1] + 10 <= found.end <= sound[-1] + voice_activity.PASSAGE_MARGIN + 3
@@ -118,7 +106,7 @@ def test_a_passage_is_the_same_at_any_level() -> None:
 def test_a_pause_within_a_line_does_not_divide_it() -> None:
     samples = spoken(0)
     half = len(samples) // mfcc.HOP // 2 * mfcc.HOP
-    assert len(passages(samples[:half], noise(0.4, 0), samples[half:])) == 1
+    assert len(passages(samples[:half], hiss(0.4, 0), samples[half:])) == 1
 
 
 @pytest.mark.parametrize("gap_s", [0.3, 0.5, 1, 5])
@@ -127,8 +115,8 @@ def test_lines_are_passages_of_their_own_whatever_their_levels(gap_s: float, dec
     """The room of a line 30 dB softer is more than 80 dB beneath the other: its margins hold nothing, or all of it."""
     one, other = spoken(1), spoken(0)
     place = len(one) // mfcc.HOP + round(100 * gap_s)
-    (first_alone,), (second_alone,) = passages(one, noise(9, 0)), passages(other)
-    first, second = passages(one, noise(gap_s, 0), louder(other, decibels))
+    (first_alone,), (second_alone,) = passages(one, hiss(9, 0)), passages(other)
+    first, second = passages(one, hiss(gap_s, 0), louder(other, decibels))
     assert first == first_alone
     (second,) = moved([second], -place)
     if decibels:
@@ -137,7 +125,7 @@ def test_lines_are_passages_of_their_own_whatever_their_levels(gap_s: float, dec
         assert sound[-1] - 3 <= second.end <= second_alone.end
     else:
         assert second == second_alone
-    soft, loud = passages(louder(one, decibels), noise(gap_s, 0), other)
+    soft, loud = passages(louder(one, decibels), hiss(gap_s, 0), other)
     assert moved([loud], -place) == [second_alone]
     assert soft.first >= first_alone.first
     assert soft.end <= first_alone.end
@@ -173,7 +161,7 @@ NO_VOICE = {
 @pytest.mark.parametrize("sound", NO_VOICE)
 @pytest.mark.parametrize("units", [None, 0, 25])
 def test_what_is_no_voice_is_no_passage(sound: str, units: float | None) -> None:
-    around = noise(5, units) if units is not None else noise(0, 0)
+    around = hiss(5, units) if units is not None else hiss(0, 0)
     samples = np.concatenate([around, NO_VOICE[sound].astype(np.float32), around])
     assert passages(samples) == []
     assert not analysed_audio.AnalysedAudio(samples, RATE_HZ).passages
@@ -227,7 +215,7 @@ def test_a_tone_that_covers_a_word_is_found_and_no_voice_is_one() -> None:
 
 @pytest.mark.parametrize("hertz", [(50, 150, 250), (120,), (200.4,)])
 def test_a_voice_is_found_beneath_hum(hertz: tuple[float, ...]) -> None:
-    samples = np.concatenate([spoken(0), noise(1, 25), spoken(1)])
+    samples = np.concatenate([spoken(0), hiss(1, 25), spoken(1)])
     hum = samples.std() * sum(np.sin(2 * np.pi * each * np.arange(len(samples)) / RATE_HZ) for each in hertz)
     clean, found = (
         [passage.first for passage in analysed_audio.AnalysedAudio(sound.astype(np.float32), RATE_HZ).passages]
@@ -269,28 +257,25 @@ def test_hours_of_silence_are_searched_for_tones_block_by_block() -> None:
         tracemalloc.stop()
 
 
-RATE = 16_000
-
-
 def loud_in(spans: list[tuple[float, float]], duration_s: float, *, gain: float = 0.1, noise: float = 1e-3) -> Audio:
     """Return noise that is loud in some spans."""
     draw = np.random.default_rng(0)
-    samples = noise * draw.normal(size=round(duration_s * RATE))
+    samples = noise * draw.normal(size=round(duration_s * RATE_HZ))
     for start_s, end_s in spans:
-        part = slice(round(start_s * RATE), round(end_s * RATE))
+        part = slice(round(start_s * RATE_HZ), round(end_s * RATE_HZ))
         samples[part] += gain * draw.normal(size=len(samples[part]))
-    return Audio(samples.astype(np.float32), RATE)
+    return Audio(samples.astype(np.float32), RATE_HZ)
 
 
 SPANS = [(0.5, 1.5), (2.0, 3.2), (4.0, 4.6)]
 
 
 def test_levels_are_those_of_the_sound():
-    sine = np.sin(2 * np.pi * 440 * np.arange(RATE) / RATE).astype(np.float32)
-    levels = pauses.measure_levels_db(Audio(0.1 * sine, RATE))
+    sine = np.sin(2 * np.pi * 440 * np.arange(RATE_HZ) / RATE_HZ).astype(np.float32)
+    levels = pauses.measure_levels_db(Audio(0.1 * sine, RATE_HZ))
     assert levels.shape == (100,)
     assert levels[10:-10] == pytest.approx(-23.0, abs=0.3)  # 20 dB below full scale, 3 for a sine
-    assert pauses.measure_levels_db(Audio(np.zeros(RATE, np.float32), RATE)).tolist() == [-100.0] * 100
+    assert pauses.measure_levels_db(Audio(np.zeros(RATE_HZ, np.float32), RATE_HZ)).tolist() == [-100.0] * 100
 
 
 def test_spans_between_pauses_are_not_divided_by_short_dips_and_clicks_are_none():
@@ -300,8 +285,8 @@ def test_spans_between_pauses_are_not_divided_by_short_dips_and_clicks_are_none(
 
 
 def test_loudness_may_change_in_an_hour():
-    loud, soft = loud_in(SPANS * 1, 60.0, gain=0.2, noise=1e-2), loud_in(SPANS, 60.0, gain=0.004, noise=1e-4)
-    both = Audio(np.concatenate([loud.samples, soft.samples]), RATE)
+    loud, soft = loud_in(SPANS, 60.0, gain=0.2, noise=1e-2), loud_in(SPANS, 60.0, gain=0.004, noise=1e-4)
+    both = Audio(np.concatenate([loud.samples, soft.samples]), RATE_HZ)
     found = pauses.list_spans(pauses.measure_levels_db(both))
     expected = [*SPANS, *((start_s + 60, end_s + 60) for start_s, end_s in SPANS)]
     np.testing.assert_allclose([span for span in found if span[0] % 60 < 5], expected, atol=0.05)
@@ -319,5 +304,5 @@ def test_levels_at_any_time_also_of_less_than_a_step():
     found = pauses.measure_levels_at(sound, times_s)
     assert found == pytest.approx([levels[0], levels[0], levels[100], levels[100:102].mean(), levels[-1]])
     for samples in (0, 159):
-        found = pauses.measure_levels_at(Audio(np.ones(samples, np.float32), RATE), np.arange(3.0))
+        found = pauses.measure_levels_at(Audio(np.ones(samples, np.float32), RATE_HZ), np.arange(3.0))
         assert found == pytest.approx([pauses.QUIETEST_DB] * 3)

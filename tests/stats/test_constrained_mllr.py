@@ -16,18 +16,11 @@ from lipmotion.stats.constrained_mllr import (
 )
 from lipmotion.stats.mixture import Mixtures
 from oracles import statistics as oracle
+from oracles.statistics import random_mixtures
 
 SIZE = 3
+SHAPE = 4, 2, SIZE
 ALL = np.ones((SIZE, SIZE + 1), bool)
-
-
-def random_mixtures(draw: np.random.Generator, densities: int = 4, gaussians: int = 2, size: int = SIZE) -> Mixtures:
-    shape = (densities, gaussians, size)
-    return Mixtures(
-        np.log(draw.dirichlet(np.ones(gaussians), densities)).astype(np.float32),
-        draw.normal(0, 2, shape).astype(np.float32),
-        draw.uniform(0.3, 1.5, shape).astype(np.float32),
-    )
 
 
 def spoken(draw: np.random.Generator, mixtures: Mixtures, frames: int) -> tuple[np.ndarray, np.ndarray]:
@@ -56,7 +49,7 @@ def gradient(function: Callable[[np.ndarray], float], transform: np.ndarray, ste
 def test_statistics_are_those_of_the_sums_written_out() -> None:
     for seed in range(3):
         draw = np.random.default_rng(seed)
-        mixtures, transform = random_mixtures(draw), random_transform(draw)
+        mixtures, transform = random_mixtures(draw, SHAPE), random_transform(draw)
         given = mixtures, *spoken(draw, mixtures, 20), transform
         found, log_likelihood = collect_transform_statistics(*given)
         quadratic, linear = oracle.affine_statistics(*given)
@@ -69,7 +62,7 @@ def test_statistics_are_those_of_the_sums_written_out() -> None:
 def test_the_objective_has_the_slope_of_the_likelihood() -> None:
     """At the transform of the posteriors, the gradients of both are equal."""
     draw = np.random.default_rng(5)
-    mixtures, transform = random_mixtures(draw), random_transform(draw)
+    mixtures, transform = random_mixtures(draw, SHAPE), random_transform(draw)
     features, densities = spoken(draw, mixtures, 20)
     statistics, _ = collect_transform_statistics(mixtures, features, densities, transform)
     rise = gradient(partial(oracle.affine_log_likelihood, mixtures, features, densities), transform, 1e-4)
@@ -80,7 +73,7 @@ def test_the_objective_has_the_slope_of_the_likelihood() -> None:
 @given(seed=st.integers(0, 10_000), frames=st.integers(0, 30))
 def test_no_row_lowers_the_objective(seed: int, frames: int) -> None:
     draw = np.random.default_rng(seed)
-    mixtures, transform = random_mixtures(draw), random_transform(draw)
+    mixtures, transform = random_mixtures(draw, SHAPE), random_transform(draw)
     statistics, _ = collect_transform_statistics(mixtures, *spoken(draw, mixtures, frames), transform)
     statistics += create_prior(mixtures, np.arange(4)).times(5)
     values = [oracle.affine_objective(statistics, transform)]
@@ -93,7 +86,7 @@ def test_no_row_lowers_the_objective(seed: int, frames: int) -> None:
 def test_the_likelihood_never_falls() -> None:
     """Of the frames and of the prior together, over all steps of EM."""
     draw = np.random.default_rng(2)
-    mixtures = random_mixtures(draw)
+    mixtures = random_mixtures(draw, SHAPE)
     features, densities = spoken(draw, mixtures, 60)
     features = transformed(features, random_transform(draw))
     prior = create_prior(mixtures, np.arange(4)).times(30)
@@ -108,7 +101,7 @@ def test_the_likelihood_never_falls() -> None:
 
 def test_a_known_distortion_is_undone() -> None:
     draw = np.random.default_rng(1)
-    mixtures = random_mixtures(draw, densities=8)
+    mixtures = random_mixtures(draw, (8, 2, SIZE))
     clean, densities = spoken(draw, mixtures, 4000)
     distortion = random_transform(draw)
     features, transform = transformed(clean, distortion), identity(SIZE)
@@ -124,7 +117,7 @@ def test_a_known_distortion_is_undone() -> None:
 
 
 def test_the_models_own_data_ask_for_no_change() -> None:
-    mixtures = random_mixtures(np.random.default_rng(4))
+    mixtures = random_mixtures(np.random.default_rng(4), SHAPE)
     prior = create_prior(mixtures, np.array([0, 2]))
     assert prior.count == pytest.approx(1)
     assert np.abs(gradient(partial(oracle.affine_objective, prior), identity(SIZE))).max() < 1e-6
@@ -136,7 +129,7 @@ def test_the_models_own_data_ask_for_no_change() -> None:
 
 def test_a_prior_holds_a_transform_of_few_frames_back() -> None:
     draw = np.random.default_rng(9)
-    mixtures = random_mixtures(draw)
+    mixtures = random_mixtures(draw, SHAPE)
     features, densities = spoken(draw, mixtures, 10)
     statistics, _ = collect_transform_statistics(mixtures, features + 2, densities, identity(SIZE))
     prior = create_prior(mixtures, np.arange(4))
@@ -148,7 +141,7 @@ def test_a_prior_holds_a_transform_of_few_frames_back() -> None:
 
 def test_entries_that_are_not_free_stay() -> None:
     draw = np.random.default_rng(3)
-    mixtures, start = random_mixtures(draw), random_transform(draw)
+    mixtures, start = random_mixtures(draw, SHAPE), random_transform(draw)
     statistics, _ = collect_transform_statistics(mixtures, *spoken(draw, mixtures, 50), start)
     free = np.eye(SIZE, SIZE + 1, dtype=bool)
     free[:, -1] = True

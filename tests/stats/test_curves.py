@@ -14,14 +14,6 @@ def test_agrees_with_the_window_matrix(frames, seed):
     assert with_dynamics(values) == pytest.approx(wanted.swapaxes(0, 1), abs=1e-12)
 
 
-def test_a_parabola_has_its_slope_and_constant_curvature():
-    t = np.arange(6.0)[:, None]
-    dynamics = with_dynamics(3 * t * t - 5 * t + 1)
-    assert dynamics[1:-1, 1] == pytest.approx(6 * t[1:-1] - 5)
-    assert dynamics[1:-1, 2] == pytest.approx(np.full((4, 1), 6.0))
-    assert not dynamics[[0, -1], 1:].any()
-
-
 def rounded(value: float, seed: int = 0) -> np.ndarray:
     """Return a constant with the rounding errors of another processor."""
     return value * (1 + 1e-7 * np.random.default_rng(seed).uniform(-1, 1, size=(500, 1)))

@@ -30,7 +30,7 @@ def sample(mean_of, frames=20, seed=0):
 
 def grown(values, questions=QUESTIONS, contexts=CONTEXTS, sums=None, likelihood=score_gaussian, **options):
     statistics = (sums or statistics_of)(values)
-    options = {"parameters": 4, "factor": 1.0, "least": 10.0} | options
+    options = {"parameters": 4, "factor": 1.0, "min_frames": 10.0} | options
     return grow_tree(contexts, statistics, questions, likelihood, **options)
 
 
@@ -43,7 +43,7 @@ def test_the_likelihood_is_that_of_the_gaussian_fitted_to_the_frames():
 
 def test_the_question_that_matters_is_asked_first_and_the_tree_can_be_read():
     tree = grown(sample(lambda context: 5.0 if context[0] in "ab" else 0.0))
-    assert tree.questions[tree.asked[0]] == Question(0, "early", frozenset("ab"))
+    assert tree.questions[tree.splits[0]] == Question(0, "early", frozenset("ab"))
     assert len(tree.leaves) == 2
     assert tree.frames[0] == 20 * 64
     leaves = ["  yes: leaf (640 frames)", "  no: leaf (640 frames)"]
@@ -52,12 +52,12 @@ def test_the_question_that_matters_is_asked_first_and_the_tree_can_be_read():
 
 
 def test_pure_noise_is_not_split():
-    assert len(grown(sample(lambda _: 0.0), factor=1.0).asked) == 1
+    assert len(grown(sample(lambda _: 0.0), factor=1.0).splits) == 1
 
 
 def test_no_leaf_has_fewer_frames_than_asked_for():
     values = sample(lambda context: float(UNITS.index(context[0]) * 4 + UNITS.index(context[1])))
-    tree = grown(values, least=100.0)
+    tree = grown(values, min_frames=100.0)
     assert len(tree.leaves) > 1
     assert tree.frames[tree.leaves].min() >= 100
 
@@ -75,7 +75,7 @@ def test_splits_are_those_of_a_search_by_hand():
         answers = np.array([question.answer(context) for context in CONTEXTS])
         return sum(likelihood([values[n] for n in np.flatnonzero(answers == answer)]) for answer in (True, False))
 
-    assert tree.asked[0] == int(np.argmax([gain(question) for question in QUESTIONS]))
+    assert tree.splits[0] == int(np.argmax([gain(question) for question in QUESTIONS]))
 
 
 def test_a_context_never_seen_is_treated_like_those_that_answer_alike():
@@ -136,7 +136,7 @@ def test_voicing_alone_is_worth_a_question():
         voiced = draw.random(30) < (0.9 if context[1] in "ab" else 0.1)
         values.append(np.where(voiced, draw.normal(0, 1, 30), np.nan))
     tree = grown(values, sums=spaces_of, likelihood=score_multispace, parameters=3)
-    assert tree.questions[tree.asked[0]] == Question(1, "early", frozenset("ab"))
+    assert tree.questions[tree.splits[0]] == Question(1, "early", frozenset("ab"))
 
 
 def test_frames_that_are_all_alike_gain_no_more_than_the_least_variance_allows():
@@ -159,4 +159,4 @@ def test_of_questions_that_split_alike_the_first_is_asked_however_sums_are_round
         return found * (1 + 1e-14 * rounding.normal(size=found.shape))
 
     tree = grown(values, [*alike, *others], likelihood=likelihood)
-    assert tree.questions[tree.asked[0]].name == "0"
+    assert tree.questions[tree.splits[0]].name == "0"

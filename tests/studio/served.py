@@ -58,9 +58,9 @@ class Served(NamedTuple):
 
 
 @contextmanager
-def served(source: Path, errors: Path, model: Path | None = None, limit_s: float = LIMIT_S) -> Iterator[Served]:
+def served(source: Path, errors: Path, *options: Path | str, limit_s: float = LIMIT_S) -> Iterator[Served]:
     """Give a studio of a recording or a project; all that it prints on standard error is added to a file."""
-    command = [*LIPMOTION, "studio", source, "--no-browser", *(["--model", model] if model else [])]
+    command = [*LIPMOTION, "studio", source, "--no-browser", *options]
     with errors.open("a", encoding="utf-8") as file, child(command, stderr=file, limit_s=limit_s) as process:
         line = process.stdout.readline() if process.stdout else ""
         port, token = line.split("http://127.0.0.1:")[1].split()[0].split("/#")
@@ -138,10 +138,10 @@ class Editor:
 
 def lost_edits(
     project: Path,
-    model: Path | None,
     errors: Path,
     kills: int,
     each_s: float,
+    *options: Path | str,
     seed: int = 5,
     report: Callable[[dict[str, int]], object] = lambda _: None,
 ) -> dict[str, int]:
@@ -153,7 +153,7 @@ def lost_edits(
     editor, chance = Editor(seed), Random(seed)
     found = {"kills": 0, "acknowledged": 0, "lost": 0}
     while found["kills"] < kills:
-        with served(project, errors, model) as server:
+        with served(project, errors, *options) as server:
             state = server.ready()
             if found["kills"] and state["steps"] not in (editor.steps, editor.sent):
                 found["lost"] += 1
@@ -183,7 +183,7 @@ def _killed_at(server: Served, ends_s: float) -> Event:
 
 
 def undone_edits(
-    project: Path, model: Path | None, errors: Path, count: int, seed: int = 9, limit_s: float = LIMIT_S
+    project: Path, errors: Path, count: int, *options: Path | str, seed: int = 9, limit_s: float = LIMIT_S
 ) -> dict[str, Any]:
     """Make random edits through a server, end it, take all back through another one, and make all again.
 
@@ -198,7 +198,7 @@ def undone_edits(
         assert status in (200, 422), (status, reply)
         return dict(reply) if status == 200 else None
 
-    with served(project, errors, model, limit_s) as server:
+    with served(project, errors, *options, limit_s=limit_s) as server:
         state = server.ready()
         first = _bytes_of(server)
         while edits < count:
@@ -211,7 +211,7 @@ def undone_edits(
                 kinds.add(type(parse_step(step)))
         last = _bytes_of(server)
         server.kill()
-    with served(project, errors, model, limit_s) as server:
+    with served(project, errors, *options, limit_s=limit_s) as server:
         for what, left, wanted in (("undo", "redo", first), ("redo", "undo", last)):
             state = server.ready()
             while state[what]:

@@ -11,7 +11,7 @@ from study.browser import BROWSER, DRIVER, MISSING, browser, check_screens
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
 
 from lipmotion_studio.folder import open_folder
-from studio.test_page import LIMIT_S, SCREENS, WEBGL, WELCOME, Page, served
+from studio.test_page import LIMIT_S, SCREENS, WELCOME, shown
 from studio.toy_recordings import SENTENCES, write_recordings
 
 pytestmark = [pytest.mark.long, pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING)]
@@ -20,13 +20,10 @@ pytestmark = [pytest.mark.long, pytest.mark.skipif(BROWSER is None or DRIVER is 
 def test_a_voice_is_trained_and_used_from_the_page(tmp_path):
     project = tmp_path / "project"
     recordings = os.path.relpath(write_recordings(tmp_path / "recordings"), project)
-    (tmp_path / "home").mkdir()
     with open_folder(WELCOME, project) as folder:
         folder.change(lambda now: replace(now, recordings=recordings))
-    with served(project) as address, browser(tmp_path / "home", *WEBGL) as window:
-        window.open(address)
-        page = Page(window, project)
-        page.ready()
+    with shown(browser, tmp_path, project) as page:
+        window = page.window
         window.click("#own")
         wait_until(lambda: window.text("#own-form"), LIMIT_S)
         window.run("const name = document.getElementById('own-name'); name.value = 'me'; name.oninput()")

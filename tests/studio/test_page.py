@@ -11,25 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from children import LIPMOTION, child, wait_until
+from children import wait_until
 from lipmotion import load_model, read_motion, save_model
 from lipmotion.pipeline.model import find_shipped
+from studio.served import served
 from studio.test_recorded_videos import shifted
-from study.browser import (
-    CONTROL,
-    DELETE,
-    ENTER,
-    ESCAPE,
-    RIGHT,
-    SHIFT,
-    SPACE,
-    TAB,
-    UP,
-    WINDOW_S,
-    Browser,
-    check_screen,
-    check_screens,
-)
+from study import browser
 from study.firefox import BOTH, Opens
 from study.small_study import sha256_of
 
@@ -93,7 +80,7 @@ class Page:
     project : its folder
     """
 
-    window: Browser
+    window: browser.Browser
     project: Path
 
     def of(self, expression: str) -> Any:
@@ -138,22 +125,13 @@ class Page:
 
 
 @contextmanager
-def served(folder: Path, *source: Path | str) -> Iterator[str]:
-    """Give the address of a studio over a project in a folder; what follows a source are options."""
-    command = [*LIPMOTION, "studio", *(source or [folder]), *(["-o", folder] if source else []), "--no-browser"]
-    with child(command, limit_s=WINDOW_S) as process:
-        line = process.stdout.readline() if process.stdout else ""
-        found = re.search(r"http://127\.0\.0\.1:\d+/#\S+", line)
-        assert found, line
-        yield found[0]
-
-
-@contextmanager
-def shown(opens: Opens, folder: Path) -> Iterator[Page]:
-    """Give the page of a studio of one recording, in a browser."""
+def shown(opens: Opens, folder: Path, source: Path = WELCOME, *options: Path | str) -> Iterator[Page]:
+    """Give the page of a studio of one recording, or of a project, in a browser; its project is in the folder."""
     (folder / "home").mkdir()
-    with served(folder / "project", WELCOME) as address, opens(folder / "home", *WEBGL) as window:
-        window.open(address)
+    place = () if source == folder / "project" else ("-o", folder / "project")
+    studio = served(source, folder / "errors.txt", *place, *options, limit_s=browser.WINDOW_S)
+    with studio as server, opens(folder / "home", *WEBGL) as window:
+        window.open(f"http://127.0.0.1:{server.port}/#{server.token}")
         page = Page(window, folder / "project")
         page.ready()
         yield page
@@ -171,7 +149,7 @@ def page(opened: Page) -> Page:
     opened.reload()
     while opened.steps:
         count = len(opened.steps)
-        opened.window.press_together(CONTROL, "z")
+        opened.window.press_together(browser.CONTROL, "z")
         opened.wait_for_steps(count - 1)
     return opened
 
@@ -202,28 +180,28 @@ def move_and_turn_a_pin(page: Page) -> None:
         unpin, pin = page.steps[-2:]
         assert re.fullmatch(r"unpin opening at \S+", unpin)
         assert re.fullmatch(ended, pin), pin
-    page.edit(lambda: page.window.press(DELETE), r"unpin opening at \S+")
+    page.edit(lambda: page.window.press(browser.DELETE), r"unpin opening at \S+")
 
 
 def test_each_edit_by_pointer_and_keys(page):
     window = page.window
 
     def type_over(text: str) -> None:
-        window.press(ENTER)
-        window.press(*text, ENTER)
+        window.press(browser.ENTER)
+        window.press(*text, browser.ENTER)
 
     page.choose(11)
     x, y = page.middle('.border[data-before="10"]')
     page.edit(lambda: window.drag((x, y), (x + 6, y), (x + 12, y)), r"phone 11 ends 1\.\d+")
-    window.press(TAB)
+    window.press(browser.TAB)
     assert page.of("studio.store.selected.index") == 11
-    page.edit(lambda: window.press_together(SHIFT, RIGHT), r"phone 12 ends 1\.\d+")
+    page.edit(lambda: window.press_together(browser.SHIFT, browser.RIGHT), r"phone 12 ends 1\.\d+")
     page.edit(lambda: type_over("t"), "phone 12 is t")
     page.edit(lambda: window.press("s"), r"split phone 12 at 1\.\d+")
     page.edit(lambda: window.press("m"), "remove phone 14")
-    page.edit(lambda: window.press(DELETE), "remove phone 13")
+    page.edit(lambda: window.press(browser.DELETE), "remove phone 13")
     page.choose(12)
-    window.press(UP)
+    window.press(browser.UP)
     number = page.of("studio.store.selected.index") + 1
     assert page.of("studio.store.selected.kind") == "word"
     page.edit(lambda: type_over("the"), f"word {number} is the")
@@ -238,7 +216,7 @@ def test_each_edit_by_pointer_and_keys(page):
     moods = [re.fullmatch(r"mood (\S+) at (\S+)", step) for step in page.steps[-2:]]
     assert [mood[1] for mood in moods if mood] == ["happy:0.7", "neutral"]
     assert [float(mood[2]) for mood in moods if mood] == pytest.approx([span["start_s"], span["end_s"]], abs=1e-3)
-    window.press(ESCAPE, "d")
+    window.press(browser.ESCAPE, "d")
     x, y = page.middle('.curve[data-channel="opening"]')
     way = [(x + 10 * step, y - 2 * step) for step in range(1, 6)]
     page.edit(lambda: window.drag((x, y), *way), r"draw opening (\S+ ){3,}from \S+ to \S+")
@@ -249,10 +227,10 @@ def test_each_edit_by_pointer_and_keys(page):
     page.edit(lambda: window.click("#set-stepped"), "set stepped true")
     made = page.steps
     for count in reversed(range(len(made))):
-        window.press_together(CONTROL, "z")
+        window.press_together(browser.CONTROL, "z")
         page.wait_for_steps(count)
     for count in range(len(made)):
-        window.press_together(CONTROL, SHIFT, "z")
+        window.press_together(browser.CONTROL, browser.SHIFT, "z")
         page.wait_for_steps(count + 1)
     assert page.steps == made
     assert [each for each in window.problems() if each.startswith("SEVERE") and "favicon" not in each] == []
@@ -262,11 +240,11 @@ def test_edited_phones_are_marked_and_the_strip_of_confidence_says_what_it_shows
     marked = "[...document.querySelectorAll('.phones .edited')].map((phone) => [phone.dataset.index, phone.title])"
     assert page.of(marked) == []
     page.choose(9)
-    page.edit(lambda: page.window.press(ENTER, *"aa", ENTER), "phone 9 is aa")
+    page.edit(lambda: page.window.press(browser.ENTER, *"aa", browser.ENTER), "phone 9 is aa")
     ((index, name),) = page.of(marked)
     assert (index, name.endswith(", edited")) == ("8", True)
     assert page.of("document.querySelector('.phones .edited').getAttribute('aria-label')") == name
-    page.window.press_together(CONTROL, "z")
+    page.window.press_together(browser.CONTROL, "z")
     wait_until(lambda: page.of(marked) == [], LIMIT_S)
     assert page.window.text(".confidence .label") == "stronger: less confident"
     page.window.run("document.querySelector('.confidence .label').focus()")
@@ -275,7 +253,7 @@ def test_edited_phones_are_marked_and_the_strip_of_confidence_says_what_it_shows
 
 def test_sound_and_face_are_in_step(page):
     wait_until(lambda: page.of("studio.weights.exact"), LIMIT_S)
-    page.window.press(ESCAPE, ESCAPE)
+    page.window.press(browser.ESCAPE, browser.ESCAPE)
     page.window.run(
         """const { head } = studio.stage, posed = head.pose.bind(head);
         window.offsets = [];
@@ -288,15 +266,15 @@ def test_sound_and_face_are_in_step(page):
     for speed in (0.5, 1):  # after a click the keys are those of the page
         page.window.click("#half")
         assert page.of("studio.store.speed") == speed
-    page.window.press(SPACE)
+    page.window.press(browser.SPACE)
     wait_until(lambda: page.of("window.offsets.length") > 5, LIMIT_S)
-    page.window.press(SPACE)
+    page.window.press(browser.SPACE)
     assert page.of("studio.player.audio.paused")
     page.window.run("studio.store.set({ looping: false, span: null })")
     assert max(map(abs, page.of("window.offsets"))) <= FRAME_S
     page.window.run("document.getElementById('half').focus()")
     for speed in (0.5, 1):  # as one comes there by Tab: it is pressed
-        page.window.press(SPACE)
+        page.window.press(browser.SPACE)
         assert page.of("[studio.store.speed, studio.store.playing]") == [speed, False]
 
 
@@ -328,8 +306,8 @@ def test_an_edit_waits_for_a_border_that_is_on_its_way(page):
     page.wait_for_steps(len(before) + 2)
     assert page.steps[-2:] == [f"phone 5 ends {ends_s - 0.02:.3f}", "pin opening 0.02 at 4.5"]
     assert page.of("studio.store.weights.values.every(Number.isFinite)")
-    page.window.press_together(CONTROL, "z")
-    page.window.press_together(CONTROL, "z")
+    page.window.press_together(browser.CONTROL, "z")
+    page.window.press_together(browser.CONTROL, "z")
     page.wait_for_steps(len(before))
 
 
@@ -351,7 +329,7 @@ def test_a_dropped_line_is_read_corrected_and_exported(opens, tmp_path):
         window.click("#word-keep")
         wait_until(lambda: "s p iy k s" in window.text("#offers"), LIMIT_S)
         page.edit(lambda: window.click("#word-change"), "word 2 is speak said s p iy k s")
-        window.press(ESCAPE, ESCAPE, "a")
+        window.press(browser.ESCAPE, browser.ESCAPE, "a")
         wait_until(lambda: page.of("studio.store.recordings.at(-1).mark") == "approved", LIMIT_S)
         window.run("document.getElementById('transcript').value += ' now'")
         page.edit(lambda: window.click("#align"), r"say please .* now from \S+ to \S+ with speak s p iy k s")
@@ -364,7 +342,7 @@ def test_a_dropped_line_is_read_corrected_and_exported(opens, tmp_path):
 def test_the_weights_of_the_page_are_those_of_the_exported_file(page):
     page.window.run("window.touching = setInterval(() => dispatchEvent(new PointerEvent('pointermove')), 100)")
     page.choose(9)
-    page.edit(lambda: page.window.press(ENTER, *"aa", ENTER), "phone 9 is aa")
+    page.edit(lambda: page.window.press(browser.ENTER, *"aa", browser.ENTER), "phone 9 is aa")
     page.edit(lambda: page.window.press("f"), r"hold from \S+ to \S+")
     wait_until(lambda: page.of("studio.weights.settling.wanted"), LIMIT_S)
     page.window.run_until_done("setTimeout(arguments[0], 4000)")
@@ -388,14 +366,14 @@ def test_the_weights_of_the_page_are_those_of_the_exported_file(page):
 def test_versions_are_kept_compared_and_gone_back_to(page):
     window = page.window
     page.choose(9)
-    page.edit(lambda: window.press(ENTER, *"aa", ENTER), "phone 9 is aa")
+    page.edit(lambda: window.press(browser.ENTER, *"aa", browser.ENTER), "phone 9 is aa")
     window.click("#tab-history")
     window.click("#compare-keep")
     wait_until(lambda: page.of("Boolean(studio.store.other?.weights)"), LIMIT_S)
     kept = page.of("studio.store.other.motion.values.join()")
     assert page.of("document.getElementById('compare-blind').disabled")  # it is what is shown
     page.choose(12)
-    page.edit(lambda: window.press(ENTER, *"uw", ENTER), "phone 12 is uw")
+    page.edit(lambda: window.press(browser.ENTER, *"uw", browser.ENTER), "phone 12 is uw")
     page.reload()
     window.click("#tab-history")
     window.click("#version-1")
@@ -405,7 +383,7 @@ def test_versions_are_kept_compared_and_gone_back_to(page):
     window.run("studio.player.seek(1.2)")
     window.click("#compare-over")
     wait_until(lambda: page.of(GHOST_PIXELS) > 1000, LIMIT_S)
-    check_screens(window, "versions", SCREENS, "studio.showPlace('panel')")
+    browser.check_screens(window, "versions", SCREENS, "studio.showPlace('panel')")
     window.click("#version-1-back")
     page.wait_for_steps(1)
     assert page.steps == ["phone 9 is aa"]
@@ -529,13 +507,12 @@ def test_every_screen(page):
         for name, act in states:
             window.run(act)
             window.run_until_done("setTimeout(arguments[0], 100)")
-            check_screen(window, name, width, scheme)
+            browser.check_screen(window, name, width, scheme)
     window.show_as(1200, 900)
 
 
 @pytest.mark.parametrize("opens", BOTH)
 def test_the_real_video_beside_and_comparisons(opens, tmp_path, filmed_face_file):
-    (tmp_path / "home").mkdir()
     sound = Path(shutil.copy(WELCOME, tmp_path))
     pictures = (np.full((64, 96, 3), 40 + number % 200, np.uint8) for number in range(100))
     write_film(tmp_path / "in step.mp4", pictures, sound)
@@ -543,11 +520,8 @@ def test_the_real_video_beside_and_comparisons(opens, tmp_path, filmed_face_file
     other = tmp_path / find_shipped().name  # another file, of the same name
     model = load_model()
     save_model(replace(model, about={**model.about, "seed": "another"}), other)
-    options = ("--against", other, "--face", filmed_face_file)
-    with served(tmp_path / "project", sound, *options) as address, opens(tmp_path / "home", *WEBGL) as window:
-        window.open(address)
-        page = Page(window, tmp_path / "project")
-        page.ready()
+    with shown(opens, tmp_path, sound, "--against", other, "--face", filmed_face_file) as page:
+        window = page.window
         window.press("x")
         wait_until(lambda: page.of("document.querySelector('.recorded').readyState") >= 2, LIMIT_S)
         window.run("studio.player.seek(1.23)")
@@ -571,7 +545,7 @@ def test_the_real_video_beside_and_comparisons(opens, tmp_path, filmed_face_file
             window.show_as(width, height, scheme, mobile=width < 600)
             window.run("studio.showPlace('panel')")
             window.run_until_done("setTimeout(arguments[0], 100)")
-            check_screen(window, "compared", width, scheme)
+            browser.check_screen(window, "compared", width, scheme)
             assert page.of(ROWS) == 1, width
         icons = page.of(
             "[...document.querySelectorAll('header path, .over path')].map((path) => path.getAttribute('d'))"
@@ -602,6 +576,6 @@ def test_the_real_video_beside_and_comparisons(opens, tmp_path, filmed_face_file
         wait_until(lambda: page.of("document.querySelector('#stage .film').hidden"), LIMIT_S)
         window.run("studio.store.set({ face: 'toy', mesh: '' })")  # its video is asked for, of another model's channels
         wait_until(lambda: "the face: its motion" in window.text("#stage .note"), LIMIT_S)
-        check_screen(window, "filmed", 1440, "light")
+        browser.check_screen(window, "filmed", 1440, "light")
         problems = [each for each in window.problems() if each.startswith("SEVERE") and "favicon" not in each]
         assert [each for each in problems if "/video " not in each] == []  # that one was refused

@@ -11,7 +11,7 @@ from lipmotion.pipeline.edits import STEPS, parse_step
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
 
-from studio.hostile import attacked
+from studio.hostile import attack
 from studio.served import edits_of_all_kinds, lost_edits, served, undone_edits
 from study.small_study import small_study
 
@@ -25,7 +25,7 @@ def line(toy_speech: Path, tmp_path: Path) -> Path:
 @pytest.mark.long
 def test_kills_in_the_middle_lose_at_most_the_last_edit(line, toy_model_file, tmp_path):
     errors = tmp_path / "errors.txt"
-    found = lost_edits(line, toy_model_file, errors, kills=3, each_s=1.5)
+    found = lost_edits(line, errors, 3, 1.5, "--model", toy_model_file)
     assert (found["kills"], found["lost"]) == (3, 0)
     assert found["acknowledged"] > 0
     assert "Traceback" not in errors.read_text(encoding="utf-8")
@@ -34,9 +34,9 @@ def test_kills_in_the_middle_lose_at_most_the_last_edit(line, toy_model_file, tm
 @pytest.mark.long
 def test_hostile_requests_get_no_file_and_leave_no_traceback(line, toy_model_file, tmp_path):
     errors = tmp_path / "errors.txt"
-    with served(line, errors, toy_model_file) as server:
+    with served(line, errors, "--model", toy_model_file) as server:
         server.ready()
-        statuses = attacked(server, line.parent, 500)
+        statuses = attack(server, line.parent, 500)
         assert server.ready()["steps"] == [] or server.ready()["undo"] > 0
         server.process.terminate()
         assert server.process.wait(60) == 143
@@ -47,7 +47,7 @@ def test_hostile_requests_get_no_file_and_leave_no_traceback(line, toy_model_fil
 @pytest.mark.long
 def test_edits_taken_back_over_http_give_the_first_bytes(line, toy_model_file, tmp_path):
     errors = tmp_path / "errors.txt"
-    found = undone_edits(line, toy_model_file, errors, 40)
+    found = undone_edits(line, errors, 40, "--model", toy_model_file)
     assert (found["edits"], found["kinds"] > 8) == (40, True)
     assert "Traceback" not in errors.read_text(encoding="utf-8")
 

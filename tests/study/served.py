@@ -5,8 +5,8 @@ import json
 import socket
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -81,24 +81,22 @@ class Connection:
         self._connection.close()
 
 
-def raw_reply(port: int, hostile: Hostile) -> tuple[http.client.HTTPResponse, bytes] | None:
-    """Return the reply to a hostile request, as it is, and its body; None: the connection was closed, which is safe."""
-    raw = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE_S)
-    try:
-        raw.putrequest(hostile.method, hostile.path, skip_host="host" in hostile.headers, skip_accept_encoding=True)
-        for name, value in {**hostile.headers, "content-length": str(len(hostile.body))}.items():
-            raw.putheader(name, value.encode("utf-8"))
-        raw.endheaders(hostile.body)
-        reply = raw.getresponse()
-        return reply, reply.read()
-    except NO_REPLY:
-        return None
-    finally:
-        raw.close()
+def attacked(port: int, requests: Iterable[Hostile], secrets: Iterable[bytes]) -> Iterator[tuple[int, bytes]]:
+    """Send hostile requests, and what is no request; give statuses and bodies of the replies.
 
-
-def send_junk(port: int) -> None:
-    """Send what is no request."""
+    Raises AssertionError: a reply holds what nobody may read.
+    """
+    for hostile in requests:
+        raw = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE_S)
+        with closing(raw), suppress(*NO_REPLY, ValueError):  # closed, which is safe; or nothing that can be sent
+            raw.putrequest(hostile.method, hostile.path, skip_host="host" in hostile.headers, skip_accept_encoding=True)
+            for name, value in {**hostile.headers, "content-length": str(len(hostile.body))}.items():
+                raw.putheader(name, value.encode("utf-8"))
+            raw.endheaders(hostile.body)
+            reply = raw.getresponse()
+            body = reply.read()
+            assert [secret for secret in (b"root:", *secrets) if secret in body] == [], hostile
+            yield reply.status, body
     for content in (b"\x16\x03\x01" * 200, b"GET / HTTP/9.9\r\n\r\n", b"GET /" + b"a" * 100_000, b"\r\n" * 500):
         with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as plain:
             plain.sendall(content)

@@ -21,7 +21,7 @@ from lipmotion_studio.verbs.study import run_serve
 from lipmotion_studio.web.replies import HEADERS
 from study.asgi import Application, ask
 from study.hostile import FOREIGN, hostile_requests
-from study.served import Connection, ScriptedRater, raw_reply, send_junk, served
+from study.served import Connection, ScriptedRater, attacked, served
 from study.small_study import scripted_answer, small_study
 
 starlette = pytest.importorskip("starlette", reason="the extra 'study' is not installed")
@@ -285,24 +285,10 @@ def test_hostile_requests_get_no_file_and_leave_no_traceback(tmp_path):
         connection = Connection(server.port)
         token = connection.ask_until_answered("/api/raters", {"agrees": True})["token"]
         video = study.videos[0].file
-        shown = {(folder / VIDEOS / each.file).read_bytes() for each in study.videos}
-        manifest = (folder / "study.json").read_bytes()
-        statuses = set()
-        for hostile in hostile_requests(500, video, token):
-            answered = raw_reply(server.port, hostile)
-            if answered is None:
-                continue
-            reply, body = answered
-            statuses.add(reply.status)
-            assert FOREIGN.encode() not in body
-            assert manifest[:200] not in body
-            assert b"SQLite format" not in body
-            assert b"root:" not in body
-            assert reply.status < 500, hostile
-            if reply.getheader("content-type") == "video/mp4" and reply.status == 200 and body:
-                assert body in shown
+        secrets = FOREIGN.encode(), (folder / "study.json").read_bytes()[:200], b"SQLite format"
+        statuses = {status for status, _ in attacked(server.port, hostile_requests(500, video, token), secrets)}
         assert {404, 405, 401, 400} <= statuses
-        send_junk(server.port)
+        assert max(statuses) < 500
         connection.close()
         later = Connection(server.port, token)
         wait_until(lambda: later.ask("/api/state")[0] == 200, 60)  # the limit on its requests has passed

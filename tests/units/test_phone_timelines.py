@@ -2,13 +2,17 @@ import pytest
 
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import Lexicon, group_words, phone_timelines
+from lipmotion.units.stress import NUCLEI, find_stress, find_stressed_vowel
 
 
-def said(*words: tuple[str, str]) -> list[tuple[float, float, str]]:
-    """Return the words in time of words with their phones, each phone a second long."""
+def said(*words: tuple[str, str]) -> Timeline[Unit]:
+    """Return words in time, each given as its spelling and its phones; a phone is a second long."""
     phones = [Unit(phone, word=word) for word, text in words for phone in text.split()]
-    units = Timeline(tuple(Span(float(n), n + 1.0, unit) for n, unit in enumerate(phones)))
-    return [(span.start_s, span.end_s, span.label) for span in group_words(units)]
+    return Timeline(tuple(Span(float(n), n + 1.0, unit) for n, unit in enumerate(phones)))
+
+
+def grouped(*words: tuple[str, str]) -> list[tuple[float, float, str]]:
+    return [(span.start_s, span.end_s, span.label) for span in group_words(said(*words))]
 
 
 def test_a_word_that_is_said_again_is_another_one() -> None:
@@ -20,16 +24,53 @@ def test_a_word_that_is_said_again_is_another_one() -> None:
         ("hahaha", "hh aa hh aa hh aa hh aa hh aa hh aa", [0, 6]), ("brrk", "r r r", [0]), ("", "b ih g b ih g", [0]),
     ):  # fmt: skip
         ends = [*starts[1:], len(phones.split())]
-        assert said((word, phones)) == list(zip(starts, ends, [word] * len(starts), strict=True))
+        assert grouped((word, phones)) == list(zip(starts, ends, [word] * len(starts), strict=True))
 
 
 def test_a_word_is_said_as_few_times_as_can_be(monkeypatch: pytest.MonkeyPatch) -> None:
     both = Lexicon({"dodo": (("d", "ow"), ("d", "ow", "d", "ow"))})
     monkeypatch.setattr(phone_timelines, "Lexicon", lambda: both)
-    assert said(("dodo", "d ow d ow")) == [(0, 4, "dodo")]
-    assert said(("dodo", "d ow d ow d ow")) in ([(0, 2, "dodo"), (2, 6, "dodo")], [(0, 4, "dodo"), (4, 6, "dodo")])
+    assert grouped(("dodo", "d ow d ow")) == [(0, 4, "dodo")]
+    assert grouped(("dodo", "d ow d ow d ow")) in ([(0, 2, "dodo"), (2, 6, "dodo")], [(0, 4, "dodo"), (4, 6, "dodo")])
 
 
 def test_other_words_and_silence_are_apart() -> None:
-    words = said(("", "sil"), ("big", "b ih g"), ("", "sp"), ("big", "b ih g"), ("boat", "b ow t"))
+    words = grouped(("", "sil"), ("big", "b ih g"), ("", "sp"), ("big", "b ih g"), ("boat", "b ow t"))
     assert words == [(0, 1, ""), (1, 4, "big"), (4, 5, ""), (5, 8, "big"), (8, 11, "boat")]
+
+
+def test_words_of_the_dictionary() -> None:
+    for word, stressed in (
+        ("mother", 0), ("again", 1), ("banana", 1), ("before", 1), ("because", 1), ("beautiful", 0), ("nation", 0),
+        ("information", 2), ("electric", 1), ("university", 2), ("yesterday", 0), ("japanese", 2), ("animated", 0),
+        ("table", 0), ("bread", 0), ("the", None), ("them", None), ("your", None), ("media's", 0),
+    ):  # fmt: skip
+        phones = Lexicon().pronunciations(word)[0]
+        assert find_stressed_vowel(word, [phone for phone in phones if phone in NUCLEI]) == stressed
+
+
+def test_a_consonant_has_the_stress_of_its_syllable() -> None:
+    """A syllable begins with one consonant, or with a glide and its lead."""
+    for word, phones, stress in (
+        ("information", "ih n f axr m ey sh ax n", (0, 0, 0, 0, 1, 1, 0, 0, 0)),
+        ("apply", "ax p l ay", (0, 1, 1, 1)),
+        ("handy", "hh ae n d iy", (1, 1, 1, 0, 0)),
+        ("singer", "s ih ng axr", (1, 1, 1, 0)),
+        ("psst", "p s t", (None, None, None)),
+        ("bye", "b ay b ay", (1, 1, 1, 1)),  # said twice
+        ("again", "ax g eh n ax g eh n", (0, 1, 1, 1, 0, 1, 1, 1)),
+    ):
+        assert find_stress(said((word, phones))) == stress
+    assert find_stress(said(("bye", "b ay"), ("", "sp"), ("bye", "b ay"))) == (1, 1, None, 1, 1)
+
+
+def test_silence_and_what_has_no_word() -> None:
+    units = said(("", "sil"), ("please", "p l iy z"), ("", "sp b ax ih"), ("hm", "hh m"), ("", "sil"))
+    assert find_stress(units) == (None, 1, 1, 1, 1, None, None, 0, None, None, None, None)
+    assert find_stress(Timeline(())) == ()
+
+
+def test_a_word_of_two_equal_halves_is_one() -> None:
+    lexicon = Lexicon({"dodo": (("d", "ow", "d", "ow"),)})
+    assert find_stress(said(("dodo", "d ow d ow")), lexicon) == (1, 1, 0, 0)
+    assert find_stress(said(("dodo", "d ow d ow d ow d ow")), lexicon) == (1, 1, 0, 0, 1, 1, 0, 0)

@@ -37,13 +37,8 @@ def port() -> Iterator[int]:
 
     application = Starlette(routes=[Route("/{name}", replied)])
     with pytest.MonkeyPatch.context() as patch, open_socket("127.0.0.1", 0) as place:
-        for name, value in {
-            "HEADERS_S": 0.2,
-            "STALLED_S": 0.2,
-            "FIRST_READ_S": 0.01,
-            "MAX_OF_ONE": 5,
-            "MAX_CONNECTIONS": 8,
-        }.items():
+        limits = {"HEADERS_S": 0.2, "STALLED_S": 0.2, "FIRST_READ_S": 0.01, "MAX_OF_ONE": 5, "MAX_CONNECTIONS": 8}
+        for name, value in limits.items():
             patch.setattr(connections, name, value)
         config = uvicorn.Config(application, lifespan="off", log_level="error", http=connections.PunctualConnection)
         server = uvicorn.Server(config)
@@ -58,12 +53,6 @@ def port() -> Iterator[int]:
 
 def connected(port: int) -> socket.socket:
     return socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S)
-
-
-def send_drops(client: socket.socket) -> None:
-    for _ in range(300):
-        client.sendall(b"x")
-        time.sleep(0.02)
 
 
 def reply_to(client: socket.socket) -> bytes:
@@ -89,18 +78,13 @@ def is_closed(client: socket.socket) -> bool:
     return True
 
 
-@pytest.mark.parametrize(
-    "sent",
-    [
-        b"",
-        b"G",
-        ASKED,
-        ASKED + b"x: ",
-        ASKED + b"\r\n" + ASKED,
-        b"GET /small HTTP/1.1\r\nhost: x\r\ncontent-length: 9\r\n\r\n",
-    ],
-    ids=["nothing", "a letter", "no end", "half a header", "half a second request", "no body"],
-)
+SENT = {
+    "nothing": b"", "a letter": b"G", "no end": ASKED, "half a header": ASKED + b"x: ",
+    "half a second request": ASKED + b"\r\n" + ASKED, "no body": ASKED + b"content-length: 9\r\n\r\n",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("sent", SENT.values(), ids=SENT)
 def test_who_does_not_end_a_request_is_closed(port, sent):
     with connected(port) as client:
         client.sendall(sent)
@@ -113,9 +97,15 @@ def test_who_does_not_end_a_request_is_closed(port, sent):
 def test_a_request_that_comes_drop_by_drop_is_closed(port):
     """Each drop does not begin the time anew."""
     with connected(port) as client:
+
+        def send_drops() -> None:
+            for _ in range(300):
+                client.sendall(b"x")
+                time.sleep(0.02)
+
         client.sendall(ASKED)
         with pytest.raises((ConnectionResetError, BrokenPipeError)):
-            send_drops(client)
+            send_drops()
 
 
 def test_who_does_not_take_a_reply_is_closed(port):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Generic, Protocol, TypeVar, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,6 +105,13 @@ class Engine(Animator[ModelT]):
     name: ClassVar[str]
     Config: ClassVar[type[Configuration]]
     config: Any
+
+    def without_closures(self) -> Engine[ModelT]:
+        """Return the engine whose option ``closures`` is off, for the same models; itself, if it has none."""
+        if not getattr(self.config, "closures", False):
+            return self
+        engine: Engine[ModelT] = replace(cast(Any, self), config=replace(self.config, closures=False))
+        return engine
 
     @abstractmethod
     def to_arrays(self, model: ModelT) -> dict[str, NDArray[Any]]:

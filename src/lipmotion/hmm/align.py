@@ -97,19 +97,6 @@ class PlacedWord(NamedTuple):
     fit: float
 
 
-def choose_pronunciations(
-    hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: Sequence[Sequence[Sequence[str]]], pause: str
-) -> list[SpokenWord]:
-    """Return the most probable pronunciation of each word, with silence and the pauses between words, in order.
-
-    words : for each word, its possible pronunciations; a pause inside of one may be left out
-    pause : the unit that may stand between words; silence (the first free unit) surrounds them all
-    Only states without context are used: then the states of a pronunciation do not depend on the words beside it.
-    Raises AlignmentError: the words do not fit into the frames.
-    """
-    return [item.spoken for item in place_words(hmm, log_likelihoods, words, pause)]
-
-
 def place_words(
     hmm: UnitHmm,
     log_likelihoods: LogLikelihoods,
@@ -117,10 +104,13 @@ def place_words(
     pause: str,
     windows: Windows | None = None,
 ) -> list[PlacedWord]:
-    """Return what ``choose_pronunciations`` does, each with its place.
+    """Return the most probable pronunciation of each word, with silence and the pauses between words, in order.
 
+    words   : for each word, its possible pronunciations; a pause inside of one may be left out
+    pause   : the unit that may stand between words; silence (the first free unit) surrounds them all
     windows : of the words: the frames that each may have; a pause may have those of both words beside it; with windows
               the fit is computed
+    Only states without context are used: then the states of a pronunciation do not depend on the words beside it.
     Raises AlignmentError: the words do not fit into the frames, or into their windows.
     """
     _check_room(hmm, log_likelihoods.frames, words)
@@ -138,13 +128,12 @@ def place_words(
         ends: list[tuple[int, float]] = []
         for choice in choices:
             if slot == 0:
-                builder.initial(len(nodes))
+                builder.initial[len(nodes)] = 0.0
             ends += _append_units(builder, hmm, choice.units, open_ends, pause if choice.word >= 0 else "")
             counts = [hmm.table.count(unit) for unit in choice.units]
             nodes += [(choice, slot, place) for place, count in enumerate(counts) for _ in range(count)]
         open_ends = ends
-    for state, move in open_ends:
-        builder.final(state, move)
+    builder.final.update(open_ends)
     plain = np.arange(len(hmm.log_stay), dtype=np.intp)
     slot_of = np.array([slot for _, slot, _ in nodes])
     of_states = None

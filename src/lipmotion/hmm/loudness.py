@@ -62,15 +62,13 @@ def measure_levels(log_energy: NDArray[np.floating]) -> tuple[float, float]:
     return loud, float(np.median(lowest[spoken])) if spoken.any() else loud
 
 
-def find_loud_frames(
-    log_energy: NDArray[np.floating], drop: float = SOUND_DROP, smoothing: int = SMOOTHING_FRAMES
-) -> NDArray[np.bool_]:
-    """Return which frames are louder than the noise, and than a level ``drop`` beneath the loud one [shape=(T,)]."""
+def find_loud_frames(log_energy: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Return which frames are louder than the noise, and not far beneath the loud level [shape=(T,)]."""
     loud, noise = measure_levels(log_energy)
     if loud - noise < MIN_RANGE:
         return np.zeros(len(log_energy), bool)
-    threshold = max(loud - drop, noise + min(ABOVE_NOISE, NOISE_SHARE * (loud - noise)))
-    return smooth_level(log_energy, smoothing) > threshold
+    threshold = max(loud - SOUND_DROP, noise + min(ABOVE_NOISE, NOISE_SHARE * (loud - noise)))
+    return smooth_level(log_energy) > threshold
 
 
 def find_sound_runs(sound: NDArray[np.bool_], pause: int = PAUSE_FRAMES) -> list[tuple[int, int]]:

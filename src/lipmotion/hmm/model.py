@@ -72,10 +72,6 @@ class StateTable:
         """Return the density without context of the same state, for every density [shape=(G,)]."""
         return np.array([self._index[re.split("[<>]", name)[0]] for name in self.names], np.intp)
 
-    def extend(self, names: tuple[str, ...]) -> StateTable:
-        """Return the table with more densities, of these names, at its end."""
-        return StateTable(self.units, self.counts, self.names + names, self.free)
-
 
 def make_plain_states(units: tuple[str, ...], counts: tuple[int, ...], free: tuple[str, ...]) -> StateTable:
     """Return the table of states without context."""

@@ -57,20 +57,11 @@ def compute_log_likelihoods(hmm: UnitHmm, features: NDArray[np.float32]) -> LogL
     )
 
 
-def penalise_silence(hmm: UnitHmm, log_likelihoods: LogLikelihoods, loud: NDArray[np.bool_]) -> LogLikelihoods:
-    """Return log likelihoods that make silence improbable in loud frames [shape=(T,)], for forced alignment."""
-    return _penalise(hmm, log_likelihoods, loud, LOUD_SILENCE_PENALTY, silent=True)
-
-
-def penalise_speech(hmm: UnitHmm, log_likelihoods: LogLikelihoods, quiet: NDArray[np.bool_]) -> LogLikelihoods:
-    """Return log likelihoods that make all but silence improbable in quiet frames [shape=(T,)]."""
-    return _penalise(hmm, log_likelihoods, quiet, QUIET_SPEECH_PENALTY, silent=False)
-
-
-def _penalise(
-    hmm: UnitHmm, log_likelihoods: LogLikelihoods, frames: NDArray[np.bool_], penalty: float, *, silent: bool
+def penalise(
+    hmm: UnitHmm, log_likelihoods: LogLikelihoods, frames: NDArray[np.bool_], *, silent: bool
 ) -> LogLikelihoods:
-    """Return log likelihoods reduced by a penalty in some frames, of the densities that are of silence or are not."""
+    """Return log likelihoods that make silence improbable in loud frames, or all else in quiet frames [shape=(T,)]."""
+    penalty = LOUD_SILENCE_PENALTY if silent else QUIET_SPEECH_PENALTY
     free = [hmm.table.density(unit, state) for unit in hmm.table.free for state in range(hmm.table.count(unit))]
     penalised = np.isin(np.arange(len(hmm.table.names)), free) == silent
 
@@ -90,16 +81,11 @@ class Network(NetworkArrays):
     """States joined by arcs, in which the best path can be searched."""
 
     def best_path(
-        self,
-        log_likelihoods: LogLikelihoods,
-        chosen: NDArray[np.intp] | None = None,
-        beam: float | None = None,
-        windows: Windows | None = None,
+        self, log_likelihoods: LogLikelihoods, chosen: NDArray[np.intp] | None = None, windows: Windows | None = None
     ) -> NDArray[np.intp]:
         """Return the states of the best path [shape=(T,)].
 
         chosen  : the densities that ``emission`` numbers; None: all
-        beam    : states with a score lower than the best of the frame by more than this are dropped; None: exact
         windows : the frames that each state may have; None: any
         Raises AlignmentError: no path reaches the end.
         """
@@ -109,7 +95,7 @@ class Network(NetworkArrays):
         def log_emission(first: int, end: int) -> NDArray[np.float32]:
             return log_likelihoods.log_density(first, end, chosen) if cached is None else cached[first:end]
 
-        path, score = best_path(log_emission, frames, self, beam, windows)
+        path, score = best_path(log_emission, frames, self, windows)
         if not np.isfinite(score):
             raise AlignmentError(
                 f"no path through {len(self.emission)} states in {frames} frames of 10 ms: "
@@ -119,13 +105,16 @@ class Network(NetworkArrays):
 
 
 class NetworkBuilder:
-    """Builder of a ``Network``, to which states and arcs are added in any order."""
+    """Builder of a ``Network``, to which states and arcs are added in any order.
+
+    initial, final : log probabilities of beginning and of ending in states
+    """
 
     def __init__(self) -> None:
         self._emission: list[int] = []
         self._arcs: list[tuple[int, int, float]] = []
-        self._initial: dict[int, float] = {}
-        self._final: dict[int, float] = {}
+        self.initial: dict[int, float] = {}
+        self.final: dict[int, float] = {}
 
     def state(self, density: int, stay: float) -> int:
         """Add a state with an arc to itself of log probability ``stay``; return its number."""
@@ -138,22 +127,14 @@ class NetworkBuilder:
         """Add an arc between two states."""
         self._arcs.append((target, source, log_probability))
 
-    def initial(self, state: int, log_probability: float = 0.0) -> None:
-        """Let paths begin in a state."""
-        self._initial[state] = log_probability
-
-    def final(self, state: int, log_probability: float = 0.0) -> None:
-        """Let paths end in a state."""
-        self._final[state] = log_probability
-
     def build(self) -> Network:
         """Return the network, with its arcs sorted by target."""
         arcs = sorted(self._arcs, key=lambda arc: arc[0])
         targets = np.array([arc[0] for arc in arcs], np.intp)
         count = len(self._emission)
         log_initial, log_final = np.full((2, count), -np.inf, np.float32)
-        log_initial[[*self._initial]] = [*self._initial.values()]
-        log_final[[*self._final]] = [*self._final.values()]
+        log_initial[[*self.initial]] = [*self.initial.values()]
+        log_final[[*self.final]] = [*self.final.values()]
         return Network(
             emission=np.array(self._emission, np.intp),
             arc_from=np.array([arc[1] for arc in arcs], np.intp),
@@ -173,8 +154,8 @@ def build_chain(
         builder.state(int(density), stay)
         if number:
             builder.arc(number - 1, number, float(log_move[number - 1]))
-    builder.initial(0)
-    builder.final(len(log_stay) - 1, float(log_move[-1]))
+    builder.initial[0] = 0.0
+    builder.final[len(log_stay) - 1] = float(log_move[-1])
     return builder.build()
 
 
@@ -219,8 +200,9 @@ def build_unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
             builder.arc(_node(last, following), _node(rows[following][0], unit), leave(unit, following))
         at_rest = unit == silence
         begin = hmm.config.insertion if at_rest else _language_score(hmm, silence, unit)
-        builder.initial(_node(first, silence), begin)
-        builder.final(_node(last, silence), hmm.move(unit, len(rows[unit]) - 1) if at_rest else leave(unit, silence))
+        builder.initial[_node(first, silence)] = begin
+        end = hmm.move(unit, len(rows[unit]) - 1) if at_rest else leave(unit, silence)
+        builder.final[_node(last, silence)] = end
     entries = frozenset(entry for unit_rows in rows.values() for entry in unit_rows[0].values())
     return UnitLoop(builder.build(), tuple(owners), entries)
 

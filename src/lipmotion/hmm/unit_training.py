@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, CorpusError
-from lipmotion.hmm.align import StateSequence, align_states, choose_pronunciations, expand_states
+from lipmotion.hmm.align import StateSequence, align_states, expand_states, place_words
 from lipmotion.hmm.loudness import smooth_level
 from lipmotion.hmm.model import HmmConfig, StateTable, UnitHmm, hmm_from_arrays, hmm_to_arrays, make_plain_states
 from lipmotion.hmm.network import compute_log_likelihoods
@@ -385,10 +385,10 @@ def _choose_sequences(
     for number, utterance in enumerate(utterances):
         words = [[v for v in variants if set(v) <= known] or variants[:1] for variants in utterance.words]
         try:
-            chosen = choose_pronunciations(hmm, compute_log_likelihoods(hmm, utterance.features), words, pause)
+            placed = place_words(hmm, compute_log_likelihoods(hmm, utterance.features), words, pause)
         except AlignmentError:
             continue
-        sequence = tuple(unit for word in chosen for unit in word.units)
+        sequence = tuple(unit for item in placed for unit in item.spoken.units)
         if sum(hmm.table.count(unit) for unit in sequence) <= len(utterance.features):
             sequences[number] = sequence
     return sequences
@@ -440,6 +440,6 @@ def add_contexts(hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: S
             chain, path = align_states(hmm, compute_log_likelihoods(hmm, x), sequence)
             frames.update(chain.names[position] for position in path)
     frequent = {name for name, count in frames.items() if count >= hmm.config.context_frames}
-    table = hmm.table.extend(tuple(sorted(frequent - set(hmm.table.names))))
+    table = replace(hmm.table, names=(*hmm.table.names, *sorted(frequent - set(hmm.table.names))))
     new = hmm.mixtures.select(table.parents()[len(hmm.log_stay) :])
     return replace(hmm, table=table, mixtures=hmm.mixtures.concatenate(new))

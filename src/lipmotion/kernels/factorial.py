@@ -190,7 +190,7 @@ class _Scaled:
         self.min_log_overlap = math.log(raised / OFF[kind])
         self.frame_bytes = self.initial.size * kind.itemsize
 
-    def forward(self, start: int, stop: int, before: Array | None, found: list[tuple[Array, Array]]) -> float:
+    def forward(self, start: int, stop: int, before: Array | None, results: list[tuple[Array, Array]]) -> float:
         """Append the forward probabilities of some frames, and those of leaving the last visual states after the audio
         loop's transition only [shape=(Na, Uv)]; return the log of the product of their scales.
         """
@@ -199,7 +199,7 @@ class _Scaled:
         for density in self.densities:
             if before is None:
                 before, log = self._shares(self.initial + self.logs.joint(0))
-                found.append((before, before[:, :count]))
+                results.append((before, before[:, :count]))
                 log_total += log
                 continue
             entering, after = self.audio[2].T @ before[-units:], np.empty_like(before)
@@ -212,7 +212,7 @@ class _Scaled:
             if not total > MIN_TOTAL[self.kind]:
                 return -math.inf
             log_total += math.log(total) + density.best
-            found.append((after, moved))
+            results.append((after, moved))
             before = after
         return log_total
 
@@ -271,14 +271,14 @@ class _InLogs:
         self.initial, self.final = log_ends(audio, visual)
         self.frame_bytes = self.initial.nbytes
 
-    def forward(self, start: int, stop: int, before: Array | None, found: list[tuple[Array, Array]]) -> float:
+    def forward(self, start: int, stop: int, before: Array | None, results: list[tuple[Array, Array]]) -> float:
         for t in range(start, stop):
             prior, leaving = self.initial, self.initial
             if before is not None:
                 moved = self.audio.forward(before)
                 prior, leaving = self.visual.forward(moved.T).T, moved[:, -len(self.visual.leaving) :]
             before = prior + self.logs.joint(t)
-            found.append((before, leaving))
+            results.append((before, leaving))
         return 0.0
 
     def end(self, before: Array) -> _StepBack:
@@ -356,7 +356,7 @@ def _move_back(after: Array, stay: Array, onward: Array, left: Array) -> Array:
 @compile_to_rounding
 def _forward(
     before: Array, stay_0: Array, onward_0: Array, entering_0: Array, stay_1: Array, onward_1: Array, entering_1: Array,
-    density_0: Array, density_1: Array, pair: Array, pair_0: Index, pair_1: Index, least: float, whole: float,
+    density_0: Array, density_1: Array, pair: Array, pair_0: Index, pair_1: Index, floor: float, whole: float,
     after: Array,
 ) -> float:  # fmt: skip
     """Fill in joint probabilities one frame on along both axes, times densities, normalised; return their sum before
@@ -364,15 +364,15 @@ def _forward(
 
     entering_0, entering_1 : [shapes=(U, M), (N, U)], probabilities of entering the first states
     pair, pair_0, pair_1 : the densities of pairs, and the two states of each, sorted by the first
-    least : smaller products are set to 0
+    floor : smaller products are set to 0
     """
     moved, prior = np.empty(before.shape[1], before.dtype), np.empty(before.shape[1], before.dtype)
     total, p = np.float64(0), 0
     for i in range(len(before)):
         _move(before, stay_0, onward_0, entering_0, i, moved)
         _move_along(moved, stay_1, onward_1, entering_1[i], prior)
-        _emit(prior, density_0[i], density_1, least, after[i])
-        p = _emit_pairs(prior, i, p, pair_0, pair_1, pair, least, after[i])
+        _emit(prior, density_0[i], density_1, floor, after[i])
+        p = _emit_pairs(prior, i, p, pair_0, pair_1, pair, floor, after[i])
         total += _sum(after[i])
     _share(after, total, whole)
     return total / whole
@@ -381,7 +381,7 @@ def _forward(
 @compile_to_rounding
 def _backward(
     before: Array, moved: Array, stay: Array, onward: Array, left: Array,
-    density_0: Array, density_1: Array, pair: Array, pair_0: Index, pair_1: Index, least: float, whole: float,
+    density_0: Array, density_1: Array, pair: Array, pair_0: Index, pair_1: Index, floor: float, whole: float,
     after: Array, posterior_0: Array, posterior_1: Array, posterior_pair: Array,
 ) -> float:  # fmt: skip
     """Fill in backward probabilities times densities, normalised, and posteriors, not normalised; return the sum of the
@@ -405,8 +405,8 @@ def _backward(
         while q < len(pair_0) and pair_0[q] == i:
             posterior_pair[q] = np.float64(before[i, pair_1[q]]) * beta[pair_1[q]]
             q += 1
-        _emit(beta, density_0[i], density_1, least, after[i])
-        p = _emit_pairs(beta, i, p, pair_0, pair_1, pair, least, after[i])
+        _emit(beta, density_0[i], density_1, floor, after[i])
+        p = _emit_pairs(beta, i, p, pair_0, pair_1, pair, floor, after[i])
         total += _sum(after[i])
     _share(after, total, whole)
     return total / whole
@@ -441,22 +441,22 @@ def _move_along(before: Array, stay: Array, onward: Array, entering: Array, into
 
 
 @compile_to_rounding
-def _emit(prior: Array, own: float, density: Array, least: float, into: Array) -> None:
+def _emit(prior: Array, own: float, density: Array, floor: float, into: Array) -> None:
     """Fill in a row times the densities of both axes; ``own`` is that of the row."""
     for j in range(len(prior)):
         partly = np.float64(prior[j]) * own
-        product = (partly if partly > least else 0.0) * density[j]
-        into[j] = product if product > least else 0.0
+        product = (partly if partly > floor else 0.0) * density[j]
+        into[j] = product if product > floor else 0.0
 
 
 @compile_to_rounding
 def _emit_pairs(
-    prior: Array, i: int, p: int, pair_0: Index, pair_1: Index, pair: Array, least: float, into: Array
+    prior: Array, i: int, p: int, pair_0: Index, pair_1: Index, pair: Array, floor: float, into: Array
 ) -> int:
     """Multiply the pairs of row i, from pair p on, by their own densities; return the first pair of the next row."""
     while p < len(pair_0) and pair_0[p] == i:
         product = np.float64(prior[pair_1[p]]) * pair[p]
-        into[pair_1[p]] = product if product > least else 0.0
+        into[pair_1[p]] = product if product > floor else 0.0
         p += 1
     return p
 
@@ -484,7 +484,7 @@ def _meet(one: Array, other: Array, sums: Array) -> float:
 def _share(joint: Array, total: float, whole: float) -> None:
     """Make joint probabilities sum to ``whole``; raise the least of them to 1 / ``whole``."""
     flat = joint.reshape(joint.size)
-    scale, least = whole / total if total > 0 else 0.0, 1 / whole
+    scale, floor = whole / total if total > 0 else 0.0, 1 / whole
     for j in range(len(flat)):
         share = flat[j] * scale
-        flat[j] = share if share > least else least
+        flat[j] = share if share > floor else floor

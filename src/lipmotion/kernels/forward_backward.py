@@ -70,16 +70,16 @@ def chain_posteriors(
     log_stay, log_move : [shape=(U, S)], of transitions to the same and to the next state
     frames, states     : [shape=(U,)], of each utterance without padding
     Returns the posterior of each state [shape=(T, U, S)], 0 in the padding; the expected number of transitions of each
-    state to itself [shape=(U, S)]; and the log likelihood [shape=(U,)]. Where it is <= IMPOSSIBLE / 2 there is
+    state to itself [shape=(U, S)]; and the log likelihood [shape=(U,)]. Where it is <= LOG_ZERO / 2 there is
     no path (fewer frames than states), and the other two are 0.
     Cost: O(T·U·S).
     """
-    log_posterior, log_kept, log_likelihood = _chains(log_emission, log_stay, log_move, frames, states)
+    log_posterior, log_stays, log_likelihood = _chains(log_emission, log_stay, log_move, frames, states)
     possible = log_likelihood > LOG_ZERO / 2
     within = frames > np.arange(len(log_emission))[:, None]
-    posterior, kept = _probabilities(log_posterior), _probabilities(log_kept)
+    posterior, stays = _probabilities(log_posterior), _probabilities(log_stays)
     posterior *= (within & possible)[:, :, None]
-    return posterior, kept.sum(axis=0) * possible[:, None], log_likelihood
+    return posterior, stays.sum(axis=0) * possible[:, None], log_likelihood
 
 
 def _probabilities(log: Array) -> Array:
@@ -92,16 +92,16 @@ def _chains(
     log_emission: Array, log_stay: Array, log_move: Array, frames: Index, states: Index
 ) -> tuple[Array, Array, Array]:
     """Return log posteriors of states and of staying in them [shapes=(T, U, S)], and log likelihoods [shape=(U,)]."""
-    posterior, kept = np.full(log_emission.shape, LOG_ZERO), np.full(log_emission.shape, LOG_ZERO)
+    posterior, stays = np.full(log_emission.shape, LOG_ZERO), np.full(log_emission.shape, LOG_ZERO)
     log_likelihood = np.empty(len(frames))
     for u in range(len(frames)):
         T, S = frames[u], states[u]
         emission = log_emission[:T, u, :S]
-        alpha, log_kept = posterior[:T, u, :S], kept[:T, u, :S]
+        alpha, log_stays = posterior[:T, u, :S], stays[:T, u, :S]
         _forward(emission, log_stay[u], log_move[u], alpha)
         log_likelihood[u] = alpha[T - 1, S - 1] + log_move[u, S - 1]
-        _backward(emission, log_stay[u], log_move[u], alpha, log_kept, log_likelihood[u])
-    return posterior, kept, log_likelihood
+        _backward(emission, log_stay[u], log_move[u], alpha, log_stays, log_likelihood[u])
+    return posterior, stays, log_likelihood
 
 
 @compiled
@@ -117,7 +117,7 @@ def _forward(log_emission: Array, log_stay: Array, log_move: Array, alpha: Array
 
 @compiled
 def _backward(
-    log_emission: Array, log_stay: Array, log_move: Array, alpha: Array, kept: Array, log_likelihood: float
+    log_emission: Array, log_stay: Array, log_move: Array, alpha: Array, stays: Array, log_likelihood: float
 ) -> None:
     """Replace the forward scores ``alpha`` by log posteriors, and fill in those of staying in a state."""
     T, S = alpha.shape
@@ -130,7 +130,7 @@ def _backward(
                 onward[s] = log_emission[t + 1, s] + beta[s]
             for s in range(S):
                 keep = log_stay[s] + onward[s]
-                kept[t, s] = alpha[t, s] + keep - log_likelihood
+                stays[t, s] = alpha[t, s] + keep - log_likelihood
                 reach = _log_sum(keep, log_move[s] + onward[s + 1]) if s + 1 < S else keep
                 beta[s] = max(reach, LOG_ZERO)
         for s in range(S):

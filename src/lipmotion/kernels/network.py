@@ -46,7 +46,7 @@ MIN_JOINT = 1e-4
 """Least root of a frame's best joint density, relative to the product of the chains' best ones: where it is less, joint
 densities are computed from sums of logarithms, as factors under e^LOWEST_ROOT may count."""
 LIMITS = {np.dtype(np.float32): (1e-24, 1e-12, 1e-4), np.dtype(np.float64): (1e-140, 1e-100, 1e-10)}
-"""By precision: ``least``, ``least_scale`` and ``off`` of ``_forward_backward``."""
+"""By precision: ``floor``, ``min_scale`` and ``off`` of ``_forward_backward``."""
 MIN_POSTERIOR = 1e-12
 """Smaller posteriors are set to 0."""
 SHARE = 1e-6
@@ -307,7 +307,7 @@ def _fill_joint_roots(roots: Array, columns: NDArray[np.uint32], joint: Array, b
 def _forward_backward(
     emission: Array, edges: Index, initial: Array, final: Array, runs: Unsigned, run_weight: Array,
     blocks: Unsigned, block_sources: Unsigned, block_weight: Array, transposed: Array,
-    least: float, least_scale: float, off: float,
+    floor: float, min_scale: float, off: float,
 ) -> tuple[Array, Array, Array, Array, Array]:  # fmt: skip
     """Return the expected counts of recordings in a network; ``emission`` is overwritten by the posteriors.
 
@@ -318,7 +318,7 @@ def _forward_backward(
     runs, run_weight : of the layout and its weights (``kernels.arcs``), padded with arcs of weight 0; weights up to 1
     blocks ... block_weight : of the layout and its weights
     transposed   : the weights of blocks, targets as rows
-    least, least_scale, off : least probability, least scale of a frame, and largest error of N (see above)
+    floor, min_scale, off : least probability, least scale of a frame, and largest error of N (see above)
     Returns the expected count of each run arc divided by its weight [shape=(N,)]; the forward probabilities of all
     blocks' sources and the backward ones of their targets in the next frame, whose products summed over time give the
     counts of block arcs [shapes=(T, ...)]; the scale of each frame [shape=(T,)] and of each end [shape=(U,)]: the
@@ -344,15 +344,15 @@ def _forward_backward(
         alpha = forward[: len(density)]
         valid = _forward(
             alpha, density, scale, initial, runs, run_weight, blocks, block_sources, block_weight, leave, room, share,
-            least, least_scale,
+            floor, min_scale,
         )  # fmt: skip
         end = (alpha[-1, :S] * final).sum() if valid else 0.0
-        if end > least_scale * scale[-1]:
+        if end > min_scale * scale[-1]:
             beta[:S] = final / end
             of_recording[:] = 0
             valid = _backward(
                 alpha, density, scale, initial, beta, onward, runs, run_weight, of_recording, few,
-                blocks, block_sources, transposed, enter, room, share, least, off,
+                blocks, block_sources, transposed, enter, room, share, floor, off,
             )  # fmt: skip
             ends[u] = end / scale[-1] if valid else 0.0
         if ends[u] > 0:
@@ -366,18 +366,18 @@ def _forward_backward(
 def _forward(
     alpha: Array, density: Array, scale: Array, initial: Array, runs: Unsigned, run_weight: Array,
     blocks: Unsigned, sources: Unsigned, block_weight: Array, leave: Array, room: Array, share: Array,
-    least: float, least_scale: float,
+    floor: float, min_scale: float,
 ) -> bool:  # fmt: skip
     """Fill in forward probabilities, scaled by the sum of the frame before, and their sums; return whether valid."""
     for t in range(len(alpha)):
-        alpha[t] = least
+        alpha[t] = floor
         if t == 0:
             alpha[t, : len(initial)] = initial
         else:
             _forward_runs(alpha, t, runs, run_weight)
-            _forward_blocks(alpha, t, blocks, sources, block_weight, leave, room, share, SHARE * least)
-        scale[t] = _emit(alpha, density, t, 1 / scale[t - 1] if t > 0 else 1.0, least)
-        if not least_scale < scale[t] < MAX_SCALE:
+            _forward_blocks(alpha, t, blocks, sources, block_weight, leave, room, share, SHARE * floor)
+        scale[t] = _emit(alpha, density, t, 1 / scale[t - 1] if t > 0 else 1.0, floor)
+        if not min_scale < scale[t] < MAX_SCALE:
             return False
     return True
 
@@ -386,21 +386,21 @@ def _forward(
 def _backward(
     alpha: Array, density: Array, scale: Array, initial: Array, beta: Array, onward: Array, runs: Unsigned,
     run_weight: Array, counts: Array, few: Array, blocks: Unsigned, sources: Unsigned, transposed: Array, enter: Array,
-    room: Array, share: Array, least: float, off: float,
+    room: Array, share: Array, floor: float, off: float,
 ) -> bool:  # fmt: skip
     """Replace densities by posteriors, and add to the counts; return whether all are valid."""
-    few[:] = least
+    few[:] = floor
     for t in range(len(alpha) - 1, -1, -1):
-        total = _close(density, alpha, t, beta, onward, 1 / scale[t - 1] if t > 0 else 1.0, least)
+        total = _close(density, alpha, t, beta, onward, 1 / scale[t - 1] if t > 0 else 1.0, floor)
         if not abs(total - 1) < off:
             return False
         if t > 0:
-            beta[:] = least
+            beta[:] = floor
             _backward_runs(alpha, t - 1, onward, beta, runs, run_weight, few)
-            _backward_blocks(onward, beta, blocks, sources, transposed, enter, t - 1, room, share, SHARE * least)
+            _backward_blocks(onward, beta, blocks, sources, transposed, enter, t - 1, room, share, SHARE * floor)
         if t % FRAMES_SUMMED == 0:
             counts += few
-            few[:] = least
+            few[:] = floor
     begun = 0.0
     for i in range(len(initial)):
         begun += initial[i] * onward[i]
@@ -418,13 +418,13 @@ def _forward_runs(alpha: Array, t: int, runs: Unsigned, weight: Array) -> None:
 @compile_to_rounding
 def _forward_blocks(
     alpha: Array, t: int, blocks: Unsigned, sources: Unsigned, weight: Array, leaving: Array, room: Array, share: Array,
-    least: float,
+    floor: float,
 ) -> None:  # fmt: skip
     for b in range(len(blocks)):
         target, targets, first, count = blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3]
         for s in range(count):
             leaving[t - 1, first + s] = alpha[t - 1, sources[first + s]]
-        total = _shares(leaving, t - 1, first, count, share, least)
+        total = _shares(leaving, t - 1, first, count, share, floor)
         _times(share, count, weight, first, room)
         for i in range(targets):
             alpha[t, target + i] += total * room[i]
@@ -438,25 +438,25 @@ def _density(root: float) -> float:
 
 
 @compile_to_rounding
-def _emit(alpha: Array, emission: Array, t: int, scale: float, least: float) -> float:
+def _emit(alpha: Array, emission: Array, t: int, scale: float, floor: float) -> float:
     """Multiply the forward probabilities of a frame by its densities and a scale; return their sum."""
     total = 0.0
     for i in range(emission.shape[1]):
         product = np.float64(alpha[t, i]) * (_density(emission[t, i]) * scale)
-        kept = product if product > least else least
-        alpha[t, i] = kept
-        total += kept
+        value = product if product > floor else floor
+        alpha[t, i] = value
+        total += value
     return total
 
 
 @compile_to_rounding
-def _close(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, scale: float, least: float) -> float:
+def _close(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, scale: float, floor: float) -> float:
     """Replace a frame's densities by posteriors, fill in backward probabilities times densities; return their sum."""
     total = 0.0
     for i in range(emission.shape[1]):
         back = np.float64(beta[i])
         product = back * (_density(emission[t, i]) * scale)
-        onward[i] = product if product > least else least
+        onward[i] = product if product > floor else floor
         posterior = alpha[t, i] * back
         total += posterior
         emission[t, i] = posterior if posterior > MIN_POSTERIOR else 0.0
@@ -478,14 +478,14 @@ def _backward_runs(
 @compile_to_rounding
 def _backward_blocks(
     onward: Array, beta: Array, blocks: Unsigned, sources: Unsigned, transposed: Array, entering: Array, t: int,
-    room: Array, share: Array, least: float,
+    room: Array, share: Array, floor: float,
 ) -> None:  # fmt: skip
     start = np.uintp(0)
     for b in range(len(blocks)):
         target, targets, first, count = blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3]
         for i in range(targets):
             entering[t, start + i] = onward[target + i]
-        total = _shares(entering, t, start, targets, share, least)
+        total = _shares(entering, t, start, targets, share, floor)
         _times(share, targets, transposed, start, room)
         for s in range(count):
             beta[sources[first + s]] += total * room[s]
@@ -493,15 +493,15 @@ def _backward_blocks(
 
 
 @compile_to_rounding
-def _shares(values: Array, t: int, first: Any, count: Any, share: Array, least: float) -> float:
-    """Fill in values of a row divided by their sum, 0 where that is less than ``least``; return the sum."""
+def _shares(values: Array, t: int, first: Any, count: Any, share: Array, floor: float) -> float:
+    """Fill in values of a row divided by their sum, 0 where that is less than ``floor``; return the sum."""
     total = 0.0
     for i in range(count):
         total += values[t, first + i]
     scale = 1 / total if total > 0 else 0.0
     for i in range(count):
         part = values[t, first + i] * scale
-        share[i] = part if part > least else 0.0
+        share[i] = part if part > floor else 0.0
     return total
 
 

@@ -59,7 +59,6 @@ def best_path(
     log_emission: LogEmission,
     count: int,
     network: NetworkArrays,
-    beam: float | None = None,
     windows: Windows | None = None,
     block_frames: int | None = None,
 ) -> tuple[Index, float]:
@@ -69,15 +68,12 @@ def best_path(
                    twice, with the same result
     count        : frames, T
     network      : logarithms in single precision
-    beam         : states with a score lower than the best of the frame by more than this are dropped: that is faster,
-                   but may miss the best path, or every path; None: exact
     windows      : the frames that each state may have; None: any
     block_frames : frames whose scores are in memory at a time, B; None: as many as are fastest
     Returns the states of the path [shape=(T,)], and its score. Scores are relative to the best of their frame and in
     single precision: no path is lost, but one may be preferred to another that is better by less than their rounding.
     Cost: O(T·E) time, O((T / B + B)·(S + G)) memory; with windows E and S are of those that have windows in one block.
     """
-    least = np.float32(-np.inf if beam is None else -beam)
     length = block_frames or (WINDOW_BLOCK if windows else max(BLOCK, BLOCK_SCORES // len(network.emission)))
     starts = range(0, max(count - 1, 1), length)
     blocks = [_Block(network, windows, start, min(start + length + 1, count)) for start in starts]
@@ -87,7 +83,7 @@ def best_path(
     is_compiled = pays(count * (1 + sum(block.arcs for block in blocks) // len(blocks) // MANY_ARCS))
 
     def scores(block: _Block, row: Scores) -> tuple[Scores, float]:
-        return _scores(block.network, row, block.log_emission(log_emission), least, is_compiled)
+        return _scores(block.network, row, block.log_emission(log_emission), is_compiled)
 
     rows, total = [blocks[0].first_row(log_emission)], 0.0
     for block, following in pairwise(blocks):
@@ -170,14 +166,11 @@ class _Block:
         )
 
 
-def _scores(
-    network: NetworkArrays, first: Scores, log_emission: Scores, least: np.float32, is_compiled: bool
-) -> tuple[Scores, float]:
+def _scores(network: NetworkArrays, first: Scores, log_emission: Scores, is_compiled: bool) -> tuple[Scores, float]:
     """Return the scores of the best path to every state, relative to each frame's best, and the sum of these best.
 
     first        : the scores in the first frame [shape=(S,)]
     log_emission : [shape=(T, G)]
-    least        : relative scores under this become -inf
     """
     emission, arc_from, arc_log, arc_start, _, _ = network
     delta = np.empty((len(log_emission), len(emission)), np.float32)
@@ -186,7 +179,7 @@ def _scores(
         arc_log, log_emission = (np.ascontiguousarray(part, np.float32) for part in (arc_log, log_emission))
         columns, sources = emission.astype(np.uintp), arc_from.astype(np.uintp)  # others are not vectorised
         stops = np.append(arc_start[1:], len(arc_from))
-        return delta, float(_fill(delta, columns, sources, log_emission, arc_log, stops, least))
+        return delta, float(_fill(delta, columns, sources, log_emission, arc_log, stops))
     arrivals = np.empty(len(arc_from), np.float32)
     shift = 0.0
     for frame in range(1, len(delta)):
@@ -197,7 +190,6 @@ def _scores(
         best = row.max()
         if best > -np.inf:
             row -= best
-            row[row < least] = -np.inf
             shift += float(best)
     return delta, shift
 
@@ -219,7 +211,7 @@ def _trace(network: NetworkArrays, path: Index, delta: Scores, state: int, is_co
 @compiled
 def _fill(
     delta: Scores, emission: NDArray[np.uintp], arc_from: NDArray[np.uintp], log_emission: Scores, arc_log: Scores,
-    arc_stop: Index, least: np.float32,
+    arc_stop: Index,
 ) -> float:  # fmt: skip
     """Fill in all scores but the first ones; return the sum of the frames' best ones."""
     shift = 0.0
@@ -241,8 +233,7 @@ def _fill(
             best = max(best, after[state])
         if best > IMPOSSIBLE:
             for state in range(len(after)):
-                score = after[state] - best
-                after[state] = score if score >= least else IMPOSSIBLE
+                after[state] -= best
             shift += float(best)
     return shift
 

@@ -61,7 +61,7 @@ CONSUMERS: Registry[Callable[[str, LiveSound], AbstractContextManager[Consumer]]
 LARGEST_PORT = 65_535
 PORTS = {"vmc": 39539, "osc": 9000, "livelink": 11111}
 """The ports at which these receivers listen unless they are told another one."""
-VRM_VOWELS = {"A": ("aa",), "I": ("ih",), "U": ("ou",), "E": ("E",), "O": ("oh",)}
+VMC_VOWELS = {"A": "aa", "I": "ih", "U": "ou", "E": "E", "O": "oh"}
 """The blend shapes of VRM 0 that VMC receivers have, and the visemes of Oculus that they are."""
 SUBJECT = "lipmotion"
 DEVICE = "$00000000-0000-0000-0000-6c69706d6f74"
@@ -160,7 +160,7 @@ def osc_bundle(messages: list[bytes]) -> bytes:
 
 def vmc_packet(frame: LiveFrame) -> bytes:
     """Return the vowels of VRM, and ARKit's blendshapes for "perfect sync", as VMC receivers take them."""
-    vowels = {name: sum(frame[f"viseme_{each}"] for each in visemes) for name, visemes in VRM_VOWELS.items()}
+    vowels = {name: frame[f"viseme_{viseme}"] for name, viseme in VMC_VOWELS.items()}
     arkit = {name: value for name, value in frame.weights.items() if not name.startswith("viseme_")}
     messages = [osc_message("/VMC/Ext/Blend/Val", name, value) for name, value in {**vowels, **arkit}.items()]
     return osc_bundle([*messages, osc_message("/VMC/Ext/Blend/Apply")])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.contact import MIN_GAP, opening_to_gap
 from lipmotion.errors import InputError
 from lipmotion.extensions import load_provided
-from lipmotion.live.network import LAGS, STEP_S, answer_silence, live_network
+from lipmotion.live.network import STEP_S, hear_silence, live_network
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
 from lipmotion.meshes.fitting.shape_weights import (
     NEAREST_VOWEL,
@@ -98,25 +98,25 @@ class ModelFace:
     @cached_property
     def resting(self) -> tuple[Array, Array]:
         """Pose and weights of the mouth at rest."""
-        articulators = answer_silence().reshape(len(LAGS), -1)[-1, : len(ARTICULATORS)].astype(float)
-        said = np.eye(len(VISEMES_15))[VISEMES_15.index("sil")]
-        return self.pose(articulators, said, 1.0)
+        articulators = hear_silence()[1][-1, : len(ARTICULATORS)].astype(float)
+        visemes = np.eye(len(VISEMES_15))[VISEMES_15.index("sil")]
+        return self.pose(articulators, visemes, 1.0)
 
-    def pose(self, articulators: Array, said: Array, closing: float) -> tuple[Array, Array]:
+    def pose(self, articulators: Array, shares: Array, closing: float) -> tuple[Array, Array]:
         """Return the values of all channels, and the weights, with the lips closed so far, 0 to 1."""
-        moved, column = articulators.copy(), self._closure.column
-        moved[self._opening] *= CLOSING_GAIN if moved[self._opening] < 0 else 1
-        moved[self._opening] += closing * min(self._closed - moved[self._opening], 0.0)
+        posed, column = articulators.copy(), self._closure.column
+        posed[self._opening] *= CLOSING_GAIN if posed[self._opening] < 0 else 1
+        posed[self._opening] += closing * min(self._closed - posed[self._opening], 0.0)
         reduced = self._prior.centre + articulators @ self._prior.matrix
-        opening = self._prior.centre[column] + moved[self._opening] * self._prior.matrix[self._opening, column]
+        opening = self._prior.centre[column] + posed[self._opening] * self._prior.matrix[self._opening, column]
         reduced += (opening - reduced[column]) * self._closure.follow
         values = self._base + reduced @ self._basis
         values[self._bounded] = np.maximum(values[self._bounded], 0)
-        arkit = np.clip(np.concatenate([[1.0], moved, said]) @ live_network().curves, 0, 1)
+        arkit = np.clip(np.concatenate([[1.0], posed, shares]) @ live_network().curves, 0, 1)
         arkit[PARTING] *= 1 - closing
-        arkit[PRESSING] = PRESS_WEIGHT * closing * (1 - min(float(said[VISEMES_15.index("sil")]), 1.0))
+        arkit[PRESSING] = PRESS_WEIGHT * closing * (1 - min(float(shares[VISEMES_15.index("sil")]), 1.0))
         arkit = cancel_opposed(arkit, ARKIT_MOUTH)
-        held = said[None] / max(float(said.sum()), 1.0)
+        held = shares[None] / max(float(shares.sum()), 1.0)
         visemes = blend_visemes(held, opening_to_gap(values[[self.opening]]), np.zeros(1))[0]
         return values, np.concatenate([arkit, visemes])
 

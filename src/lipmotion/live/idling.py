@@ -82,7 +82,12 @@ class Idling:
             target, stay_s = draw_fixation(self._rng, self._fixations[-1][1], time_s - self._began_s < BORDER_S)
             self._fixations.append((time_s, target))
             self._until_s = time_s + stay_s
-        turn = (STILL_SHARE + (1 - STILL_SHARE) * self._talking) * self._sway_at(time_s)
+        number, place = divmod(round(time_s / STEP_S), SWAY_STEPS)
+        if number != self._swayed[0]:
+            rng = np.random.default_rng([self._seed, 1])
+            ahead_s = (number * SWAY_STEPS + np.arange(SWAY_STEPS, dtype=float)) * STEP_S
+            self._swayed = number, np.stack([size * sway(ahead_s, rng, *SWAY_HZ) for size in SWAY], axis=1)
+        turn = (STILL_SHARE + (1 - STILL_SHARE) * self._talking) * self._swayed[1][place]
         turn[1] -= NOD_RAD * self._accent
         (_, before), (began_s, aimed) = self._fixations
         aim = np.array(before) + smooth_step(np.array([time_s - began_s]) / SACCADE_S) * np.subtract(aimed, before)
@@ -93,17 +98,6 @@ class Idling:
         weights = eye_and_brow_weights(Liveliness(lids, brows, gaze[None], turn[None]))
         angles = dict(zip(ANGLES, turn.tolist(), strict=True))
         return {name: float(curve[0]) for name, curve in weights.items()} | angles
-
-    def _sway_at(self, time_s: float) -> Array:
-        """Return the slow turning of the head [shape=(3,)], which is computed for some seconds at a time."""
-        number, place = divmod(round(time_s / STEP_S), SWAY_STEPS)
-        if number != self._swayed[0]:
-            rng = np.random.default_rng([self._seed, 1])
-            ahead_s = (number * SWAY_STEPS + np.arange(SWAY_STEPS, dtype=float)) * STEP_S
-            rows = np.stack([size * sway(ahead_s, rng, *SWAY_HZ) for size in SWAY], axis=1)
-            self._swayed = number, rows
-        turn: Array = self._swayed[1][place]
-        return turn
 
     def _draw_blink(self, time_s: float, ended: bool) -> None:
         """Decide when the lids fall next: at random, and rather where a phrase ends."""

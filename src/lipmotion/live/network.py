@@ -273,12 +273,8 @@ def live_network() -> LiveNetwork:
 
 
 @cache
-def silent_steps() -> CausalSteps:
-    """Return the network of the package after nothing but silence; to be copied."""
-    return CausalSteps(live_network().network, silent_step(live_network().typical))
-
-
-@cache
-def answer_silence() -> Array:
-    """Return the answers of the network of the package after nothing but silence [shape=(5 · 23,)]."""
-    return copy.deepcopy(silent_steps()).push(silent_step(live_network().typical))
+def hear_silence() -> tuple[CausalSteps, Array]:
+    """Return the network of the package after nothing but silence, to be copied, and its answers [shape=(5, 23)]."""
+    silent = silent_step(live_network().typical)
+    steps = CausalSteps(live_network().network, silent)
+    return steps, copy.deepcopy(steps).push(silent).reshape(len(LAGS), -1)

@@ -23,10 +23,9 @@ from lipmotion.live.network import (
     LiveNetwork,
     Resampler,
     SoundFeatures,
-    answer_silence,
+    hear_silence,
     live_network,
     mono_samples,
-    silent_steps,
 )
 from lipmotion.live.timings import TimedPhones
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VISEMES_15
@@ -217,7 +216,7 @@ class Stream:
         """Begin to hear, as after silence; how loud and how coloured the sound is stays known."""
         self._resampler = Resampler(self.sample_rate)
         self._features.restart()
-        self._steps = copy.deepcopy(silent_steps())
+        self._steps = copy.deepcopy(hear_silence()[0])
         self._rows: list[NDArray[np.float32]] = []
         self._answers = deque([self._smoother.silent] * ANSWER_STEPS, ANSWER_STEPS)
         self._heard = 0  # steps
@@ -289,9 +288,9 @@ class Stream:
         )
         motion, face, visemes = (each.resampled(1 / STEP_S) for each in (result.motion, *curves))
         frames = []
-        for pose, row, said in zip(motion.values, face.values, visemes.values, strict=False):
+        for pose, row, viseme_row in zip(motion.values, face.values, visemes.values, strict=False):
             mouth, living = np.split(row, [len(ARKIT_MOUTH)])
-            frame = self._frame((pose, np.concatenate([mouth, said])), end_s)
+            frame = self._frame((pose, np.concatenate([mouth, viseme_row])), end_s)
             named = dict(zip(face.names[len(ARKIT_MOUTH) :], living.tolist(), strict=True))
             frames.append(replace(frame, weights=frame.weights | named))
         self._first = self._next
@@ -321,7 +320,7 @@ class _Smoother:
             first = np.linalg.solve(normal, np.eye(count)[0])
             self._of_answers[:, column] = first * trust[:, column]
             self._of_before[:, column] = -first @ (unknown.T @ known) / variance
-        self.silent = answer_silence().reshape(len(LAGS), -1)
+        self.silent = hear_silence()[1]
         self.rest = self.silent[-1, : len(ARTICULATORS)].astype(float)
 
     def solve(self, answers: deque[NDArray[np.float32]], before: list[Array]) -> tuple[Array, Array]:

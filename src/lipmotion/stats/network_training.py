@@ -48,11 +48,13 @@ class Dropout(NamedTuple):
 class SequenceNetwork(ABC):
     """A network whose last layer is a linear map of hidden units, at every time step.
 
+    layers : the parameters of all layers below
     output : the linear map
     SHARDS : parts of a batch, computed in one thread each. Their number is fixed: the sum does not depend on the
              processors
     """
 
+    layers: tuple[Any, ...]
     output: LinearMap
     SHARDS: ClassVar[int] = 1
 
@@ -65,9 +67,9 @@ class SequenceNetwork(ABC):
         """Return the last hidden layer of one sequence [shape=(T, H)]; inputs [shape=(T, I)]."""
 
     @property
-    @abstractmethod
     def parameters(self) -> list[Array]:
         """All weights and biases; the last two are those of ``output``."""
+        return [array for layer in (*self.layers, self.output) for array in layer]
 
     @abstractmethod
     def with_parameters(self: NetworkT, parameters: Sequence[Array]) -> NetworkT:

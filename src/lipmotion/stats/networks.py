@@ -55,10 +55,6 @@ class ConvolutionalNetwork(SequenceNetwork):
         """How many time steps before and after a step change its output."""
         return sum(self.dilations)
 
-    @property
-    def parameters(self) -> list[Array]:  # noqa: D102
-        return [array for layer in (*self.layers, self.output) for array in layer]
-
     def with_parameters(self, parameters: Sequence[Array]) -> ConvolutionalNetwork:  # noqa: D102
         pairs = [LinearMap(*parameters[i : i + 2]) for i in range(0, len(parameters), 2)]
         return replace(self, layers=tuple(pairs[:-1]), output=pairs[-1])
@@ -194,10 +190,6 @@ class RecurrentNetwork(SequenceNetwork):
             for (first, start), each, state in zip(pieces, rows, states, strict=True):
                 result[start : start + PIECE] = state[start - first : min(start - first + PIECE, len(each))]
         return result
-
-    @property
-    def parameters(self) -> list[Array]:  # noqa: D102
-        return [array for layer in (*self.layers, self.output) for array in layer]
 
     def with_parameters(self, parameters: Sequence[Array]) -> RecurrentNetwork:  # noqa: D102
         layers = tuple(RecurrentLayer(*parameters[i : i + 3]) for i in range(0, len(parameters) - 2, 3))

@@ -50,14 +50,14 @@ def fit_pca(values: NDArray[Any], components: int) -> Pca:
     """
     mean = values.mean(axis=0, dtype=np.float64)
     largest = max(float(values.max()), -float(values.min()))  # no copy of a large table
-    least = values.size * (largest * CONSTANT) ** 2
+    threshold = values.size * (largest * CONSTANT) ** 2
     if min(values.shape) > EXACT_ROWS:
         return Pca(mean, _fix_signs(_iterate_subspace(values, mean, components)))
     centred = values - mean
     if values.shape[0] >= values.shape[1]:
-        return Pca(mean, find_principal_axes(centred.T @ centred, components, least))
+        return Pca(mean, find_principal_axes(centred.T @ centred, components, threshold))
     squares, vectors = np.linalg.eigh(centred @ centred.T)  # XXᵀu = λu gives XᵀX(Xᵀu) = λ(Xᵀu)
-    chosen = _find_largest(squares, components, least)
+    chosen = _find_largest(squares, components, threshold)
     return Pca(mean, _fix_signs((vectors[:, chosen] / np.sqrt(squares[chosen])).T @ centred))
 
 
@@ -70,13 +70,13 @@ def measure_covariance(tables: Iterable[NDArray[Any]]) -> tuple[NDArray[np.float
     return mean, products / count - np.outer(mean, mean)
 
 
-def find_principal_axes(products: NDArray[np.float64], components: int, least: float = 0.0) -> NDArray[np.float64]:
+def find_principal_axes(products: NDArray[np.float64], components: int, threshold: float = 0.0) -> NDArray[np.float64]:
     """Return the first principal components [shape=(K, D)] of centred values X, given XᵀX or their covariance.
 
-    products : [shape=(D, D)];  least : largest eigenvalue that rounding alone may produce
+    products : [shape=(D, D)];  threshold : largest eigenvalue that rounding alone may produce
     """
     squares, vectors = np.linalg.eigh(products)
-    return _fix_signs(vectors[:, _find_largest(squares, components, least)].T)
+    return _fix_signs(vectors[:, _find_largest(squares, components, threshold)].T)
 
 
 def _fix_signs(basis: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -92,10 +92,10 @@ def check_orthonormal(name: str, basis: NDArray[Any]) -> None:
         raise ValueError(f"{name} of rows that are not orthonormal (products {worst:g} off)")
 
 
-def _find_largest(squares: NDArray[np.float64], count: int, least: float) -> NDArray[np.intp]:
-    """Return the indices of the largest of ascending numbers, without rounding errors, up to ``least``."""
+def _find_largest(squares: NDArray[np.float64], count: int, threshold: float) -> NDArray[np.intp]:
+    """Return the indices of the largest of ascending numbers, without rounding errors, up to ``threshold``."""
     indices = np.arange(len(squares))[::-1][:count]
-    return indices[squares[indices] > max(RANK_TOLERANCE * squares[-1], least)]
+    return indices[squares[indices] > max(RANK_TOLERANCE * squares[-1], threshold)]
 
 
 def _iterate_subspace(values: NDArray[Any], mean: NDArray[np.float64], components: int) -> NDArray[np.float64]:

@@ -42,29 +42,29 @@ class Tree:
     """A decision tree; its nodes are in depth-first order, the yes-branch first, and node 0 is the root.
 
     questions : those that may be asked
-    asked     : [shape=(N,)], the number of each node's question; -1 for a leaf
+    splits    : [shape=(N,)], the number of the question that splits each node; -1 for a leaf
     no        : [shape=(N,)], the node after the answer no (after yes it is the next one); -1 for a leaf
     frames    : [shape=(N,)], the frames of training data in each node
     """
 
     questions: tuple[Question, ...]
-    asked: NDArray[np.int32]
+    splits: NDArray[np.int32]
     no: NDArray[np.int32]
     frames: NDArray[np.float64]
 
     def path(self, context: Context) -> list[int]:
         """Return the nodes from the root to the leaf of a context, whether or not it occurred in training."""
-        asked, no = self._lists
+        splits, no = self._lists
         nodes, node = [0], 0
-        while asked[node] >= 0:
-            node = node + 1 if self.questions[asked[node]].answer(context) else no[node]
+        while splits[node] >= 0:
+            node = node + 1 if self.questions[splits[node]].answer(context) else no[node]
             nodes.append(node)
         return nodes
 
     @cached_property
     def _lists(self) -> tuple[list[int], list[int]]:
-        """``asked`` and ``no`` as lists, which are faster to look up."""
-        return self.asked.tolist(), self.no.tolist()
+        """``splits`` and ``no`` as lists, which are faster to look up."""
+        return self.splits.tolist(), self.no.tolist()
 
     def path_to(self, node: int) -> list[int]:
         """Return the nodes from the root to a node."""
@@ -78,15 +78,16 @@ class Tree:
     @property
     def leaves(self) -> NDArray[np.intp]:
         """The numbers of the leaves."""
-        return np.nonzero(self.asked < 0)[0]
+        return np.nonzero(self.splits < 0)[0]
 
     def name(self, node: int) -> str:
         """Return the answers that lead to a node, in words."""
         path = self.path_to(node)
         answers = []
         for at, following in pairwise(path):
-            asked = self.questions[self.asked[at]]
-            answers.append(f"{POSITIONS[asked.position]} {'is' if following == at + 1 else 'is not'} {asked.name}")
+            question = self.questions[self.splits[at]]
+            verb = "is" if following == at + 1 else "is not"
+            answers.append(f"{POSITIONS[question.position]} {verb} {question.name}")
         return ", ".join(answers) or "any"
 
     def text(self) -> str:
@@ -94,8 +95,8 @@ class Tree:
         lines: list[str] = []
 
         def write(node: int, depth: int, answer: str) -> None:
-            asked = self.asked[node]
-            question = self.questions[asked] if asked >= 0 else None
+            number = self.splits[node]
+            question = self.questions[number] if number >= 0 else None
             line = f"{POSITIONS[question.position]} is {question.name}?" if question else "leaf"
             lines.append(f"{'  ' * depth}{answer}{line} ({self.frames[node]:.0f} frames)")
             if question:
@@ -110,24 +111,24 @@ POSITIONS = ("left", "unit", "right")
 _STORED_POSITIONS = [str(position) for position in range(len(POSITIONS))]
 
 
-def score_gaussian(statistics: Array, least_variance: float = MIN_VARIANCE) -> Array:
+def score_gaussian(statistics: Array, min_variance: float = MIN_VARIANCE) -> Array:
     """Return the log likelihood of frames under their maximum-likelihood diagonal Gaussian [shape=(N,)].
 
     statistics     : [shape=(N, 1 + 2·D)]: number of frames, sums, sums of squares
-    least_variance : of the Gaussian; without it the likelihood of a few equal frames has no limit
+    min_variance : of the Gaussian; without it the likelihood of a few equal frames has no limit
     """
     count = np.maximum(statistics[:, :1], 1e-12)
     sums, squares = np.split(statistics[:, 1:] / count, 2, axis=1)
     spread = np.maximum(squares - sums * sums, 0.0)
-    variance = np.maximum(spread, least_variance)
+    variance = np.maximum(spread, min_variance)
     return -0.5 * count[:, 0] * (np.log(2 * np.pi * variance) + spread / variance).sum(axis=1)
 
 
-def score_multispace(statistics: Array, least_variance: float = MIN_VARIANCE) -> Array:
+def score_multispace(statistics: Array, min_variance: float = MIN_VARIANCE) -> Array:
     """Return the log likelihood of frames, some without a value, under their maximum-likelihood density [shape=(N,)].
 
     statistics : [shape=(N, 2 + 2·D)]: number of frames, of frames with a value, and their sums and sums of squares
-    least_variance : as in ``score_gaussian``
+    min_variance : as in ``score_gaussian``
     The density is a Gaussian for frames with a value and a point mass for those without one.
     """
     count, voiced = statistics[:, 0], statistics[:, 1]
@@ -135,7 +136,7 @@ def score_multispace(statistics: Array, least_variance: float = MIN_VARIANCE) ->
     likelihood = np.zeros(len(count))
     for part in (np.maximum(voiced, 0.0), np.maximum(count - voiced, 0.0)):
         likelihood += part * np.log(np.where(part > 0, part, total) / total)
-    return likelihood + np.where(voiced > 0, score_gaussian(statistics[:, 1:], least_variance), 0.0)
+    return likelihood + np.where(voiced > 0, score_gaussian(statistics[:, 1:], min_variance), 0.0)
 
 
 def grow_tree(
@@ -146,7 +147,7 @@ def grow_tree(
     *,
     parameters: int,
     factor: float,
-    least: float,
+    min_frames: float,
 ) -> Tree:
     """Return the tree in which every split raises the log likelihood by more than its description length.
 
@@ -154,13 +155,13 @@ def grow_tree(
     statistics : of each context [shape=(C, K)], additive, the number of frames first
     log_likelihood : function of statistics
     parameters : number of parameters of a density; a split adds as many, of price ``factor`` · ½ log(frames) each
-    least      : frames that a leaf must have
+    min_frames : frames that a leaf must have
     Source: Shinoda & Watanabe 2000 (minimum description length).
     """
     questions = tuple(questions)
     answers = np.array([[q.answer(c) for c in contexts] for q in questions], float).reshape(len(questions), -1)
     price = factor * parameters / 2 * np.log(max(statistics[:, 0].sum(), 2.0))
-    asked: list[int] = []
+    splits: list[int] = []
     no: list[int] = []
     frames: list[float] = []
 
@@ -168,7 +169,7 @@ def grow_tree(
         """Return the number of the question with the largest gain; -1: no gain exceeds the price."""
         total = statistics[members].sum(axis=0)
         yes = answers[:, members] @ statistics[members]
-        allowed = np.nonzero((yes[:, 0] >= least) & (total[0] - yes[:, 0] >= least))[0]
+        allowed = np.nonzero((yes[:, 0] >= min_frames) & (total[0] - yes[:, 0] >= min_frames))[0]
         if not len(allowed):
             return -1
         unsplit = log_likelihood(total[None])
@@ -178,31 +179,31 @@ def grow_tree(
         return int(allowed[best]) if gain[best] > price else -1
 
     def add(members: NDArray[np.intp]) -> None:
-        node = len(asked)
-        asked.append(choose_question(members))
+        node = len(splits)
+        splits.append(choose_question(members))
         no.append(-1)
         frames.append(float(statistics[members, 0].sum()))
-        if asked[node] >= 0:
-            yes = answers[asked[node], members] > 0
+        if splits[node] >= 0:
+            yes = answers[splits[node], members] > 0
             add(members[yes])
-            no[node] = len(asked)
+            no[node] = len(splits)
             add(members[~yes])
 
     add(np.arange(len(contexts)))
-    return Tree(questions, np.array(asked, np.int32), np.array(no, np.int32), np.array(frames))
+    return Tree(questions, np.array(splits, np.int32), np.array(no, np.int32), np.array(frames))
 
 
 def trees_to_arrays(trees: Mapping[str, Tree]) -> dict[str, NDArray[Any]]:
     """Serialise trees that share their questions, by name; only questions that are asked are stored."""
     questions = next(iter(trees.values())).questions
-    asked = np.concatenate([tree.asked for tree in trees.values()])
-    used = np.unique(asked[asked >= 0])
+    splits = np.concatenate([tree.splits for tree in trees.values()])
+    used = np.unique(splits[splits >= 0])
     stored = [(str(q.position), q.name, " ".join(sorted(q.members))) for q in (questions[n] for n in used)]
     return {
         "questions": np.array(stored, np.str_).reshape(-1, 3),
         "trees": np.array(list(trees)),
-        "sizes": np.array([len(tree.asked) for tree in trees.values()], np.int32),
-        "asked": np.where(asked >= 0, np.searchsorted(used, asked), -1).astype(np.int32),
+        "sizes": np.array([len(tree.splits) for tree in trees.values()], np.int32),
+        "asked": np.where(splits >= 0, np.searchsorted(used, splits), -1).astype(np.int32),
         "no": np.concatenate([tree.no for tree in trees.values()]),
         "frames": np.concatenate([tree.frames for tree in trees.values()]),
     }
@@ -231,19 +232,19 @@ def trees_from_arrays(arrays: Arrays) -> dict[str, Tree]:
         raise ValueError(f"trees of {ends[-1]} nodes with {stored.sizes['S']} questions asked, or two of one name")
     trees = {}
     for name, start, end in zip(names, ends - sizes, ends, strict=True):
-        asked, no = stored["asked"][start:end], stored["no"][start:end]
-        _check_nodes(asked, no, len(questions))
-        trees[name] = Tree(questions, asked, no, stored["frames"][start:end])
+        splits, no = stored["asked"][start:end], stored["no"][start:end]
+        _check_nodes(splits, no, len(questions))
+        trees[name] = Tree(questions, splits, no, stored["frames"][start:end])
     return trees
 
 
-def _check_nodes(asked: NDArray[np.int32], no: NDArray[np.int32], questions: int) -> None:
+def _check_nodes(splits: NDArray[np.int32], no: NDArray[np.int32], questions: int) -> None:
     """Raise ValueError unless the nodes are a tree in the order of ``Tree``."""
-    inner = asked >= 0
-    if (asked >= questions).any() or (asked < -1).any() or (no[~inner] != -1).any():
+    inner = splits >= 0
+    if (splits >= questions).any() or (splits < -1).any() or (no[~inner] != -1).any():
         raise ValueError("a tree asks a question that does not exist")
-    ends = [len(asked)]  # of the subtrees that contain the node
-    for node in range(len(asked)):
+    ends = [len(splits)]  # of the subtrees that contain the node
+    for node in range(len(splits)):
         if node == ends[-1]:
             ends.pop()
         if inner[node]:
@@ -303,9 +304,9 @@ def fit_tree_regressions(
         coefficients = ridge(sum(inside[1:], inside[0]), prior, strength)
         if node in moments:
             regressions[node] = coefficients
-        if tree.asked[node] >= 0:
+        if tree.splits[node] >= 0:
             visit(node + 1, int(tree.no[node]), coefficients)
             visit(int(tree.no[node]), end, coefficients)
 
-    visit(0, len(tree.asked), shared)
+    visit(0, len(tree.splits), shared)
     return regressions

@@ -93,18 +93,18 @@ def xsampa_to_ipa(label: str) -> str:
     >>> xsampa_to_ipa("@U"), xsampa_to_ipa("t_h"), xsampa_to_ipa("4"), xsampa_to_ipa("word")
     ('əʊ', 't', 'ɾ', '')
     """
-    found, at = [], 0
+    symbols, at = [], 0
     while at < len(label):
         symbol = _XSAMPA_SYMBOL.match(label, at)
         if symbol is None:
             return ""
-        found.append(XSAMPA.get(symbol[0], ""))
+        symbols.append(XSAMPA.get(symbol[0], ""))
         at = symbol.end()
-    bases = [symbol for symbol in found if symbol not in ("", "ʷ") and not is_mark(symbol[0])]
+    bases = [symbol for symbol in symbols if symbol not in ("", "ʷ") and not is_mark(symbol[0])]
     vowels = all(symbol[0] in VOWEL_CHART for symbol in bases) and len(bases) < 4
     opened = len(bases) == 2 and bases[0] in "ptdkb" and bases[1] in "fvθðszʃʒxçhʂʐɕʑ"
     single = len(bases) == 1 or opened or (vowels and len({*bases}) == len(bases))
-    return "".join(found).replace("ʰ", "") if single else ""
+    return "".join(symbols).replace("ʰ", "") if single else ""
 
 
 @cache

@@ -134,8 +134,8 @@ class Lexicon:
 
     def known(self, word: str) -> bool:
         """Return whether a word, or the usual reading of a written form, is in the user's file or the dictionary."""
-        said = (each in self.user or list_entries(each) for each in list_readings(word.removesuffix("'s"))[0])
-        return word in self.user or all(said) or bool(expand_lengthened(word) or SOUNDED.fullmatch(word))
+        are_known = (each in self.user or list_entries(each) for each in list_readings(word.removesuffix("'s"))[0])
+        return word in self.user or all(are_known) or bool(expand_lengthened(word) or SOUNDED.fullmatch(word))
 
     def pronunciations(self, word: str) -> tuple[Pronunciation, ...]:
         """Return every pronunciation of a lower-case word, or of a written form (``1995``) in all its readings.
@@ -149,14 +149,14 @@ class Lexicon:
 
     def spoken_forms(self, word: str) -> tuple[SpokenForm, ...]:
         """Return every way to say a word or a written form, the usual one first. Raises as ``pronunciations``."""
-        said = list_readings(word)
-        if said == ((word,),) and word not in self.user:
-            said = expand_lengthened(word) or said
-        own = tuple(reading for reading in said if len(reading) == 1 and reading[0] in self.user)
+        readings = list_readings(word)
+        if readings == ((word,),) and word not in self.user:
+            readings = expand_lengthened(word) or readings
+        own = tuple(reading for reading in readings if len(reading) == 1 and reading[0] in self.user)
         forms: list[SpokenForm] = []
-        for reading in ((word,),) if word in self.user else own or said:
+        for reading in ((word,),) if word in self.user else own or readings:
             choices = [self._pronounce(each) for each in reading]
-            several = len(said) > 1 and len(reading) > 1  # then not in all their pronunciations
+            several = len(readings) > 1 and len(reading) > 1  # then not in all their pronunciations
             for number in range(min(max(map(len, choices)), 2 if several else MAX_VARIANTS)):
                 form: list[tuple[str, str]] = []
                 for each, variants in zip(reading, choices, strict=True):
@@ -187,7 +187,7 @@ def expand_lengthened(word: str) -> tuple[tuple[str, ...], ...]:
     plain = remove_accents(word)
     if not LENGTHENED.search(plain) or len(plain) > LONGEST_LENGTHENED or list_entries(word):
         return ()
-    runs = [found[0] for found in re.finditer(r"(.)\1*", plain)]
+    runs = [match[0] for match in re.finditer(r"(.)\1*", plain)]
     choices = [
         (run[0],) if len(run) == 1 else (run[0], 2 * run[0]) if run[0] in "aiuy" else (2 * run[0], run[0])
         for run in runs
@@ -196,8 +196,8 @@ def expand_lengthened(word: str) -> tuple[tuple[str, ...], ...]:
         shortest = 3 if SOUNDED.fullmatch(plain) else 1  # "sss" is no name of a letter
         known = [each for each in map("".join, product(*choices)) if len(each) >= shortest and list_entries(each)]
         return tuple((each,) for each in sorted(known, key=lambda each: each not in OFTEN_LENGTHENED))
-    found = REPEATED.fullmatch(plain)
-    return ((found[1],) * found[0].count(found[1]),) if found and list_entries(found[1]) else ()
+    match = REPEATED.fullmatch(plain)
+    return ((match[1],) * match[0].count(match[1]),) if match and list_entries(match[1]) else ()
 
 
 def find_english_data() -> Path:

@@ -123,7 +123,7 @@ SIMILAR_PHONES: dict[str, tuple[str, ...]] = {
 """A phone that is not in a corpus borrows the model of the first of these that is."""
 
 
-def count_phone_edits(wanted: Sequence[str], found: Sequence[str]) -> int:
+def count_phone_edits(wanted: Sequence[str], heard: Sequence[str]) -> int:
     """Return the fewest substitutions, insertions and deletions that make one sequence of phones of another.
 
     Full and reduced forms of a phone count as the same.
@@ -132,10 +132,10 @@ def count_phone_edits(wanted: Sequence[str], found: Sequence[str]) -> int:
     >>> count_phone_edits(["ax", "b", "el"], ["ah", "b", "l"])
     0
     """
-    row = list(range(len(found) + 1))
+    row = list(range(len(heard) + 1))
     for number, phone in enumerate(wanted, 1):
         above, row = row, [number]
-        for column, other in enumerate(found, 1):
+        for column, other in enumerate(heard, 1):
             differs = FULL_FORMS.get(phone, phone) != FULL_FORMS.get(other, other)
             row.append(min(above[column] + 1, row[-1] + 1, above[column - 1] + differs))
     return row[-1]

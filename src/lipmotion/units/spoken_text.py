@@ -145,9 +145,9 @@ def remove_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[str
 def find_speaker_names(texts: Iterable[str]) -> frozenset[str]:
     """Return the names before a colon at the start of several lines, or of every one of two lines and more."""
     lines = [line for text in texts for line in text.splitlines() if line.strip()]
-    found = [match[2] for match in map(SPEAKER.match, lines) if match and match[2] and match[2].istitle()]
-    names = {name: count for name, count in Counter(found).items() if name.lower() not in NO_NAMES}
-    in_all = len(found) == len(lines) > 1
+    matched = [match[2] for match in map(SPEAKER.match, lines) if match and match[2] and match[2].istitle()]
+    names = {name: count for name, count in Counter(matched).items() if name.lower() not in NO_NAMES}
+    in_all = len(matched) == len(lines) > 1
     return frozenset(name for name, count in names.items() if in_all or count >= SPEAKER_NAME_LINES)
 
 

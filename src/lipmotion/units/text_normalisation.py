@@ -64,14 +64,14 @@ def tokenise(text: str) -> tuple[str, ...]:
     >>> tokenise("Dr. Brown met Henry VIII at 5:00, in May 1995!")
     ('Dr.', 'brown', 'met', 'Henry VIII', 'at', '5:00', 'in', 'may', '1995')
     """
-    text = SMILEY.sub(" ", REFERENCE.sub(lambda found: html.unescape(found[0]), text))
+    text = SMILEY.sub(" ", REFERENCE.sub(lambda match: html.unescape(match[0]), text))
     text = re.sub(r"\bWW(?=II?\b)", "World War ", re.sub("№ ?", "No. ", text))
     plain = re.sub(r"\bUS(?=\$)", "", RANGE.sub("–", convert_to_plain(text)))
-    plain = CURRENCY.sub(lambda found: {"U": "$", "E": "€", "G": "£"}[found[0].strip()[0]], plain)
-    plain = GROUPED.sub(lambda found: re.sub(r"\D", ",", found[0]), plain)
+    plain = CURRENCY.sub(lambda match: {"U": "$", "E": "€", "G": "£"}[match[0].strip()[0]], plain)
+    plain = GROUPED.sub(lambda match: re.sub(r"\D", ",", match[0]), plain)
     shouted = not any(letter.islower() for letter in plain)
     tokens = []
-    for token in (found[0] for found in _scanner().finditer(plain)):
+    for token in (match[0] for match in _scanner().finditer(plain)):
         is_word = token.isalpha() or ("'" in token and token.replace("'", "").isalpha())
         is_short = not shouted and INITIALS.fullmatch(token) and not list_entries(token.lower())
         is_short = is_short and not (expand_lengthened(token.lower()) or SOUNDED.fullmatch(token.lower()))

@@ -84,8 +84,8 @@ def list_readings(token: str) -> tuple[Reading, ...]:
     >>> list_readings("1995")[:2]
     (('nineteen', 'ninety', 'five'), ('one', 'thousand', 'nine', 'hundred', 'ninety', 'five'))
     """
-    found = {tuple(_COUNTED.sub(_singular, each).split()): None for each in _iterate_readings(token)}
-    return tuple(found)[:MAX_READINGS]
+    readings = {tuple(_COUNTED.sub(_singular, each).split()): None for each in _iterate_readings(token)}
+    return tuple(readings)[:MAX_READINGS]
 
 
 def _iterate_readings(token: str) -> Iterator[str]:
@@ -95,16 +95,16 @@ def _iterate_readings(token: str) -> Iterator[str]:
     if token in SIGNS:
         yield from SIGNS[token].split("|")
         return
-    matches = ((said, re.fullmatch(pattern, token, re.IGNORECASE)) for pattern, said in FORMS)
-    said, match = next(((said, match) for said, match in matches if match), ("", None))
+    matches = ((templates, re.fullmatch(pattern, token, re.IGNORECASE)) for pattern, templates in FORMS)
+    templates, match = next(((templates, match) for templates, match in matches if match), ("", None))
     if match is None and token.endswith("'s"):  # of a written form, as "Henry VIII's"
         yield from (f"{' '.join(reading)}'s" for reading in list_readings(token[:-2]))
         return
-    if match is None or callable(said):
-        yield from said(token) if callable(said) else [token.lower()]
+    if match is None or callable(templates):
+        yield from templates(token) if callable(templates) else [token.lower()]
         return
     parts = ["", *map(_FormPart, match.groups(""))]
-    for template in said.split("|"):
+    for template in templates.split("|"):
         each = re.search(r"{(\d):\*}", template)
         for reading in map(" ".join, list_readings(parts[int(each[1])])) if each else ("",):
             yield (template.replace(each[0], reading) if each else template).format(*parts)
@@ -209,12 +209,12 @@ def _telephone(text: str) -> Iterator[str]:
     spelled = [_spell(group, "oh") for group in groups]
     hundreds = [_cardinal(g) if re.fullmatch("[1-9]00", g) else s for g, s in zip(groups, spelled, strict=True)]
     yield plus + " ".join(map(_spell, groups))
-    for said in (spelled, hundreds):
-        yield plus + " ".join(said)
+    for words in (spelled, hundreds):
+        yield plus + " ".join(words)
         if len(groups[-1]) == 4:
             last = groups[-1]
             pairs = _cardinal(last) if last.endswith("000") else f"{_pair(last[:2])} {_pair(last[2:])}"
-            yield plus + " ".join((*said[:-1], pairs))
+            yield plus + " ".join((*words[:-1], pairs))
     if len(groups) == 2:
         yield " to ".join(map(_cardinal, groups))
 
@@ -389,6 +389,6 @@ Readings are divided by ``|``; ``{1}`` is the usual one of the first group, ``{1
 """
 
 
-def _singular(found: re.Match[str]) -> str:
-    name = found[2]
-    return found[1] + (parse_table("pence=penny feet=foot inches=inch").get(name) or name.removesuffix("s"))
+def _singular(match: re.Match[str]) -> str:
+    name = match[2]
+    return match[1] + (parse_table("pence=penny feet=foot inches=inch").get(name) or name.removesuffix("s"))

@@ -189,8 +189,9 @@ def evaluate(
         figures["without_words"] = sum(not (each.words or each.phones) for each in recordings.utterances)
     if _was_trained_on(model, recordings.utterances, corpus.path.name):
         figures["seen_in_training"] = True
-    if model.speakers is not None:
-        figures["strangers"] = list(recordings.strangers)
+    if model.speakers is not None:  # the others are compared with the mean person
+        speakers = {utterance.speaker for utterance in recordings.utterances}
+        figures["strangers"] = sorted(speakers - set(model.speakers.names))
     return replace_nan(figures)
 
 

@@ -61,12 +61,6 @@ class HeldOutRecordings:
     prior: Model | None = None
     speakers: SpeakerMaps | None = None
 
-    @property
-    def strangers(self) -> tuple[str, ...]:
-        """Names of the speakers whom the model does not know: they are compared with the mean person."""
-        known = self.speakers.names if self.speakers is not None else ()
-        return tuple(sorted({utterance.speaker for utterance in self.utterances} - set(known)))
-
     def select_first(self, count: int) -> HeldOutRecordings:
         """Return the first recordings alone."""
         conditions = {name: phones[:count] for name, phones in self.conditions.items()}

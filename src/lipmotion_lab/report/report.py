@@ -26,17 +26,10 @@ from lipmotion_lab.engine_comparison import compare_engines
 from lipmotion_lab.folds import FOLDS, cross_validate
 from lipmotion_lab.learning_curve import run_learning_curve
 from lipmotion_lab.minnis2000 import run_minnis2000
+from lipmotion_lab.report import sections
 from lipmotion_lab.report.html import GENERATOR
 from lipmotion_lab.report.page import ClipKeeper, FinishedPart, write_html, write_videos
 from lipmotion_lab.report.section import Section, write_text
-from lipmotion_lab.report.sections import (
-    build_engines_section,
-    build_folds_section,
-    build_hofer_section,
-    build_learning_section,
-    build_minnis_section,
-    build_xie_liu_section,
-)
 from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, Stamp, check_opening, share_out, take_quick_part
 from lipmotion_lab.xie_liu2007 import six_systems
 from lipmotion_lab.xie_liu2007.six_systems import PLOT_CAPTIONS
@@ -95,25 +88,25 @@ PARTS: dict[str, ReportPart] = {
         lambda run: hofer2008.run_hofer2008(
             run.corpus, hofer2008.QUICK if run.quick else hofer2008.FULL, work=run.work, settings=run.settings
         ),
-        build_hofer_section,
+        sections.build_hofer_section,
     ),
-    "xieliu2007": ReportPart(("train", TEST), 8, _run_xie_liu, build_xie_liu_section, draws=True),
+    "xieliu2007": ReportPart(("train", TEST), 8, _run_xie_liu, sections.build_xie_liu_section, draws=True),
     "minnis2000": ReportPart(
         ("train", TEST),
         2,
         lambda run: run_minnis2000(
             run.corpus, models=run.models, quick=run.quick, work=run.work, settings=run.settings
         ),
-        build_minnis_section,
+        sections.build_minnis_section,
     ),
     "engines": ReportPart(
         ("train", TEST),
         4,
         lambda run: compare_engines(run.corpus, split=TEST, models=run.models, settings=run.settings),
-        build_engines_section,
+        sections.build_engines_section,
     ),
-    "learning-curve": ReportPart(("train", TEST), 2, _run_learning_curve, build_learning_section),
-    "folds": ReportPart(("train",), 4, _run_folds, build_folds_section),
+    "learning-curve": ReportPart(("train", TEST), 2, _run_learning_curve, sections.build_learning_section),
+    "folds": ReportPart(("train",), 4, _run_folds, sections.build_folds_section),
 }
 """All experiments by name, in the order of the report: the papers' first."""
 
@@ -190,7 +183,13 @@ def write_report(
         missing = [name for name in wanted if name not in lacking and writer.record(name) is None]
         parts = share_out(settings, missing, sizes=[PARTS[name].share for name in missing])
         for name, part in zip(missing, parts, strict=True):
-            writer.run(name, part)
+            try:
+                writer.run(name, part)
+            except ExportError:
+                raise  # nor could the others write
+            except Exception as error:  # one experiment must not stop the others
+                part.monitor(Item(name, "failed", describe_error(error)))
+                writer.failed[name] = error
             writer.write_page(wanted)
         finished = writer.list_finished()
     verdicts = {part.name: part.section.verdict for part in finished}
@@ -263,21 +262,11 @@ class _Writer:
             write_text(page, text)
 
     def run(self, name: str, settings: ExperimentSettings) -> None:
-        """Run an experiment with its settings, and write its folder, or keep its error. Raises ExportError."""
-        try:
-            self._run(name, settings)
-        except ExportError:
-            raise  # nor could the others write
-        except Exception as error:  # one experiment must not stop the others
-            settings.monitor(Item(name, "failed", describe_error(error)))
-            self.failed[name] = error
-
-    def _run(self, name: str, settings: ExperimentSettings) -> None:
-        part, target = PARTS[name], self.folder / name
+        """Run an experiment with its settings, and write its folder. Raises the errors of the experiment."""
+        part, target, key = PARTS[name], self.folder / name, self.make_key(name)
         models = self.folder / "models" / self.make_key("models")[:KEY_DIGITS]  # of other recordings, other models
         with locks.keep_unfinished(self.folder / f"{name}.json") as work:
-            stamp = Stamp()
-            keeper = ClipKeeper(work / MOTION, self.make_key(name))
+            stamp, keeper = Stamp(), ClipKeeper(work / MOTION, key)
             running = replace(settings.narrow(0, 0.95), receive=keeper)
             plots = work / "plots" if part.draws and self.can_draw else None
             figures = part.run(PartRun(self.corpus, self.quick, work, models, plots, running))
@@ -285,18 +274,14 @@ class _Writer:
             made_with = stamp.collect(self._build_command([name]), self.corpus, settings)
             shutil.rmtree(target, ignore_errors=True)
             with files.replace_folder(target) as made:
-                videos = []
-                if motion:
-                    drawing = sub_monitor(settings.monitor, 0.95, 1)
-                    videos = write_videos(motion, section.shown, self.corpus, made, drawing)
-                captions = PLOT_CAPTIONS if plots is not None else {}
+                drawing, captions = sub_monitor(settings.monitor, 0.95, 1), PLOT_CAPTIONS if plots is not None else {}
+                videos = write_videos(motion, section.shown, self.corpus, made, drawing) if motion else []
                 for file in captions:
                     shutil.move(work / "plots" / file, made / file)
                 pictures = [{"file": file, "caption": caption} for file, caption in captions.items()]
-                record: dict[str, Any] = {"experiment": name, "key": self.make_key(name), "stamp": made_with}
-                record |= {"figures": figures, "videos": videos, "pictures": pictures}
+                record = {"experiment": name, "key": key, "stamp": made_with, "figures": figures, "videos": videos}
                 section.write_tables(made / "tables")
-                for file, content in ((MOTION, motion), (FIGURES, record)):
+                for file, content in ((MOTION, motion), (FIGURES, record | {"pictures": pictures})):
                     write_text(made / file, as_json(content, indent=1) + "\n")
 
     def _build_command(self, wanted: Sequence[str]) -> list[str]:

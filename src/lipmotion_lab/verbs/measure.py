@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
-from typing import Any
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output
 from lipmotion.cli.arguments.options import add_figures_arguments, add_machine_readable, list_or_all, report_figures
@@ -51,24 +50,21 @@ def run_evaluate(options: argparse.Namespace) -> None:
     """Call ``lipmotion.evaluate`` and print its figures."""
     from lipmotion.corpora import Corpus, Selection
     from lipmotion.pipeline.model import load_model
-    from lipmotion.types import Monitor
-    from lipmotion.units import Lexicon
     from lipmotion_lab.evaluation.evaluate import evaluate
     from lipmotion_lab.evaluation.table import format_figures
 
-    selection = Selection(list_or_all(options.split), tuple(options.speaker))
-
-    def compute(lexicon: Lexicon | None, monitor: Monitor) -> dict[str, Any]:
-        return evaluate(
+    report_figures(
+        options,
+        lambda lexicon, monitor: evaluate(
             load_model(options.model),
             Corpus.open(options.corpus),
-            selection=selection,
+            selection=Selection(list_or_all(options.split), tuple(options.speaker)),
             lexicon=lexicon,
             recogniser=options.recogniser,
             monitor=monitor,
-        )
-
-    report_figures(options, compute, format_figures)
+        ),
+        format_figures,
+    )
 
 
 def add_league(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -34,24 +34,7 @@ from lipmotion_lab import runner
 from lipmotion_lab.evaluation import evaluate
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, OPENING, ComparedClip, HeldOutRecordings, generate_clips
 from lipmotion_lab.learning_curve import check_training_names, choose_sizes
-from lipmotion_lab.xie_liu2007.systems import (
-    ALL_PATHS,
-    BLSTM,
-    COMPARED_SYSTEMS,
-    PAPER_FIGURES,
-    REFERENCE_SYSTEM,
-    SPLIT,
-    TWO_STAGES,
-    TrainedSystem,
-    as_row,
-    find_best_trial,
-    list_changed_options,
-    select_systems,
-    system_from_arrays,
-    system_to_arrays,
-    train_system,
-    with_inputs_of,
-)
+from lipmotion_lab.xie_liu2007 import systems
 
 CONVERGENCE_RECORDINGS, PREDICTED_RECORDINGS = 8, 6
 """Recordings that are shown in one picture."""
@@ -77,7 +60,7 @@ def check_plot_folder(folder: Path) -> None:
         raise ExportError(f"{folder}: is a file; give a folder for the pictures")
 
 
-def draw_plots(chains: TrainedSystem, recordings: HeldOutRecordings, folder: Path) -> None:
+def draw_plots(chains: systems.TrainedSystem, recordings: HeldOutRecordings, folder: Path) -> None:
     """Write pictures of the conversion by EM of the first recordings. Raises ExportError: they cannot be written."""
     from matplotlib.figure import Figure  # which needs no screen
 
@@ -155,7 +138,12 @@ class ComparisonOptions:
 
 DEFAULT_OPTIONS = ComparisonOptions()
 QUICK = ComparisonOptions(
-    systems=[*PAPER_FIGURES, *(name + SPLIT for name in PAPER_FIGURES if "FHMM" not in name), "mean pose"], mixtures=2
+    systems=[
+        *systems.PAPER_FIGURES,
+        *(name + systems.SPLIT for name in systems.PAPER_FIGURES if "FHMM" not in name),
+        "mean pose",
+    ],
+    mixtures=2,
 )
 """A small comparison, for the recordings of ``runner.take_quick_part``; conversion by factorial chains is slow."""
 
@@ -181,12 +169,12 @@ def run_xieliu2007(  # noqa: PLR0913
     Raises MissingDependencyError: the pictures need a package that is not installed.
     Raises ExportError: the pictures cannot be written.
     """
-    names, seed = select_systems(options.systems), settings.seed
-    if not options.voices and (without := [name for name in names if COMPARED_SYSTEMS[name].second_stage]):
+    names, seed = systems.select_systems(options.systems), settings.seed
+    if not options.voices and (without := [name for name in names if systems.COMPARED_SYSTEMS[name].second_stage]):
         raise InputError(f"{without[0]} needs speech of others; give it by --recordings or --voices")
     check_visual(options.visual)
     listed = tuple(order) if order is not None else runner.shuffle(corpus.required("train"), seed)
-    chosen_on_val = any(COMPARED_SYSTEMS[name].splits for name in names)
+    chosen_on_val = any(systems.COMPARED_SYSTEMS[name].splits for name in names)
     held_out, validation = corpus.required(split), corpus.required("val") if chosen_on_val else ()
     check_training_names(corpus, listed, (*held_out, *validation))
     steps = choose_sizes(sizes if sizes is not None else [len(listed)], len(listed))
@@ -204,7 +192,7 @@ def run_xieliu2007(  # noqa: PLR0913
         figures = _measure_systems(recordings, trained, options.transcripts, settings, checkpoint)
         rows.append({"names": count, "used": used} | figures)
     if plots is not None:
-        draw_plots(trained[REFERENCE_SYSTEM], recordings, plots)
+        draw_plots(trained[systems.REFERENCE_SYSTEM], recordings, plots)
     about = {"split": split or "all", "clips": len(held_out), "seed": seed, "workers": settings.workers}
     about |= {"order": "given" if order is not None else "shuffled", "visual": options.visual}
     about |= {"channels": list(recordings.channels), "closed_under": recordings.closed_under}
@@ -223,27 +211,29 @@ class _TrainingSetup:
     work: Path | None
 
     def train(
-        self, systems: Sequence[str], names: Sequence[str], monitor: Monitor
-    ) -> tuple[int, HeldOutRecordings, dict[str, TrainedSystem]]:
+        self, wanted: Sequence[str], names: Sequence[str], monitor: Monitor
+    ) -> tuple[int, HeldOutRecordings, dict[str, systems.TrainedSystem]]:
         """Return how many utterances ``names`` are used, what is held out, and systems trained on the same phones."""
         examples, recordings = self._prepare(names, sub_monitor(monitor, 0, 0.3))
-        checkpoint, trained = self.open_checkpoint(names), dict[str, TrainedSystem]()
+        checkpoint, trained = self.open_checkpoint(names), dict[str, systems.TrainedSystem]()
         others = [*list_motionless(engine_named("coupled"), self.options.voices)]
-        for number, name in enumerate(systems):
-            start, stop = 0.3 + 0.7 * number / len(systems), 0.3 + 0.7 * (number + 1) / len(systems)
-            part, compared = sub_monitor(monitor, start, stop, f"{name}: "), COMPARED_SYSTEMS[name]
+        for number, name in enumerate(wanted):
+            start, stop = 0.3 + 0.7 * number / len(wanted), 0.3 + 0.7 * (number + 1) / len(wanted)
+            part, compared = sub_monitor(monitor, start, stop, f"{name}: "), systems.COMPARED_SYSTEMS[name]
             chains = compared.make is None and not compared.same_model_as  # coupled chains of its own
             arrays = checkpoint.load(f"system-{name}") if chains else None
             if arrays is not None:
-                trained[name] = system_from_arrays(arrays)
+                trained[name] = systems.system_from_arrays(arrays)
                 continue
-            known = [*with_inputs_of(name, examples, self.corpus)]
+            known = [*systems.with_inputs_of(name, examples, self.corpus)]
             known += others if compared.second_stage else []
-            trained[name] = train_system(name, known, recordings.get("val"), trained, self.options.mixtures, part)
+            trained[name] = systems.train_system(
+                name, known, recordings.get("val"), trained, self.options.mixtures, part
+            )
             if chains:  # their arrays are rounded when they are stored, and so is every model that is used
-                arrays = system_to_arrays(trained[name])
+                arrays = systems.system_to_arrays(trained[name])
                 checkpoint.save(f"system-{name}", arrays)
-                trained[name] = system_from_arrays(arrays)
+                trained[name] = systems.system_from_arrays(arrays)
         return len(examples), recordings["held out"], trained
 
     def _prepare(self, names: Sequence[str], monitor: Monitor) -> tuple[list[Example], dict[str, HeldOutRecordings]]:
@@ -273,7 +263,7 @@ class _TrainingSetup:
 
 def _measure_systems(
     recordings: HeldOutRecordings,
-    systems: Mapping[str, TrainedSystem],
+    trained: Mapping[str, systems.TrainedSystem],
     transcripts: bool,
     settings: runner.ExperimentSettings,
     checkpoint: Checkpoint,
@@ -282,7 +272,7 @@ def _measure_systems(
     conditions, seed = list(recordings.conditions) if transcripts else [AUDIO_ONLY], settings.seed
     generated: dict[str, dict[str, list[ComparedClip]]] = {condition: {} for condition in conditions}
     for condition, made in generated.items():
-        for name, system in systems.items():
+        for name, system in trained.items():
             arrays = checkpoint.load(f"{condition}-{name}")
             if arrays is None:
                 arrays = runner.clips_to_arrays(generate_clips(recordings, condition, system.engine, system.model))
@@ -292,13 +282,16 @@ def _measure_systems(
         for name, clips in made.items():
             settings.receive(name, condition, recordings, clips)
     training: dict[str, dict[str, Any]] = {}
-    for name, system in systems.items():
+    for name, system in trained.items():
         row: dict[str, Any] = {"seconds": system.seconds, "parameters": None, "options": None}
-        row["tried"] = [*map(as_row, system.tried)]
-        if name == BLSTM and system.tried:
-            row |= {key: getattr(find_best_trial(system.tried), key) for key in ("parameters", "options")}
+        row["tried"] = [*map(systems.as_row, system.tried)]
+        if name == systems.BLSTM and system.tried:
+            row |= {key: getattr(systems.find_best_trial(system.tried), key) for key in ("parameters", "options")}
         if isinstance(system.model, CoupledModel):
-            row |= {"parameters": system.model.chains.parameters, "options": list_changed_options(system.engine.config)}
+            row |= {
+                "parameters": system.model.chains.parameters,
+                "options": systems.list_changed_options(system.engine.config),
+            }
         training[name] = row
     return {
         "training": training,
@@ -311,15 +304,15 @@ def _compare_paper_pairs(
     recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int
 ) -> list[dict[str, Any]]:
     """Return how much better each system of the paper is than each that is worse in print, on the same clips."""
-    by_acc = sorted(PAPER_FIGURES, key=lambda name: -PAPER_FIGURES[name][1])
+    by_acc = sorted(systems.PAPER_FIGURES, key=lambda name: -systems.PAPER_FIGURES[name][1])
     rows = []
-    for ending in ("", SPLIT):
+    for ending in ("", systems.SPLIT):
         compared = [name + ending for name in by_acc if name + ending in made]
         pairs = [*combinations(compared, 2)]
         if not ending:
-            pairs += [(name + more, name) for name in compared for more in (", tied", ", together", ALL_PATHS)]
-            pairs += combinations([name + ALL_PATHS for name in by_acc], 2)
-            pairs += [(name, name.replace(TWO_STAGES, "")) for name in made if TWO_STAGES in name]
+            pairs += [(name + more, name) for name in compared for more in (", tied", ", together", systems.ALL_PATHS)]
+            pairs += combinations([name + systems.ALL_PATHS for name in by_acc], 2)
+            pairs += [(name, name.replace(systems.TWO_STAGES, "")) for name in made if systems.TWO_STAGES in name]
         pairs = [pair for pair in pairs if {*pair} <= made.keys()]
         statistics = {name: evaluate.list_statistics(recordings, made[name]) for pair in pairs for name in pair}
         for better, worse in pairs:
@@ -333,7 +326,7 @@ def _compare_paper_pairs(
 
 def _make_rows(recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int) -> dict[str, Any]:
     """Return the figures of what all systems generate for the same recordings, and differences from the reference."""
-    reference, rows = evaluate.list_statistics(recordings, made[REFERENCE_SYSTEM]), {}
+    reference, rows = evaluate.list_statistics(recordings, made[systems.REFERENCE_SYSTEM]), {}
     for system, clips in made.items():
         figures = evaluate.measure_clips(clips, recordings, seed)
         row: dict[str, Any] = {}

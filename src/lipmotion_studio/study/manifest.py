@@ -120,9 +120,9 @@ def read_study(folder: Path) -> Study:
     path = folder / MANIFEST
     if not path.is_file():
         raise InputError(f"{folder}: has no {MANIFEST}; make a study: lipmotion study design -o {folder} ...")
-    found = read_text_file(path, "study")
+    document = read_text_file(path, "study")
     try:
-        content = from_json(found)
+        content = from_json(document)
         if not isinstance(content, dict) or (content.pop("format", ""), content.pop("version", 0)) != (FORMAT, VERSION):
             raise ValueError(f"not {FORMAT} of version {VERSION}")
         return _STUDY(content)

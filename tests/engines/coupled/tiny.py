@@ -14,8 +14,8 @@ from lipmotion.engines.coupled.chains.product import (
     create_transitions,
     find_reachable,
 )
-from lipmotion.stats.mixture import Mixtures
 from lipmotion.units import PHONES, UnitSet
+from oracles.statistics import random_mixtures
 
 COUPLED, FACTORIAL, MULTISTREAM, HMM = "coupled", "factorial", "multistream", "hmm"
 """Values of the option ``structure``."""
@@ -68,16 +68,6 @@ def joint_product(of: Structure, seed=0) -> Product:
     return Product(of, own, joints, sources, targets, moved.T.astype(bool), share, initial)
 
 
-def mixtures(count, components, size, seed) -> Mixtures:
-    draw = np.random.default_rng(seed)
-    weights = draw.dirichlet(np.ones(components), count)
-    return Mixtures(
-        np.log(weights).astype(np.float32),
-        draw.normal(0, 1, (count, components, size)).astype(np.float32),
-        draw.uniform(0.5, 2, (count, components, size)).astype(np.float32),
-    )
-
-
 def chains(of: Structure | None = None, components=(2, 2), sizes=(2, 1), seed=0, weights=(1.0, 1.0)) -> Chains:
     """Chains of random densities and tables, one stream of speech and one visual stream."""
     of = of or structure()
@@ -92,7 +82,8 @@ def chains(of: Structure | None = None, components=(2, 2), sizes=(2, 1), seed=0,
         chain = of.chain_of(members[0])
         edges = np.cumsum([0, *(sizes[s] for s in members)]).tolist()
         columns = tuple(slice(a, b) for a, b in pairwise(edges))
-        found = mixtures(of.state_counts[chain], components[number], edges[-1], [seed, 2, number])
+        shape = of.state_counts[chain], components[number], edges[-1]
+        found = random_mixtures(np.random.default_rng([seed, 2, number]), shape, 1.0, 1.0, (0.5, 2))
         groups.append(
             StreamGroup(members, columns, found, tuple(weights[s] for s in members), joint.chain_states[chain])
         )

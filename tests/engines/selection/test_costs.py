@@ -57,6 +57,8 @@ def test_stress_that_is_known_and_differs_costs_and_the_ratio_of_durations_by_it
     costs = costs_of(with_stress(units, 1, 0, -1), stress=0.06)
     for stress, wanted in ((1, [0, 0.06, 0]), (0, [0.06, 0, 0]), (-1, [0, 0, 0])):
         assert costs.target_costs(target_of(costs, "aa", [stress]), 0, array(0, 1, 2)) == pytest.approx(wanted)
+    cheapest = costs_of(with_stress(units, 0, 1, 0), stress=0.06, candidates=1)
+    assert cheapest.candidates(target_of(cheapest, "aa", [1]), 0).tolist() == [1]
     times_s = np.array([[0, PHONE_S], [0, 2 * PHONE_S], [0, PHONE_S / 4]])
     costs = costs_of(replace(units, windows=replace(units.windows, times_s=times_s)), duration=0.3)
     found = costs.target_costs(target_of(costs, "aa"), 0, array(0, 1, 2))

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import example as case
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -243,6 +244,8 @@ def test_classes_of_lip_reading_and_their_overlaps() -> None:
 
 @settings(max_examples=20)
 @given(LONGER, st.integers(0, 999))
+@case(["t", "aa", "uw", "t"], 3)
+@case(["t", "m", "t", "b"], 11)
 def test_every_unit_is_shown(model, engine, phones: list[str], seed: int) -> None:
     costs = model.costs(engine.config)
     target = build_target(model, costs, speech(timeline(phones)))

@@ -35,7 +35,7 @@ def test_motion_that_is_not_stored_is_a_line_between_its_edges() -> None:
     units = recorded(timeline("s aa"), timeline("iy s"))
     assert len(units.values) == 82
     motion = np.arange(20.0)[:, None]
-    cut = replace(units, kept=np.array([[5, 15], [31, 36], [60, 65]]), motion=motion)
+    cut = replace(units, stored_ranges=np.array([[5, 15], [31, 36], [60, 65]]), motion=motion)
     assert cut.values[:6, 0] == pytest.approx([0] * 6)
     assert cut.values[14:32, 0] == pytest.approx(np.linspace(9, 10, 18))
     assert cut.values[35:41, 0] == pytest.approx([14] * 6)
@@ -59,7 +59,7 @@ def test_words_begin_and_end_where_the_word_changes_and_suppressed_phones_are_on
     one, two = phones_of("b iy", "be"), phones_of("g aa", "go")
     both = Timeline((*one.spans, *two.shifted(0.2).spans))
     assert list_windows([both]).words.tolist() == [[True, False], [False, True], [True, False], [False, True]]
-    symbols = list_windows([phones_of("t d k sp")]).symbols({"t", "d"})
+    symbols = list_windows([phones_of("t d k sp")]).contexts({"t", "d"}, 0)[:, 0]
     assert symbols.tolist() == [INVISIBLE_SYMBOL, INVISIBLE_SYMBOL, PHONE_NUMBER["k"], SILENT]
     with pytest.raises(InputError, match="unknown phone 'xx' at 0"):
         list_windows([phones_of("xx")])

@@ -173,7 +173,7 @@ def test_trees_tell_apart_what_moves_apart():
     }
     assert middle["aa"] > middle["iy"] + 0.1
     assert middle["iy"] > middle["p"] + 0.05
-    assert {tree.questions[tree.asked[0]].position for tree in emission.forest.values() if tree.asked[0] >= 0} >= {1}
+    assert {tree.questions[tree.splits[0]].position for tree in emission.forest.values() if tree.splits[0] >= 0} >= {1}
 
 
 def test_a_channel_that_never_moves_keeps_a_variance():

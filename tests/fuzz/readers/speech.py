@@ -54,17 +54,16 @@ AUDIO_TEXTS = {
 
 def seed_audio(_: Good) -> list[Files]:
     """Return a tone in many containers, with video, with a gap; and texts that FFmpeg accepts as recordings."""
-    found: list[Files] = []
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as made:
+        folder, paths = Path(made), list[Path]()
         for name, codec in CODECS.items():
             rate_hz = 48_000 if codec == "libopus" else 16_000
-            path = write_sound(Path(folder) / f"a.{name}", tone(rate_hz, SECONDS), rate_hz, codec)
-            found.append({path.name: path.read_bytes()})
+            paths.append(write_sound(folder / f"a.{name}", tone(rate_hz, SECONDS), rate_hz, codec))
         for name in ("video.mp4", "video.mkv"):
-            path = write_sound(Path(folder) / name, tone(16_000, SECONDS, 2), 16_000, "aac", video=True, start_s=0.1)
-            found.append({path.name: path.read_bytes()})
-        path = write_sound(Path(folder) / "hole.mka", tone(16_000, 2.0), 16_000, "flac", hole_s=(0.5, 1.0))
-        found.append({path.name: path.read_bytes()})
+            sound = tone(16_000, SECONDS, 2)
+            paths.append(write_sound(folder / name, sound, 16_000, "aac", video=True, start_s=0.1))
+        paths.append(write_sound(folder / "hole.mka", tone(16_000, 2.0), 16_000, "flac", hole_s=(0.5, 1.0)))
+        found = [{path.name: path.read_bytes()} for path in paths]
     return found + [{name: text.encode()} for name, text in AUDIO_TEXTS.items()]
 
 
@@ -86,8 +85,12 @@ CORPUS_PHONES = Timeline((Span(0.0, 0.3, Unit("sil")), Span(0.3, 0.5, Unit("b"))
 def seed_corpus(good: Good) -> list[Files]:
     """Return corpora of half a second: with labelled phones and tiny mouth pictures, without, without checksums."""
     corpus = Corpus.open(good.corpus)
-    small = _half_a_second(corpus.utterance(corpus.names()[0]))
-    track = replace(small.track, crops=np.zeros((FRAMES, *PIXELS), np.uint8))
+    first = corpus.utterance(corpus.names()[0])
+    audio = Audio(first.audio.samples[:CORPUS_SAMPLES].copy(), first.audio.rate_hz)
+    motion = first.track.motion
+    track = Track(Motion(motion.values[:FRAMES], motion.rate_hz, motion.channels), np.ones(FRAMES, bool))
+    small = replace(first, audio=audio, features=features_of(audio), track=track)
+    track = replace(track, crops=np.zeros((FRAMES, *PIXELS), np.uint8))
     labelled = replace(small, speaker="anna", phones=CORPUS_PHONES, track=track)
     return [_corpus(labelled), _corpus(small), _without_checksums(_corpus(small))]
 
@@ -98,13 +101,6 @@ def _without_checksums(files: Files) -> Files:
     entry = json.loads(files[name])
     entry.pop("checksums", None)
     return files | {name: json.dumps(entry).encode()}
-
-
-def _half_a_second(utterance: Utterance) -> Utterance:
-    audio = Audio(utterance.audio.samples[:CORPUS_SAMPLES].copy(), utterance.audio.rate_hz)
-    motion = utterance.track.motion
-    short = Motion(motion.values[:FRAMES], motion.rate_hz, motion.channels)
-    return replace(utterance, audio=audio, features=features_of(audio), track=Track(short, np.ones(FRAMES, bool)))
 
 
 def _corpus(utterance: Utterance) -> Files:

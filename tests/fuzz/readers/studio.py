@@ -8,7 +8,7 @@ import os
 import shutil
 import socket
 import tempfile
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from functools import cache
@@ -23,14 +23,14 @@ import numpy as np
 from websockets.sync.client import connect
 
 from fuzz.inputs import Files, Good, Reader, good_model, refuse_constant, require, short_speech
-from lipmotion import Edits, Job, LiveFrame, Request, Stream, errors
+from lipmotion import Edits, Job, LiveFrame, Request, Stream
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.pipeline.batch import BatchLine, read_lines
 from lipmotion.pipeline.batch.ledger import LEDGER, Place, open_ledger, write_receipt
 from lipmotion.pipeline.batch.report import MARKS, read_marks, write_marks, write_reports
 from lipmotion.pipeline.edit_files import EditFile, read_edits, write_edits
 from lipmotion.pipeline.job import check_outputs, open_face
-from lipmotion.storage import archive, json_text
+from lipmotion.storage.archive import take_array
 from lipmotion.storage.json_text import from_json
 from lipmotion.types import Outlook, Span, Timeline, Unit
 from lipmotion_studio.application import TOKEN_HEADER
@@ -168,15 +168,6 @@ def check_settings(folder: Path, _: Good) -> None:
         _read_one(path, path.relative_to(folder).as_posix(), folder)
 
 
-def _job(path: Path) -> Job:
-    """Return the job of an object of JSON, in which every value is put into every place."""
-    try:
-        content = from_json(path.read_bytes())
-    except ValueError as error:
-        raise InputError(str(error)) from error
-    return Job.parsed(content if isinstance(content, dict) else {}).at(path.parent)
-
-
 def _read_one(path: Path, name: str, folder: Path) -> None:
     if name == MANIFEST:
         read_study(folder)
@@ -195,7 +186,11 @@ def _read_one(path: Path, name: str, folder: Path) -> None:
     elif name.startswith("answers"):
         read_answers(path)
     elif name.startswith("job"):
-        job = Job.from_file(path) if path.suffix == ".toml" else _job(path)
+        if path.suffix == ".toml":
+            job = Job.from_file(path)
+        else:  # an object of JSON, in which every value is put into every place
+            content = _decoded(from_json, path.read_bytes())
+            job = Job.parsed(content if isinstance(content, dict) else {}).at(folder)
         check_outputs(replace(job, outputs=replace(job.outputs, files=("a.csv",))), open_face(job.outputs))
     else:
         file = read_edits(path)
@@ -306,33 +301,27 @@ def check_live(folder: Path, good: Good) -> None:
     if path.suffix == ".http":
         _send(content)
     elif path.name == "replies.json":
-        asyncio.run(_converse(_parsed(content)))
+        asyncio.run(_converse(_decoded(from_json, content)))
     else:
-        stream = copy.deepcopy(_stream())
-        frames = []
+        stream, frames = copy.deepcopy(_stream()), list[LiveFrame]()
         if path.suffix == ".json":
-            (stream.add_words if path.stem == "words" else stream.add_phones)(_parsed(content))
+            (stream.add_words if path.stem == "words" else stream.add_phones)(_decoded(from_json, content))
+        elif path.suffix == ".raw":
+            frames = stream.push(content)
         else:
-            frames = stream.push(content if path.suffix == ".raw" else _array(content))
+            array = _decoded(take_array, content)
+            frames = stream.push(array if array.size < 1e6 else array.ravel()[:1_000_000])
         frames += stream.push(short_speech(good).samples[:8000]) + stream.flush()
         require([frame.number for frame in frames] == list(range(len(frames))), "frames that are missing")
         require(all(_is_finite(frame) for frame in frames), "a frame that is not finite")
 
 
-def _parsed(content: bytes) -> Any:
-    """Return what a program sends that parses JSON."""
+def _decoded(decode: Callable[[bytes], Any], content: bytes) -> Any:
+    """Return what a program sends that decodes its content first."""
     try:
-        return json_text.from_json(content)
+        return decode(content)
     except ValueError as error:
-        raise errors.InputError(str(error)) from error
-
-
-def _array(content: bytes) -> Any:
-    try:
-        array = archive.take_array(content)
-    except ValueError as error:
-        raise errors.InputError(str(error)) from error
-    return array if array.size < 1e6 else array.ravel()[:1_000_000]
+        raise InputError(str(error)) from error
 
 
 def _is_finite(frame: LiveFrame) -> bool:

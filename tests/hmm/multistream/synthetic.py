@@ -5,7 +5,8 @@ from itertools import product
 import numpy as np
 
 from lipmotion.hmm.multistream import densities, model, multistream_training, unit_states
-from lipmotion.stats import bigram, mixture
+from lipmotion.stats import bigram
+from oracles.statistics import random_mixtures
 
 UNITS = ("a", "b", "c", "d")
 NAMES = ("sil", "sp", *UNITS, "x")
@@ -54,12 +55,7 @@ def random_joint(
         sums.add(np.arange(len(seen)), 9.0 * np.concatenate([np.ones((len(seen), 2)), means, means**2 + 0.1], axis=1))
         tying = model.JointConfig(least_frames=1.0, both_neighbours=changes.get("both_neighbours", False))
         forest = model.grow_forest(name, known, questions, seen, sums, has_spaces=has_spaces, config=tying)
-        shape = (forest.size, components, D)
-        mixtures = mixture.Mixtures(
-            np.log(draw.dirichlet(np.full(components, 2.0), forest.size)).astype(np.float32),
-            draw.normal(0, 1.5, shape).astype(np.float32),
-            draw.uniform(0.3, 2, shape).astype(np.float32),
-        )
+        mixtures = random_mixtures(draw, (forest.size, components, D), 2.0, 1.5, (0.3, 2))
         voiced = draw.uniform(0.1, 0.9, forest.size) if has_spaces else None
         parts[name] = model.StreamModel(
             densities.StreamScale(draw.normal(0, 1, D), draw.uniform(0.5, 2, D)),

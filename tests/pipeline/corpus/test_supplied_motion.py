@@ -22,7 +22,7 @@ from meshes.flame import head
 from meshes.live_link_app import write_take
 from meshes.speech import said
 from pipeline.made import read_sound, replace_tracking, write_noise, write_sound
-from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
+from speech.made_voices import RATE_HZ, clap, recorded_twice, speech_like
 
 CHANNELS = (Channel("jaw", "weight"), Channel("brow", "weight"))
 

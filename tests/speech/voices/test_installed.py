@@ -218,7 +218,7 @@ def test_a_program_is_stopped(script: str, message: str, tmp_path: Path) -> None
 
 @needs_scripts
 def test_a_program_reads_what_it_is_given(tmp_path: Path) -> None:
-    assert synthesiser.run_program([str(_program(tmp_path, "exec cat"))], "a-package", given="Helló\n") == "Helló\n"
+    assert synthesiser.run_program([str(_program(tmp_path, "exec cat"))], "a-package", stdin="Helló\n") == "Helló\n"
 
 
 @needs_scripts

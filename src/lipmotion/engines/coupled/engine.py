@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from textwrap import wrap
@@ -20,7 +21,7 @@ from lipmotion.engines.coupled.chains.product import COUPLED, FACTORIAL, HMM, MU
 from lipmotion.engines.coupled.conversion import convert, group_index, path_to_means, weigh_regressions
 from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.chain_training import mark_allowed_units
-from lipmotion.engines.coupled.training.coupled_training import THREADS, fit_coupled
+from lipmotion.engines.coupled.training.coupled_training import THREADS, grow_models
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import Statistics, count_unseen, slice_dynamics
 from lipmotion.motion.generation import split_into_blocks
@@ -52,33 +53,6 @@ KINDS = {
     COUPLED: "chains whose transitions depend on all chains, densities of their own states",
 }
 LINE = 110
-
-
-def describe(model: CoupledModel) -> str:
-    """Return a text with the chains, the streams and the regressions of a model, one a line."""
-    chains, structure, product = model.chains, model.chains.structure, model.chains.transitions.product
-    lines = [f"{structure.kind}: {KINDS[structure.kind]}"]
-    if len(structure.chains) > 1:
-        apart = "any number of states" if structure.limit is None else f"up to {structure.limit} state(s)"
-        together = "" if structure.cross_units or structure.limit is None else ", units left together"
-        lines.append(f"  asynchrony: {apart} apart{together}")
-    lines.append(f"  joint states: {product.chain_states.shape[1]}")
-    for number, (chain, units) in enumerate(zip(structure.chains, structure.units, strict=True), start=1):
-        lines.append(f"chain {number}: {chain.name}, {len(units)} units of {structure.states} states")
-        lines += [f"  {line}" for line in wrap(" ".join(units), LINE)]
-    for stream, name in enumerate(chains.streams):
-        densities, components, size = chains.groups[group_index(chains, stream)].stream_mixtures(stream).size
-        lines.append(
-            f"stream {name}: {size} dimensions on chain {structure.chain_of(stream) + 1}, "
-            f"{densities} densities of {components} Gaussian(s)"
-        )
-    regressions = model.regression[1] if model.regression is not None else ()
-    for visual, regression in zip(model.visual, regressions, strict=False):
-        count, inputs, _ = regression.coefficients.shape
-        lines.append(
-            f"means of {visual.name}: {count} regressions on {inputs} inputs, from features and posteriors around"
-        )
-    return "\n".join(map(printable, lines))
 
 
 Array = NDArray[np.float64]
@@ -282,10 +256,7 @@ class CoupledEngine(Engine[CoupledModel]):
     def fit(  # noqa: D102
         self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = THREADS
     ) -> Fit[CoupledModel]:
-        return fit_coupled(examples, self.config, monitor, checkpoint)
-
-    def without_closures(self) -> CoupledEngine:  # noqa: D102
-        return replace(self, config=replace(self.config, closures=False))
+        return deque(grow_models(examples, self.config, monitor, checkpoint), maxlen=1)[0]()
 
     def generate(self, model: CoupledModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         frames = len(speech.features.values)
@@ -380,7 +351,29 @@ class CoupledEngine(Engine[CoupledModel]):
         )
 
     def describe(self, model: CoupledModel) -> str:  # noqa: D102
-        return describe(model)
+        chains, structure, product = model.chains, model.chains.structure, model.chains.transitions.product
+        lines = [f"{structure.kind}: {KINDS[structure.kind]}"]
+        if len(structure.chains) > 1:
+            apart = "any number of states" if structure.limit is None else f"up to {structure.limit} state(s)"
+            together = "" if structure.cross_units or structure.limit is None else ", units left together"
+            lines.append(f"  asynchrony: {apart} apart{together}")
+        lines.append(f"  joint states: {product.chain_states.shape[1]}")
+        for number, (chain, units) in enumerate(zip(structure.chains, structure.units, strict=True), start=1):
+            lines.append(f"chain {number}: {chain.name}, {len(units)} units of {structure.states} states")
+            lines += [f"  {line}" for line in wrap(" ".join(units), LINE)]
+        for stream, name in enumerate(chains.streams):
+            densities, components, size = chains.groups[group_index(chains, stream)].stream_mixtures(stream).size
+            lines.append(
+                f"stream {name}: {size} dimensions on chain {structure.chain_of(stream) + 1}, "
+                f"{densities} densities of {components} Gaussian(s)"
+            )
+        regressions = model.regression[1] if model.regression is not None else ()
+        for visual, regression in zip(model.visual, regressions, strict=False):
+            count, inputs, _ = regression.coefficients.shape
+            lines.append(
+                f"means of {visual.name}: {count} regressions on {inputs} inputs, from features and posteriors around"
+            )
+        return "\n".join(map(printable, lines))
 
     def to_arrays(self, model: CoupledModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         return coupled_to_arrays(model)

@@ -20,6 +20,7 @@ from lipmotion.engines.coupled.conversion import (
     UPDATES,
     RegressionInputs,
     VisualRegression,
+    group_index,
     sum_precisions,
 )
 from lipmotion.motion.articulation import ArticulationPrior
@@ -46,7 +47,7 @@ class CoupledConfig(Configuration):
     asynchrony : number of states that chains may be apart; -1: no limit, of two factorial chains
     cross_units : let chains leave a unit at different times
     start_asynchrony, unseen_loss : of factorial chains without a limit: how far apart the chains may be while the first
-                 densities are learned, and the nats that rare joint states lose (``chains.structures.Structure``)
+                 densities are learned, and the nats that rare joint states lose (``chains.product.Structure``)
     moves_together : coupled chains may move on in the same frame more often than by chance; the paper's may not
     mixtures, visual_mixtures : Gaussians per state, of the speech stream and of visual streams (powers of two); the
                  structure ``hmm`` uses the first for both
@@ -57,7 +58,7 @@ class CoupledConfig(Configuration):
                  and of eigenlips
     conversion : ``trajectory``: parameter generation from expected precisions and means of static values, Δ and Δ²;
                  ``em``: the paper's, frame by frame;  ``viterbi``: means along the best path
-    start, update, steps : of EM conversion (``conversion.em_conversion.convert``); ``trajectory`` takes no
+    start, update, steps : of EM conversion (``conversion.convert``); ``trajectory`` takes no
                  steps after its soft start unless asked to
     acoustic_regression : regress visual means on the acoustic features and state posteriors around the frame
                  (``trajectory`` only)
@@ -196,7 +197,7 @@ class CoupledModel:
         """The limits of the means of all densities."""
         low, high = np.zeros(self.space.dimensions), np.zeros(self.space.dimensions)
         for number, stream in enumerate(self.visual, start=1):
-            group = next(group for group in self.chains.groups if number in group.streams)
+            group = self.chains.groups[group_index(self.chains, number)]
             means = group.stream_mixtures(number).means.astype(float)
             flat = means.reshape(-1, means.shape[2])
             poses = stream.unstandardised(flat, np.ones_like(flat))[0][:, 0]
@@ -220,10 +221,8 @@ class CoupledModel:
                 mean = weighted / np.maximum(precision, 1e-300)
             else:
                 posterior = inference.posteriors.chains[self.chains.structure.chain_of(number + 1)]
-                mean, precision = (
-                    regressions[number].means(inputs, posterior),
-                    regressions[number].precisions(posterior),
-                )
+                regression = regressions[number]
+                mean, precision = regression.means(inputs, posterior), regression.precisions(posterior)
             means[:, :, stream.columns], precisions[:, :, stream.columns] = stream.unstandardised(mean, precision)
         away = self.is_away_from_speech(inference.posteriors.chains[0])
         means[away] = 0

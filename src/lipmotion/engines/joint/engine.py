@@ -16,7 +16,7 @@ from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.hmm.multistream.densities import MOTION, StreamObservations, StreamWeights, stream_observations
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_arrays, joint_to_arrays
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, grow_joint, measure_durations, train_joint
-from lipmotion.hmm.multistream.recognise import StatePath, align, build_recogniser, merge_gaussians, select_densities
+from lipmotion.hmm.multistream.recognise import StatePath, align, merge_gaussians, recognise_units, select_densities
 from lipmotion.hmm.multistream.unit_states import Inventory, RecognisedUnit, frames_to_units, units_to_frames
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.arrays import (
@@ -27,7 +27,7 @@ from lipmotion.motion.arrays import (
     scaling_from_arrays,
     scaling_to_arrays,
 )
-from lipmotion.motion.articulation import ArticulationPrior, Statistics, fit_articulation_prior
+from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import Closure, fit_closure
 from lipmotion.motion.frame_labels import with_unit_names
 from lipmotion.motion.generation import LearnedMotion, VarianceScaling, fit_scaling_factors
@@ -130,6 +130,8 @@ class JointEngineConfig(Configuration):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if not self.hmm.training.active:
+            raise InputError("all streams are switched off in training; give at least one a weight")
         if not self.hmm.recognition.active:
             raise InputError("no stream takes part in recognition; give speech or F0 a weight")
 
@@ -271,14 +273,11 @@ class JointEngine(Engine[JointModel]):
         modulation = learn_filter(self.config.modulation_filter, compared, examples, values)
         return replace(model, scaling=VarianceScaling(factors, rest), modulation=modulation)
 
-    def without_closures(self) -> JointEngine:  # noqa: D102
-        return replace(self, config=replace(self.config, closures=False))
-
     def generate(self, model: JointModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         observations, duration_s = self._observations(speech), speech.features.duration_s
 
         def recognise() -> tuple[Timeline[Unit], StatePath]:
-            segments = build_recogniser(model.hmm).recognise(observations)
+            segments = recognise_units(model.hmm, observations)
             units = frames_to_units(segments, duration_s, lambda unit: replace(model.units.label(unit), confidence=0.0))
             bounds = np.array([*(segment.first for segment in segments), observations.frames])
             return units, align(model.hmm, observations, [segment.unit for segment in segments], bounds)
@@ -291,12 +290,8 @@ class JointEngine(Engine[JointModel]):
                 units = _align_times(model, observations, units, duration_s)
             path = _align(model, observations, units)
         means, precisions = merge_gaussians(select_densities(model.hmm, path))
-
-        def statistics(frames: slice) -> Statistics:
-            return means[frames], precisions[frames]
-
         motion, variance = model.motion.for_voice(speech.voice).generate(
-            statistics,
+            lambda frames: (means[frames], precisions[frames]),
             len(speech.features.values),
             units,
             constraints,

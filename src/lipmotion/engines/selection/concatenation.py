@@ -16,7 +16,6 @@ from scipy.interpolate import PchipInterpolator
 from lipmotion.engines.selection.costs import ABUTTING_JOIN, JOIN_AFTER, JOIN_BEFORE, NO_JOIN, Costs, Target
 from lipmotion.engines.selection.inventory import PROTECTED_PHONES, RecordedUnits, UnitNumbers
 from lipmotion.engines.selection.model import SelectionModel
-from lipmotion.motion.articulation import Statistics
 from lipmotion.motion.frame_labels import find_digital_silence, find_runs, mark_distant
 from lipmotion.stats.curves import with_dynamics
 from lipmotion.types import FRAME_RATE_HZ, Constraints, Motion, ReducedVariance, Speech, Timeline, Unit
@@ -217,11 +216,6 @@ def join_motion(
     resting = _resting(np.asarray(speech.features.values), speech.units, always=always)[:, None]
     means = with_dynamics(track + resting * (model.rest - track))
     precisions = np.broadcast_to(1 / model.variances, means.shape)
-
-    def statistics(block: slice) -> Statistics:
-        return means[block].copy(), precisions[block].copy()
-
-    learned = model.motion.for_voice(speech.voice)
     target, middle = chosen.target, costs.config.window // 2
     around = slice(middle - 1, middle + 2)  # units that were recorded between other phones may be corrected
     differs = (costs.index.contexts[chosen.units][:, around] != target.contexts[:, around]).any(axis=1)
@@ -229,7 +223,14 @@ def join_motion(
     for (start_s, end_s), other in zip(target.windows.times_s.tolist(), differs.tolist(), strict=True):
         within = slice(int(start_s * FRAME_RATE_HZ), int(np.ceil(end_s * FRAME_RATE_HZ)))
         reliability[within] = float(other and not target.by_sound)
-    return learned.generate(statistics, frames, speech.units, constraints, close=close, reliability=reliability)
+    return model.motion.for_voice(speech.voice).generate(
+        lambda block: (means[block].copy(), precisions[block].copy()),
+        frames,
+        speech.units,
+        constraints,
+        close=close,
+        reliability=reliability,
+    )
 
 
 def _resting(features: NDArray[np.floating], units: Timeline[Unit], *, always: bool) -> Array:

@@ -385,10 +385,10 @@ def select(
     Source: Minnis & Breen 2000, §3.
     """
     required = required or {}
-    found = [_candidates(costs, target, n, excluded, required.get(n), prune) for n in range(len(target))]
-    total, backward = found[0][1], []
-    for number in range(1, len(found)):
-        (left, _), (right, right_costs) = found[number - 1], found[number]
+    trellis = [_candidates(costs, target, n, excluded, required.get(n), prune) for n in range(len(target))]
+    total, backward = trellis[0][1], []
+    for number in range(1, len(trellis)):
+        (left, _), (right, right_costs) = trellis[number - 1], trellis[number]
         join = costs.join_costs(target, number, left, right)
         sums = total[:, None] + join
         best = sums.argmin(axis=0)
@@ -397,7 +397,7 @@ def select(
     places = [int(total.argmin())]
     for best in reversed(backward):
         places.append(int(best[places[-1]]))
-    units = [candidates[place] for (candidates, _), place in zip(found, reversed(places), strict=True)]
+    units = [candidates[place] for (candidates, _), place in zip(trellis, reversed(places), strict=True)]
     return np.array(units, np.intp), float(total.min())
 
 
@@ -418,8 +418,8 @@ def _candidates(
         units = costs.candidates(target, number)
     each = costs.target_costs(target, number, units)
     if prune:
-        kept = np.flatnonzero(each <= each.min() + 2 * costs.config.most)
-        if 0 < costs.config.beam < len(kept):
-            kept = np.sort(kept[np.argsort(each[kept], kind="stable")[: costs.config.beam]])
-        units, each = units[kept], each[kept]
+        chosen = np.flatnonzero(each <= each.min() + 2 * costs.config.most)
+        if 0 < costs.config.beam < len(chosen):
+            chosen = np.sort(chosen[np.argsort(each[chosen], kind="stable")[: costs.config.beam]])
+        units, each = units[chosen], each[chosen]
     return units, each

@@ -117,9 +117,6 @@ class SelectionEngine(Engine[SelectionModel]):
     def recognise(self, model: SelectionModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
         return model.phone_recogniser.phones(speech) if model.phone_recogniser is not None else None
 
-    def without_closures(self) -> SelectionEngine:  # noqa: D102
-        return replace(self, config=replace(self.config, closures=False))
-
     def generate(self, model: SelectionModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         costs = model.costs(self.config)
         target = build_target(model, costs, speech)
@@ -158,7 +155,7 @@ class SelectionEngine(Engine[SelectionModel]):
                     "give the corpus that the model learned"
                 )
         sound = np.concatenate([np.asarray(features[name], float) for name in inventory.names])
-        inventory = replace(inventory, kept=np.array([[0, len(sound)]]), motion=sound, predicted=None)
+        inventory = replace(inventory, stored_ranges=np.array([[0, len(sound)]]), motion=sound, predicted=None)
         costs = Costs(inventory, replace(self.config, **SOUND), 1 / np.maximum(sound.std(axis=0), 1e-9))
         target = costs.target(list_windows([units]), None, None)
         chosen = select(costs, target)[0]

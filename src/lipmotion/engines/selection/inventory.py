@@ -106,16 +106,14 @@ class PhoneWindows:
         """The duration of every phone [shape=(U,)]."""
         return self.times_s[:, 1] - self.times_s[:, 0]
 
-    def symbols(self, invisible: Collection[str]) -> NDArray[np.intp]:
-        """Return the symbol of every phone [shape=(U,)]: pauses are silence, suppressed phones are one symbol."""
+    def contexts(self, invisible: Collection[str], reach: int) -> NDArray[np.intp]:
+        """Return the symbols around every phone [shape=(U, 2·reach + 1)]; beyond a recording there is silence.
+
+        Pauses are silence; suppressed phones are one symbol.
+        """
         table = np.array([SILENT if is_silent(p) else INVISIBLE_SYMBOL if p in invisible else n
                           for n, p in enumerate(PHONES)], np.intp)  # fmt: skip
-        return table[self.phones]
-
-    def contexts(self, invisible: Collection[str], reach: int) -> NDArray[np.intp]:
-        """Return the symbols around every phone [shape=(U, 2·reach + 1)]; beyond a recording there is silence."""
-        symbols = self.symbols(invisible)
-        numbers = np.arange(len(self))
+        symbols, numbers = table[self.phones], np.arange(len(self))
         columns = []
         for offset in range(-reach, reach + 1):
             there = np.clip(numbers + offset, 0, len(self) - 1)
@@ -139,21 +137,21 @@ class PhoneWindows:
 
         A phone beside one that was left out begins or ends the word that this one began or ended.
         """
-        kept = np.flatnonzero(~np.isin(self.phones, [PHONE_NUMBER[phone] for phone in phones]))
-        if len(kept) in (0, len(self)):
+        remaining = np.flatnonzero(~np.isin(self.phones, [PHONE_NUMBER[phone] for phone in phones]))
+        if len(remaining) in (0, len(self)):
             return self, np.arange(len(self))
-        begins = np.logical_or.reduceat(self.words[: kept[-1] + 1, 0], np.append(0, kept[:-1] + 1))
-        ends = np.logical_or.reduceat(self.words[:, 1], kept)
+        begins = np.logical_or.reduceat(self.words[: remaining[-1] + 1, 0], np.append(0, remaining[:-1] + 1))
+        ends = np.logical_or.reduceat(self.words[:, 1], remaining)
         taken = replace(
             self,
-            recording=self.recording[kept],
-            phones=self.phones[kept],
-            times_s=self.times_s[kept],
+            recording=self.recording[remaining],
+            phones=self.phones[remaining],
+            times_s=self.times_s[remaining],
             words=np.stack([begins, ends], axis=1),
-            stress=self.stress[kept],
-            hidden=np.diff(kept, prepend=-1) > 1,
+            stress=self.stress[remaining],
+            hidden=np.diff(remaining, prepend=-1) > 1,
         )
-        return taken, kept
+        return taken, remaining
 
     def suppressed(self, phones: Collection[str]) -> PhoneWindows:
         """Return the phones of one recording without some, whose time the vowel that follows takes.
@@ -161,9 +159,9 @@ class PhoneWindows:
         Where no vowel follows, the phone before takes it; at the start, the phone after.
         Source: Minnis & Breen 2000, §3: "the following vowel gives the shape of the mouth".
         """
-        others, kept = self.without(phones)
+        others, remaining = self.without(phones)
         times_s = others.times_s.copy()
-        if len(kept) == len(self):
+        if len(remaining) == len(self):
             return self
         times_s[0, 0], times_s[-1, 1] = self.times_s[0, 0], self.times_s[-1, 1]
         vowel = np.array([PHONES[phone] in NUCLEI for phone in others.phones[1:]], bool)
@@ -229,7 +227,7 @@ class RecordedUnits:
     windows   : the units, recording by recording; times are seconds in their recording
     usable    : whether the motion of each unit was measured throughout [shape=(U,)]
     first     : the row of ``values`` at which each recording begins; the last number is that of all rows [shape=(R+1,)]
-    kept      : the first row and the one after the last of each range whose motion is stored, in order [shape=(K, 2)]
+    stored_ranges : the first row and the one after the last of each range of stored motion, in order [shape=(K, 2)]
     motion    : there, in the motion space, 100 rows a second; stored in half precision [shape=(N, Q)]
     predicted : what the guide predicts at ``POINTS`` of each unit, reduced [shape=(U, POINTS, D)]; None: no guide
     """
@@ -238,14 +236,14 @@ class RecordedUnits:
     windows: PhoneWindows
     usable: NDArray[np.bool_]
     first: NDArray[np.intp]
-    kept: NDArray[np.intp]
+    stored_ranges: NDArray[np.intp]
     motion: NDArray[np.floating[Any]]
     predicted: NDArray[np.float16] | None
 
     @cached_property
     def values(self) -> Array:
         """The motion of all recordings [shape=(F, Q)]; silence that is not stored is a line."""
-        stored = np.concatenate([np.arange(first, stop) for first, stop in self.kept.tolist()])
+        stored = np.concatenate([np.arange(first, stop) for first, stop in self.stored_ranges.tolist()])
         rows, frames = self.motion.astype(float), np.arange(self.first[-1])
         if len(rows) == len(frames):
             return rows
@@ -259,11 +257,11 @@ class RecordedUnits:
 
     def without(self, phones: Collection[str]) -> RecordedUnits:
         """Return the units of other phones; all units, if none of those is usable."""
-        windows, kept = self.windows.without(phones)
-        if not self.usable[kept].any():
+        windows, remaining = self.windows.without(phones)
+        if not self.usable[remaining].any():
             return self
-        predicted = self.predicted[kept] if self.predicted is not None else None
-        return replace(self, windows=windows, usable=self.usable[kept], predicted=predicted)
+        predicted = self.predicted[remaining] if self.predicted is not None else None
+        return replace(self, windows=windows, usable=self.usable[remaining], predicted=predicted)
 
     def poses(self, fraction: float, later_s: float = 0.0) -> Array:
         """Return the motion of all units at a fraction of their duration, 0 to 1, or some time later [shape=(U, Q)]."""
@@ -317,14 +315,14 @@ class UnitIndex:
         length = len(window)
         sides = (range(length // 2 + 1, 1, -1), range(length // 2 + 1, 1, -1), range(length, 1, -2))
         lengths = sides if not count else (range(length, 0, -1),) * 3
-        found = [
+        matches = [
             each
             for bias, (order, keys) in enumerate(zip(self.orders, self.keys, strict=True))
             for each in _longest(order, keys, window[digits(bias, length)], lengths[bias], count, excluded, costs)
         ]
-        if not found and not count:
-            found = [*_longest(self.orders[0], self.keys[0], window[digits(0, length)], (1,), 0, excluded, costs)]
-        return np.unique(np.concatenate(found)) if found else np.zeros(0, np.intp)
+        if not matches and not count:
+            matches = [*_longest(self.orders[0], self.keys[0], window[digits(0, length)], (1,), 0, excluded, costs)]
+        return np.unique(np.concatenate(matches)) if matches else np.zeros(0, np.intp)
 
 
 def index_units(inventory: RecordedUnits, invisible: Collection[str], window: int) -> UnitIndex:
@@ -372,7 +370,7 @@ def _longest(
 ) -> Iterator[UnitNumbers]:
     """Yield units whose agreement has some falling lengths, until there are ``count``; 0: those of the first length."""
     inner: tuple[int, int] | None = None
-    found = 0
+    total = 0
     for length in lengths:
         low = int(_keys(symbols[None, :length])[0]) * SYMBOLS ** (len(symbols) - length)
         first, stop = np.searchsorted(keys, [low, low + SYMBOLS ** (len(symbols) - length)]).tolist()
@@ -382,13 +380,13 @@ def _longest(
             units = order[begin:end]
             if excluded is not None:
                 units = units[~excluded[units]]
-            if costs is not None and 0 < count - found < len(units):
+            if costs is not None and 0 < count - total < len(units):
                 units = units[np.argsort(costs(units), kind="stable")]
-            units = units[: count - found] if count else units
-            found += len(units)
+            units = units[: count - total] if count else units
+            total += len(units)
             if len(units):
                 yield units
-            if 0 < count <= found:
+            if 0 < count <= total:
                 return
-        if found and not count:
+        if total and not count:
             return

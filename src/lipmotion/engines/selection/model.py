@@ -98,7 +98,7 @@ def model_arrays(model: SelectionModel) -> dict[str, NDArray[Any]]:
         "unit_words": windows.words,
         "unit_stress": windows.stress.astype(np.int32),
         "unit_usable": inventory.usable,
-        "recorded_rows": inventory.kept,
+        "recorded_rows": inventory.stored_ranges,
         "recorded_motion": inventory.motion,
         "selection_scale": model.scale,
         "selection_rest": model.rest,
@@ -178,11 +178,11 @@ GUIDE = {
 
 
 def _check(inventory: RecordedUnits) -> None:
-    windows, first, rows = inventory.windows, inventory.first, inventory.kept.ravel()
+    windows, first, rows = inventory.windows, inventory.first, inventory.stored_ranges.ravel()
     if len(first) != len(inventory.names) + 1 or first[0] != 0 or (np.diff(first) < 1).any():
         raise ValueError("recording_first is not rising from 0, with one number for each recording and one more")
-    stored = int(np.diff(inventory.kept, axis=1).sum())
-    if (np.diff(rows) < 0).any() or rows[-1] > first[-1] or (np.diff(inventory.kept, axis=1) < 1).any():
+    stored = int(np.diff(inventory.stored_ranges, axis=1).sum())
+    if (np.diff(rows) < 0).any() or rows[-1] > first[-1] or (np.diff(inventory.stored_ranges, axis=1) < 1).any():
         raise ValueError(f"recorded_rows that are not ranges in ascending order within {first[-1]} rows")
     if len(inventory.motion) != stored:
         raise ValueError(f"recorded_motion of {len(inventory.motion)} rows, required {stored}")

@@ -446,9 +446,6 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
     def recognise(self, model: TrajectoryModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
         return model.phone_recogniser.phones(speech) if model.phone_recogniser is not None else None
 
-    def without_closures(self) -> TrajectoryEngine:  # noqa: D102
-        return replace(self, config=replace(self.config, closures=False))
-
     def generate(self, model: TrajectoryModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         frames = len(speech.features.values)
         layout = self.config.layout(model.units)

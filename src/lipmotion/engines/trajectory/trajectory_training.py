@@ -281,7 +281,7 @@ def _fit_emission(clips: Sequence[TrainingClip], options: TrajectoryConfig, layo
             score_gaussian,
             parameters=2 * overall.size,
             factor=options.tree_factor,
-            least=options.least_frames,
+            min_frames=options.least_frames,
         )
         for name, contexts in grouped.items()
     }
@@ -332,13 +332,13 @@ def _sum_context_moments(
 
 def _fit_leaves(tree: Tree, contexts: _Contexts, size: int, options: TrajectoryConfig) -> list[tuple[Array, Array]]:
     """Return mean and variance [each shape=(3·Q,)] of every leaf, in standardised units."""
-    totals = np.zeros((len(tree.asked), 1 + 2 * size))
-    parents = np.full(len(tree.asked), -1)
+    totals = np.zeros((len(tree.splits), 1 + 2 * size))
+    parents = np.full(len(tree.splits), -1)
     for context, moments in contexts.items():
         path = tree.path(context)
         totals[path] += moments
         parents[path[1:]] = path[:-1]
-    means, variances = np.zeros((len(tree.asked), size)), np.ones((len(tree.asked), size))
+    means, variances = np.zeros((len(tree.splits), size)), np.ones((len(tree.splits), size))
     for node, (total, parent) in enumerate(zip(totals, parents, strict=True)):
         count, sums, squares = total[0], total[1 : 1 + size], total[1 + size :]
         mean, variance = (means[parent], variances[parent]) if parent >= 0 else (np.zeros(size), np.ones(size))

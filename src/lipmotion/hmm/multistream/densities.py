@@ -22,18 +22,13 @@ ACOUSTIC_STREAMS = (SPEECH, *F0_STREAMS)
 
 @dataclass(frozen=True)
 class StreamWeights:
-    """Factors of the streams' log densities; 0: off. Raises InputError: a weight is negative or not finite."""
+    """Factors of the streams' log densities; 0: off."""
 
     speech: float = 1.0
     f0: float = 1.0
     f0_slope: float = 1.0
     f0_curvature: float = 1.0
     motion: float = 1.0
-
-    def __post_init__(self) -> None:
-        for name, weight in self:
-            if not 0 <= weight < float("inf"):
-                raise InputError(f"the weight of the stream {name} is {weight}, required 0 or more and finite")
 
     def __iter__(self) -> Iterator[tuple[str, float]]:
         return ((field.name, getattr(self, field.name)) for field in fields(self))

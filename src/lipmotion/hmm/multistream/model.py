@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -95,10 +95,10 @@ class Forest:
         numbers = {int(node): self._first_leaf[name] + i for i, node in enumerate(tree.leaves)}
 
         def fill(node: int, left: NDArray[np.intp], right: NDArray[np.intp]) -> None:
-            if tree.asked[node] < 0:
+            if tree.splits[node] < 0:
                 leaves[np.ix_(left, right)] = numbers[node]
                 return
-            position, _, members = tree.questions[tree.asked[node]]
+            position, _, members = tree.questions[tree.splits[node]]
             if position == 1:
                 fill(node + 1 if unit in members else int(tree.no[node]), left, right)
                 return
@@ -130,9 +130,9 @@ def build_unit_forest(inventory: Inventory, spoken: Sequence[str]) -> Forest:
     for name, (unit, _) in inventory.trees.items():
         order = [] if unit else [number[spoken_unit] for spoken_unit in spoken if spoken_unit not in inventory.free]
         nodes = 2 * len(order) + 1
-        asked, no = np.full((2, nodes), -1, np.int32)
-        asked[:-1:2], no[:-1:2] = order, np.arange(2, nodes, 2)  # one after another, until one is answered with yes
-        trees[name] = Tree(questions, asked, no, np.zeros(nodes))
+        splits, no = np.full((2, nodes), -1, np.int32)
+        splits[:-1:2], no[:-1:2] = order, np.arange(2, nodes, 2)  # one after another, until a yes
+        trees[name] = Tree(questions, splits, no, np.zeros(nodes))
     return Forest(inventory, trees)
 
 
@@ -168,10 +168,6 @@ def choose_positions(
     return {-1: (0, 1), 0: (1,), 1: (1, 2)}[inventory.side(unit, state)]
 
 
-ACOUSTIC_ONLY = StreamWeights(motion=0.0)
-MOTION_ONLY = StreamWeights(0.0, 0.0, 0.0, 0.0, 1.0)
-
-
 @dataclass(frozen=True)
 class JointConfig:
     """How a joint model is built, trained and used.
@@ -184,8 +180,7 @@ class JointConfig:
     least_frames : frames that a leaf must have
     variance_floor : least variance, as a share of a dimension's overall variance
     bigram_weight, insertion : scale of the log bigram, and log insertion penalty of every unit, in recognition
-    training, recognition, synthesis : weights of the streams in each
-    Raises InputError: a number out of its range.
+    training, recognition : weights of the streams in each
     """
 
     states: int = 3
@@ -200,20 +195,7 @@ class JointConfig:
     bigram_weight: float = 4.0
     insertion: float = -4.0
     training: StreamWeights = field(default=StreamWeights())
-    recognition: StreamWeights = field(default=ACOUSTIC_ONLY)
-    synthesis: StreamWeights = field(default=MOTION_ONLY)
-
-    def __post_init__(self) -> None:
-        for each in fields(self):
-            value = getattr(self, each.name)
-            if each.type == "int" and (not isinstance(value, int) or value < 1):
-                raise InputError(f"{each.name} is {value!r}, required a whole number from 1")
-            if each.type == "float" and not np.isfinite(value):
-                raise InputError(f"{each.name} is {value}, required a finite number")
-        if min(self.tree_factor, self.least_frames, self.variance_floor) <= 0:
-            raise InputError("tree_factor, least_frames and variance_floor must be more than 0")
-        if not self.training.active:
-            raise InputError("all streams are switched off in training; give at least one a weight")
+    recognition: StreamWeights = field(default=StreamWeights(motion=0.0))
 
 
 def grow_forest(
@@ -240,12 +222,12 @@ def grow_forest(
     names = np.array([inventory.tree(context[1], state) for context, state in triphones])
     trees = {}
     for name, (unit, state) in inventory.trees.items():
-        asked = choose_positions(stream, inventory, unit, state, both_neighbours=config.both_neighbours)
+        positions = choose_positions(stream, inventory, unit, state, both_neighbours=config.both_neighbours)
         in_tree = np.flatnonzero(names == name)
         index: dict[Context, int] = {}  # contexts reduced to the positions asked about
         groups = [
             index.setdefault(
-                tuple(part if place in asked else "" for place, part in enumerate(triphones[i][0])), len(index)
+                tuple(part if place in positions else "" for place, part in enumerate(triphones[i][0])), len(index)
             )
             for i in in_tree.tolist()
         ]
@@ -254,13 +236,13 @@ def grow_forest(
         trees[name] = grow_tree(
             list(index) or [("", "", "")],
             pooled,
-            [q if q.position in asked else q._replace(members=frozenset()) for q in questions],  # always no
-            partial(likelihood, least_variance=config.variance_floor),
+            [q if q.position in positions else q._replace(members=frozenset()) for q in questions],  # always no
+            partial(likelihood, min_variance=config.variance_floor),
             parameters=values.shape[1] - 1,
             factor=config.tree_factor,
-            least=config.least_frames,
+            min_frames=config.least_frames,
         )
-    return Forest(inventory, {name: Tree(questions, tree.asked, tree.no, tree.frames) for name, tree in trees.items()})
+    return Forest(inventory, {name: replace(tree, questions=questions) for name, tree in trees.items()})
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,7 +32,7 @@ from lipmotion.hmm.multistream.model import (
     grow_forest,
     list_context_questions,
 )
-from lipmotion.hmm.multistream.recognise import align, check_bounds
+from lipmotion.hmm.multistream.recognise import align
 from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState, expand_triphones
 from lipmotion.hmm.unit_training import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES, group_by_length
 from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors
@@ -251,18 +251,11 @@ class TrainingUtterance:
 
     bounds : the first frame of each unit, and the frame count at the end [shape=(len(units) + 1,)], to start
              from; None: a flat start, with states of equal length
-    Raises InputError: no units, or bounds that do not fit the units or the frames.
     """
 
     observed: StreamObservations
     units: tuple[str, ...]
     bounds: NDArray[np.intp] | None = None
-
-    def __post_init__(self) -> None:
-        if not self.units:
-            raise InputError("an utterance without units; give at least silence")
-        if self.bounds is not None:
-            check_bounds(self.bounds, len(self.units), self.observed.frames)
 
 
 def train_joint(
@@ -297,7 +290,7 @@ def grow_joint(
     Raises InputError: an unknown unit, or no stream that is active in training.
     Source: Hofer 2008, §4 and §6; tying by minimum description length as in ``stats.trees``.  Deviations: utterances
     with ``bounds`` start from these, not flat; trees of acoustic streams ask about one neighbour, unless
-    ``both_neighbours`` is set (``forest.choose_positions``).
+    ``both_neighbours`` is set (``model.choose_positions``).
     """
     hmm, prepared = _start(utterances, inventory, config)
     splits = [count.bit_length() - 1 for count in (config.mixtures, config.motion_mixtures)]
@@ -324,8 +317,6 @@ def _start(
     if not utterances:
         raise CorpusError("no utterances to train on; give at least one")
     streams = [name for name in STREAMS if any(name in utterance.observed.streams for utterance in utterances)]
-    if config.states != inventory.states:
-        raise InputError(f"an inventory of {inventory.states} states a unit, the configuration says {config.states}")
     if not set(streams) & set(config.training.active):
         raise InputError(f"switched on are {', '.join(config.training.active)}; observed were {', '.join(streams)}")
     hmm = _make_equal_models(utterances, inventory, config, streams)

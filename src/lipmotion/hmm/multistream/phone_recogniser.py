@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.multistream.densities import SPEECH, StreamObservations, stream_observations
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_arrays, joint_to_arrays
-from lipmotion.hmm.multistream.recognise import build_recogniser
+from lipmotion.hmm.multistream.recognise import recognise_units
 from lipmotion.hmm.multistream.unit_states import Inventory, frames_to_units, units_to_frames
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, select_arrays
@@ -53,7 +53,7 @@ class OwnPhoneRecogniser:
         if _score_similarity(self.hmm, observations) < self.training_score + SIMILARITY_MARGIN:
             return None
         try:
-            segments = build_recogniser(self.hmm).recognise(observations)
+            segments = recognise_units(self.hmm, observations)
         except AlignmentError:  # shorter than any phone
             return None
         return frames_to_units(segments, speech.features.duration_s)

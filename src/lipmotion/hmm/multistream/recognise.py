@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import AlignmentError, InputError
+from lipmotion.errors import AlignmentError
 from lipmotion.hmm.multistream.densities import ACOUSTIC_STREAMS, MOTION, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.unit_states import RecognisedUnit, TriphoneStates, expand_triphones
@@ -45,7 +45,7 @@ def align(
     bounds  : the first frame of each unit, and the frame count at the end, where they are known: then only the path
               inside each unit is searched; a unit with fewer frames than states has some of its states, evenly spread
     weights : of the streams; those of recognition by default
-    Raises AlignmentError: fewer frames than states. Raises InputError: an unknown unit, or bounds that do not fit.
+    Raises AlignmentError: fewer frames than states. Raises InputError: an unknown unit.
     """
     weights = weights or hmm.config.recognition
     states = expand_triphones(hmm.inventory, units)
@@ -53,7 +53,6 @@ def align(
     log_density = hmm.log_density(streams, hmm.leaves(states.triphones), weights)
     chosen = np.arange(len(states.monophones))
     if bounds is not None:
-        check_bounds(bounds, len(units), observed.frames)
         first, end = bounds[states.positions], bounds[states.positions + 1]
         time = np.arange(observed.frames)[:, None]
         log_density[(time < first) | (time >= end)] = -np.inf
@@ -73,12 +72,6 @@ def align(
     values = log_density[:, chosen].astype(np.float32)
     path = network.best_path(LogLikelihoods(len(values), lambda first, end, _: values[first:end]))
     return StatePath(states, chosen[path])
-
-
-def check_bounds(bounds: NDArray[np.intp], units: int, frames: int) -> None:
-    """Raise InputError unless bounds are the first frames of so many units, and the frame count at the end."""
-    if bounds.shape != (units + 1,) or bounds[0] != 0 or bounds[-1] != frames or (np.diff(bounds) < 0).any():
-        raise InputError(f"bounds {bounds.tolist()} of {units} units; required one more than units, from 0 to {frames}")
 
 
 Grid = NDArray[np.intp]
@@ -112,8 +105,12 @@ class _StateNodes(NamedTuple):
     numbers: Grid
 
 
+@lru_cache(maxsize=4)
 def build_context_loop(hmm: JointHmm) -> ContextLoop:
-    """Return the loop of a model's units with the back-off bigram (Hofer 2008, Eq. 5), as if silence were around it."""
+    """Return the loop of a model's units with the back-off bigram (Hofer 2008, Eq. 5), as if silence were around it.
+
+    The loops of the last few models are cached.
+    """
     inventory = hmm.inventory
     units = [unit for unit in hmm.spoken if unit not in inventory.free[1:]]
     leaves, densities = _number_densities(hmm, units)
@@ -154,10 +151,10 @@ def _join_units(
             for source in last.numbers[:, last.right[place[following]]].tolist():
                 for target in entered.numbers[entered.left[place[unit]]].tolist():
                     builder.arc(source, target, score)
-        for node in first.numbers[first.left[place[silence]]].tolist():
-            builder.initial(node, hmm.config.insertion if unit == silence else _language_score(hmm, silence, unit))
-        for node in last.numbers[:, last.right[place[silence]]].tolist():
-            builder.final(node, leave + (0.0 if unit == silence else _language_score(hmm, unit, silence)))
+        begin = hmm.config.insertion if unit == silence else _language_score(hmm, silence, unit)
+        builder.initial.update(dict.fromkeys(first.numbers[first.left[place[silence]]].tolist(), begin))
+        end = leave + (0.0 if unit == silence else _language_score(hmm, unit, silence))
+        builder.final.update(dict.fromkeys(last.numbers[:, last.right[place[silence]]].tolist(), end))
 
 
 def _language_score(hmm: JointHmm, unit: str, following: str) -> float:
@@ -193,48 +190,24 @@ def _advance(builder: NetworkBuilder, source: _StateNodes, target: _StateNodes, 
             builder.arc(int(source.numbers[left, right]), int(target.numbers[left_after, right_after]), log_move)
 
 
-@dataclass(frozen=True, eq=False)
-class JointRecogniser:
-    """Recogniser that searches the loop of all units that occurred in training, in context, with the back-off bigram.
+def recognise_units(hmm: JointHmm, observed: StreamObservations) -> list[RecognisedUnit]:
+    """Return the likeliest of all sequences of units that occurred in training, in context, with the back-off bigram.
 
     The search is exact, whether trees of acoustic streams ask about one neighbour or both. Where units have one state,
     a unit spoken twice in a row is recognised once.
-    Raises InputError: the weight of motion is not 0.
+    Raises InputError: no active stream. Raises AlignmentError: too few frames.
     Source: Hofer 2008, Eq. 5.
     """
+    weights, context_loop = hmm.config.recognition, build_context_loop(hmm)
+    streams = hmm.standardise(observed, weights)
 
-    hmm: JointHmm
-    weights: StreamWeights | None = None
+    def log_density(first: int, end: int, _: NDArray[np.intp] | None) -> NDArray[np.float32]:
+        rows = {name: stream[first:end] for name, stream in streams.items()}
+        return hmm.log_density(rows, context_loop.leaves, weights).astype(np.float32)
 
-    def __post_init__(self) -> None:
-        if MOTION in self._weights.active:
-            raise InputError("recognition uses no motion: give the stream motion the weight 0")
-
-    @property
-    def _weights(self) -> StreamWeights:
-        return self.weights or self.hmm.config.recognition
-
-    @cached_property
-    def _loop(self) -> ContextLoop:
-        return build_context_loop(self.hmm)
-
-    def recognise(self, observed: StreamObservations) -> list[RecognisedUnit]:
-        """Return the likeliest units. Raises InputError: no active stream. Raises AlignmentError: too few frames."""
-        streams = self.hmm.standardise(observed, self._weights)
-
-        def log_density(first: int, end: int, _: NDArray[np.intp] | None) -> NDArray[np.float32]:
-            rows = {name: stream[first:end] for name, stream in streams.items()}
-            return self.hmm.log_density(rows, self._loop.leaves, self._weights).astype(np.float32)
-
-        loop = self._loop.network
-        units, starts = decode_path(loop, loop.network.best_path(LogLikelihoods(observed.frames, log_density)))
-        return [RecognisedUnit(unit, int(first)) for unit, first in zip(units, starts[:-1], strict=True)]
-
-
-@lru_cache(maxsize=4)
-def build_recogniser(hmm: JointHmm) -> JointRecogniser:
-    """Return the recogniser of a model; the last few recognisers, with their networks, are cached."""
-    return JointRecogniser(hmm)
+    loop = context_loop.network
+    units, starts = decode_path(loop, loop.network.best_path(LogLikelihoods(observed.frames, log_density)))
+    return [RecognisedUnit(unit, int(first)) for unit, first in zip(units, starts[:-1], strict=True)]
 
 
 Array = NDArray[np.float64]
@@ -267,15 +240,12 @@ class FrameDensities:
 
 
 def select_densities(hmm: JointHmm, path: StatePath) -> FrameDensities:
-    """Return the densities of motion along a path of states. Raises InputError: no motion, or its weight is 0."""
-    weight = hmm.config.synthesis.motion
-    if MOTION not in hmm.models or not weight:
-        raise InputError("the model has no motion, or it is switched off in synthesis; train on recordings with a face")
+    """Return the densities of motion along a path of states."""
     model = hmm.models[MOTION]
     mixtures, deviation = model.tied.mixtures, model.scale.deviation
     G, M, D = mixtures.size
     means = (mixtures.means * deviation + model.scale.mean).reshape(G, M, 3, D // 3)
-    precisions = (weight / (mixtures.variances * deviation**2)).reshape(G, M, 3, D // 3)
+    precisions = (1 / (mixtures.variances * deviation**2)).reshape(G, M, 3, D // 3)
     chosen = model.forest.leaves(path.states.triphones)[path.frames]
     precisions = precisions[chosen]
     precisions[[0, -1], :, 1:] = 0  # Δ and Δ² of the first and last frame count for nothing

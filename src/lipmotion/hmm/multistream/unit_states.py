@@ -25,7 +25,7 @@ class Inventory:
 
     free   : the silent ones, whose sound depends on no neighbour; as neighbours, all are represented by the first
     states : number of states of a unit, left to right without skips; silent units but the first have one
-    Raises InputError: no silent unit, one that is no unit, a unit named twice or with a space, or no state.
+    Raises InputError: no silent unit, one that is no unit, or a unit named twice or with a space.
     """
 
     names: tuple[str, ...]
@@ -37,8 +37,6 @@ class Inventory:
             raise InputError(f"silent units {' '.join(self.free)!r}; required one or more of {' '.join(self.names)!r}")
         if len(set(self.names)) < len(self.names) or any(len(name.split()) != 1 for name in self.names):
             raise InputError(f"units {self.names}; required different names without spaces")
-        if self.states < 1:
-            raise InputError(f"{self.states} states a unit, required one or more")
 
     @property
     def silence(self) -> str:

@@ -62,14 +62,14 @@ class AnalysedAudio(Audio):
     @cached_property
     def passages(self) -> tuple[Passage, ...]:
         """The passages of the recording, in order; none where nothing can be said in it."""
-        found = [(piece, stretch) for piece in self._pieces for stretch in piece.passages]
-        stretches = [Stretch(piece.frame + first, piece.frame + end) for piece, (first, end) in found]
+        places = [(piece, stretch) for piece in self._pieces for stretch in piece.passages]
+        stretches = [Stretch(piece.frame + first, piece.frame + end) for piece, (first, end) in places]
         bounds = [0, *((before.end + after.first) // 2 for before, after in pairwise(stretches)), self.frames]
         passages = []
-        sounds = {id(piece): _LevelledPiece(piece.samples) for piece, _ in found}
-        windows = {id(piece): WindowedEncoding(sounds[id(piece)].read, len(piece.samples)) for piece, _ in found}
-        room = np.zeros(sum(end - first + 2 * SILENT_FRAMES for _, (first, end) in found) * HOP, np.float32)
-        for number, (piece, (first, end)) in enumerate(found):
+        sounds = {id(piece): _LevelledPiece(piece.samples) for piece, _ in places}
+        windows = {id(piece): WindowedEncoding(sounds[id(piece)].read, len(piece.samples)) for piece, _ in places}
+        room = np.zeros(sum(end - first + 2 * SILENT_FRAMES for _, (first, end) in places) * HOP, np.float32)
+        for number, (piece, (first, end)) in enumerate(places):
             level, samples = piece.energy[first:end], piece.samples[first * HOP : end * HOP]
             gain = find_passage_gain(level)
             samples = apply_gain(fill_gaps(samples, level), np.arange(len(gain)), gain)
@@ -87,14 +87,14 @@ class AnalysedAudio(Audio):
     @property
     def tones(self) -> list[Stretch]:
         """Where a steady tone covers what is said; its frames count as silence."""
-        found = {Stretch(each.frame + first, each.frame + end) for each in self._pieces for first, end in each.tones}
-        return sorted(found)
+        tones = {Stretch(each.frame + first, each.frame + end) for each in self._pieces for first, end in each.tones}
+        return sorted(tones)
 
     @property
     def between_silences(self) -> list[tuple[int, AnalysedAudio]]:
         """What lies between digital silences, as far as something may be said in it: its first frame, and its sound."""
         pieces = [piece for piece in self._pieces if piece.passages]
-        return [(each.frame, _Stretch(each.samples, self.rate_hz, whole=self, first=each.frame)) for each in pieces]
+        return [(each.frame, _Stretch(each.samples, self.rate_hz, recording=self, first=each.frame)) for each in pieces]
 
     @cached_property
     def _pieces(self) -> list[_Piece]:
@@ -128,8 +128,8 @@ class AnalysedAudio(Audio):
                 frame = min((start + HOP // 2) // HOP, self.frames - len(energy))
                 pieces.append(_Piece(frame, samples, energy, passages, tones))
         levels = [average_power(piece.energy).max() if piece.passages else -np.inf for piece in pieces]
-        least = max(levels, default=0) - SOFTEST_DROP
-        return [piece for piece, level in zip(pieces, levels, strict=True) if level >= least or piece.tones]
+        softest = max(levels, default=0) - SOFTEST_DROP
+        return [piece for piece, level in zip(pieces, levels, strict=True) if level >= softest or piece.tones]
 
     @property
     def is_passage(self) -> bool:
@@ -218,7 +218,7 @@ class AnalysedAudio(Audio):
 
     def stretch(self, first: int, stop: int) -> AnalysedAudio:
         """Return some frames of the recording, with the features that they have in the whole."""
-        return _Stretch(self.samples[first * HOP : stop * HOP], self.rate_hz, whole=self, first=first)
+        return _Stretch(self.samples[first * HOP : stop * HOP], self.rate_hz, recording=self, first=first)
 
 
 class Passage(NamedTuple):
@@ -323,8 +323,8 @@ class _PassageAudio(AnalysedAudio):
         return np.concatenate([np.repeat(silence, self.lead, axis=0), rows, np.repeat(silence, self.tail, axis=0)])
 
     def _new_mfcc(self, warps: Sequence[float]) -> list[Features]:
-        found = mfcc_of_warps(self.sound, warps, self._energy)
-        return [Features(self._with_silence(each.values), self.duration_s) for each in found]
+        features = mfcc_of_warps(self.sound, warps, self._energy)
+        return [Features(self._with_silence(each.values), self.duration_s) for each in features]
 
     @cached_property
     def log_energy(self) -> NDArray[np.float32]:
@@ -349,9 +349,9 @@ class _PassageAudio(AnalysedAudio):
 
 @dataclass(frozen=True, eq=False)
 class _Stretch(AnalysedAudio):
-    """Frames of a recording, from ``first`` on, whose features are those of the whole: normalised as these."""
+    """Frames of a recording, from ``first`` on, whose features are those of the recording: normalised as these."""
 
-    whole: AnalysedAudio = field(default=None, repr=False, kw_only=True)  # type: ignore[assignment]
+    recording: AnalysedAudio = field(default=None, repr=False, kw_only=True)  # type: ignore[assignment]
     first: int = field(default=0, kw_only=True)
 
     @property
@@ -359,11 +359,11 @@ class _Stretch(AnalysedAudio):
         return (Passage(0, slice(0, self.frames), self),)
 
     def mfcc_of_warps(self, warps: Sequence[float]) -> list[Features]:
-        self.whole.mfcc_of_warps(warps)  # the spectra are computed once for all
+        self.recording.mfcc_of_warps(warps)  # the spectra are computed once for all
         return super().mfcc_of_warps(warps)
 
     def joined(self, of_passage: Callable[[AnalysedAudio], NDArray[Any]], _: float | None = None) -> NDArray[Any]:
-        return of_passage(self.whole)[self.first : self.first + len(self.samples) // HOP + 1]
+        return of_passage(self.recording)[self.first : self.first + len(self.samples) // HOP + 1]
 
 
 def analysed(audio: Audio, features: Features | None = None) -> AnalysedAudio:

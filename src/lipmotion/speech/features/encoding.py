@@ -40,11 +40,10 @@ class WindowedEncoding:
 
     read    : returns the samples of the recording from one to before another, at the level of all passages
     samples : their number
-    encoder : the network; None: that of the package
     """
 
-    def __init__(self, read: Callable[[int, int], Array], samples: int, encoder: Encoder | None = None) -> None:
-        self._read, self._samples, self._encoder = read, samples, encoder or load_encoder()
+    def __init__(self, read: Callable[[int, int], Array], samples: int) -> None:
+        self._read, self._samples, self._encoder = read, samples, load_encoder()
         self._windows: dict[int, Array] = {}
 
     def rows(self, first: int, stop: int) -> NDArray[np.float16]:
@@ -101,7 +100,9 @@ def encode_window(log_mel: Array, encoder: Encoder) -> Array:
         padded = np.pad(x, ((1, 1), (0, 0)))
         columns = [padded[first : first + len(x) : stride] for first in range(3)]
         x = _gelu(np.concatenate(columns, axis=1) @ kernel + bias)
-    x += _positions(x.shape[1])
+    half = x.shape[1] // 2  # what tells the network where in its window a row is: Vaswani et al. 2017, §3.5
+    angles = np.arange(len(x))[:, None] * np.exp(-np.log(10_000) / (half - 1) * np.arange(half))
+    x += np.concatenate([np.sin(angles), np.cos(angles)], axis=1).astype(np.float32)
     for (attend, attend_bias), (merge, merge_bias), (widen, widen_bias), (narrow, narrow_bias) in encoder.layers:
         queries, keys, values = np.split(_standardise(x) @ attend + attend_bias, 3, axis=1)
         q, k, v = (part.reshape(len(x), HEADS, -1).swapaxes(0, 1) for part in (queries, keys, values))
@@ -132,13 +133,6 @@ def _standardise(x: Array) -> Array:
     centred = x - x.mean(axis=1, keepdims=True)
     result: Array = centred / np.sqrt(np.square(centred).mean(axis=1, keepdims=True) + np.float32(1e-5))
     return result
-
-
-@cache
-def _positions(size: int) -> Array:
-    """Return what tells the network where in its window a row is [shape=(400, size)]: Vaswani et al. 2017, §3.5."""
-    angles = np.arange(WINDOW_ROWS)[:, None] * np.exp(-np.log(10_000) / (size // 2 - 1) * np.arange(size // 2))
-    return np.concatenate([np.sin(angles), np.cos(angles)], axis=1).astype(np.float32)
 
 
 Linear = tuple[Array, Array]

@@ -22,14 +22,12 @@ from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.types import Audio, Prosody
 
 LOWEST_HZ, HIGHEST_HZ = 60.0, 400.0
-"""The range of F0 that is searched."""
 BLOCK = 1024
 """Frames searched at a time: memory stays bounded for any length."""
 
 UNVOICED_COST = 0.52
 """Cost of an unvoiced frame; a voiced one costs 1 − its correlation, weighted."""
 VOICING_CHANGE_COST = 0.25
-"""Cost of a change from voiced to unvoiced, or back."""
 JUMP_COST = 0.4
 """Cost of a change of F0 by a factor of e; an octave costs 0.28."""
 LONG_LAG_SHARE = 0.2
@@ -40,8 +38,7 @@ FRICATION_SHARE = 1e-3
 """Share of the power of the full signal's slope that is added too: the low frequencies of an s may seem periodic."""
 ROUNDING_POWER = 1e-10
 """Power that is added too, as a share of that of the highest sample: a constant's rounding error has a period."""
-CANDIDATES = 4
-"""Lags considered in a frame."""
+CANDIDATES = 4  # lags considered in a frame
 
 _STEP = 4  # samples at 16 kHz for one of the low-passed signal
 _RATE_HZ = SPEECH_RATE_HZ // _STEP
@@ -63,7 +60,13 @@ def log_f0(audio: Audio) -> Floats:
     Raises InputError: as ``speech.features.mfcc`` says.
     """
     samples = check_samples(audio)
-    silence = SILENCE_POWER * _loudness(samples) + ROUNDING_POWER * float(max(samples.max(), -samples.min())) ** 2
+    power, square = 0.0, 0.0  # of frames, each weighted by itself: pauses count little, a click does not count much
+    for start in range(0, len(samples) // HOP + 1, BLOCK):
+        low = _filter_low(samples, start * HOP, min(BLOCK, len(samples) // HOP + 1 - start))
+        powers = np.square(low).reshape(-1, _HOP).mean(axis=1).astype(np.float64)
+        power, square = power + powers.sum(), square + np.square(powers).sum()
+    silence = SILENCE_POWER * (square / power if power else 0.0)
+    silence += ROUNDING_POWER * float(max(samples.max(), -samples.min())) ** 2
     frames = frame_count(samples)
     pitch = np.empty((CANDIDATES + 1, frames), np.float32)
     pointers = np.empty((frames, CANDIDATES + 1), np.uint8)
@@ -134,16 +137,6 @@ def candidates(correlation: Floats) -> tuple[Floats, Floats]:
 def _weigh_lag(lag: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the weight of the correlation at a lag (``LONG_LAG_SHARE``)."""
     return 1 - LONG_LAG_SHARE * lag * LOWEST_HZ / _RATE_HZ
-
-
-def _loudness(samples: Floats) -> float:
-    """Return the mean power of frames, each weighted by its power: pauses count little, a click does not count much."""
-    power, square = 0.0, 0.0
-    for start in range(0, len(samples) // HOP + 1, BLOCK):
-        low = _filter_low(samples, start * HOP, min(BLOCK, len(samples) // HOP + 1 - start))
-        frames = np.square(low).reshape(-1, _HOP).mean(axis=1).astype(np.float64)
-        power, square = power + frames.sum(), square + np.square(frames).sum()
-    return square / power if power else 0.0
 
 
 def _filter_low(samples: Floats, first: int, hops: int) -> Floats:

@@ -37,7 +37,8 @@ EDGE_FRAMES = 5
 VOICED_SHARES = (0.15, 0.75)
 """Share of the frames of a bout that is voiced; with less it is a cough, or clicks of tongue or teeth."""
 WEIGHTS = (14.8, 0.122, -7.09, -2.93, 3.85, -16.5)
-"""The log odds of laughter: the sum of these times likeness, depth, voiced share, voiced gaps, log calls, and 1."""
+"""The log odds of laughter: the sum of these times the mean correlation of the spectra of successive calls, how far the
+level falls between them, the voiced share, that of the quietest frames between them, the log number of calls, and 1."""
 MIN_PROBABILITY = 0.7
 
 
@@ -70,26 +71,6 @@ def _find_fall(heights: Curve, lowest: Curve) -> Curve:
         falls.append(fall)
         higher.append((height, fall))
     return np.array(falls)
-
-
-def _rate_laughter(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, calls: list[int], run: slice) -> float:
-    """Return the probability that a run of calls is laughter; 0: its voiced share is not that of laughter.
-
-    ``WEIGHTS`` weigh the mean correlation of the spectra of successive calls; how far the level falls between them, in
-    decibels; the voiced share; that of the gaps where they are quietest; the log number of calls.
-    """
-    share = float(voiced[run].mean())
-    if not VOICED_SHARES[0] <= share <= VOICED_SHARES[1]:
-        return 0.0
-    quietest = [before + int(level_db[before:after].argmin()) for before, after in pairwise(calls)]
-    peaks = level_db[calls]
-    depth = np.mean(np.minimum(peaks[1:], peaks[:-1]) - level_db[quietest])
-    spectra = _bands(audio, run)[np.array(calls) - run.start].astype(np.float64)
-    spectra -= spectra.mean(axis=1, keepdims=True)
-    spectra /= np.maximum(np.linalg.norm(spectra, axis=1, keepdims=True), 1e-9)
-    likeness = (spectra[1:] * spectra[:-1]).sum(axis=1).mean()
-    figures = [likeness, depth, share, voiced[quietest].mean(), np.log(len(calls)), 1.0]
-    return float(1 / (1 + np.exp(-np.dot(WEIGHTS, figures))))
 
 
 SMOOTHING_FRAMES = 2.0
@@ -142,24 +123,24 @@ def find_voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, 
     audio : at 16 kHz
     Raises InputError: as ``speech.features.mfcc`` says.
     """
-    found, judged = list[VoiceEvent](), list[tuple[float, float, tuple[float, float, float]]]()
+    detected, judged = list[VoiceEvent](), list[tuple[float, float, tuple[float, float, float]]]()
     for first, sound in analysed(audio).between_silences:
         at_s = first / FRAME_RATE_HZ
-        said = units.between(at_s, at_s + sound.duration_s)
+        phones = units.between(at_s, at_s + sound.duration_s)
         level_db = _smooth(analysed(sound).log_energy.astype(np.float64) * DB)
         pitch = log_f0(sound).astype(np.float64) * 12 / np.log(2)  # semitones
         voiced = np.isfinite(pitch)
-        laughs = tuple(_laughs(sound, level_db, voiced, said))
+        laughs = tuple(_laughs(sound, level_db, voiced, phones))
         phrases = [
             phrase
-            for phrase in _phrases(said)
+            for phrase in _phrases(phones)
             if not any(_find_overlap(phrase, (laugh.start_s, laugh.end_s)) > 0 for laugh in laughs)
         ]
-        events = *laughs, *_breaths(sound, level_db, voiced, said), *_whispers(level_db, voiced, phrases)
-        found += [event.shifted(at_s) for event in events]
+        events = *laughs, *_breaths(sound, level_db, voiced, phones), *_whispers(level_db, voiced, phrases)
+        detected += [event.shifted(at_s) for event in events]
         efforts = _efforts(sound, level_db, pitch, phrases)
         judged += [(start_s + at_s, end_s + at_s, effort) for (start_s, end_s), effort in efforts]
-    return tuple(sorted([*found, *_shouts(judged)], key=lambda event: event.start_s))
+    return tuple(sorted([*detected, *_shouts(judged)], key=lambda event: event.start_s))
 
 
 def silence_units(units: Timeline[Unit], others: Sequence[tuple[float, float]]) -> Timeline[Unit]:
@@ -197,36 +178,46 @@ def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeli
         if len(calls) < MIN_CALLS:
             continue
         first, end = max(int(calls[0]) - EDGE_FRAMES, 0), min(int(calls[-1]) + EDGE_FRAMES + 1, len(level_db))
-        probability = _rate_laughter(audio, level_db, voiced, calls.tolist(), slice(first, end))
+        share, levels = float(voiced[first:end].mean()), level_db[calls]
+        if not VOICED_SHARES[0] <= share <= VOICED_SHARES[1]:
+            continue
+        quietest = [before + int(level_db[before:after].argmin()) for before, after in pairwise(calls.tolist())]
+        depth_db = np.mean(np.minimum(levels[1:], levels[:-1]) - level_db[quietest])
+        spectra = _bands(audio, slice(first, end))[calls - first].astype(np.float64)
+        spectra -= spectra.mean(axis=1, keepdims=True)
+        spectra /= np.maximum(np.linalg.norm(spectra, axis=1, keepdims=True), 1e-9)
+        likeness = (spectra[1:] * spectra[:-1]).sum(axis=1).mean()
+        figures = [likeness, depth_db, share, voiced[quietest].mean(), np.log(len(calls)), 1.0]
+        probability = float(1 / (1 + np.exp(-np.dot(WEIGHTS, figures))))
         start_s, end_s = first / FRAME_RATE_HZ, end / FRAME_RATE_HZ
         word_s = sum(_find_overlap((span.start_s, span.end_s), (start_s, end_s)) for span in words)
         if probability >= MIN_PROBABILITY and word_s <= MAX_WORD_SHARE * (end_s - start_s):
-            loudness = 2 ** ((level_db[calls] - level_db[calls].max()) / 10)
+            loudness = 2 ** ((levels - levels.max()) / 10)
             timed_calls = zip((calls / FRAME_RATE_HZ).tolist(), loudness.tolist(), strict=True)
             yield VoiceEvent(start_s, end_s, LAUGHTER, probability, tuple(timed_calls))
 
 
 def _phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
     """Return start and end, in seconds, of the phrases that are long enough to be judged."""
-    found: list[tuple[float, float, float, int]] = []
+    phrases: list[tuple[float, float, float, int]] = []
     for span in units:
         if is_silent(span.label.phone):
             continue
         vowel = int(span.label.phone in VOWELS)
-        if found and span.start_s - found[-1][1] < PHRASE_PAUSE_S:
-            start_s, _, said_s, vowels = found[-1]
-            found[-1] = start_s, span.end_s, said_s + span.duration_s, vowels + vowel
+        if phrases and span.start_s - phrases[-1][1] < PHRASE_PAUSE_S:
+            start_s, _, said_s, vowels = phrases[-1]
+            phrases[-1] = start_s, span.end_s, said_s + span.duration_s, vowels + vowel
         else:
-            found.append((span.start_s, span.end_s, span.duration_s, vowel))
-    return [each[:2] for each in found if each[2] >= MIN_PHRASE_S and each[3] >= MIN_VOWELS]
+            phrases.append((span.start_s, span.end_s, span.duration_s, vowel))
+    return [each[:2] for each in phrases if each[2] >= MIN_PHRASE_S and each[3] >= MIN_VOWELS]
 
 
 def _whispers(level_db: Curve, voiced: Voiced, phrases: Sequence[tuple[float, float]]) -> Iterator[VoiceEvent]:
-    quiet_db, most_db = np.percentile(_select_heard(level_db), (10, 99))
+    quiet_db, loud_db = np.percentile(_select_heard(level_db), (10, 99))
     for start_s, end_s in phrases:
         frames = _frames(start_s, end_s)
         middle_db, loudest_db = np.percentile(level_db[frames], (50, 95)) if len(level_db[frames]) else (quiet_db,) * 2
-        if loudest_db - quiet_db < MIN_SNR_DB or middle_db - most_db < -BELOW_LOUDEST_DB:
+        if loudest_db - quiet_db < MIN_SNR_DB or middle_db - loud_db < -BELOW_LOUDEST_DB:
             continue
         share = float(voiced[frames][level_db[frames] > loudest_db - LOUD_DB].mean())
         strength = _risen(-share, (-WHISPERED_SHARES[1], -WHISPERED_SHARES[0]))
@@ -295,8 +286,8 @@ def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, i
     centres, starts = find_centres(), range(0, len(bands), BLOCK_FRAMES)
     low, middle, high, bright = (
         np.concatenate([np.exp(bands[n : n + BLOCK_FRAMES, inside].astype(np.float64)).mean(axis=1) for n in starts])
-        for least, most in ((0, 1000), (1000, 3500), (3500, 7600), (1000, np.inf))
-        for inside in [(centres >= least) & (centres < most)]
+        for lowest_hz, highest_hz in ((0, 1000), (1000, 3500), (3500, 7600), (1000, np.inf))
+        for inside in [(centres >= lowest_hz) & (centres < highest_hz)]
     )
     level = _smooth(DB * np.log(bright))
     reach = round(QUIET_REACH_S * FRAME_RATE_HZ)

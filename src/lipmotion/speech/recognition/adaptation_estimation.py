@@ -83,20 +83,14 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
         plain = np.arange(len(own.log_stay), dtype=np.intp)
         prior = create_prior(own.mixtures, plain).times(SHORT_RELEVANCE if short else OWN_RELEVANCE)
         matrix = _improved(combined.hmm.mixtures, prior, own_features, densities, adaptation.own, free)
-        streams = _improve_general(general_features, combined.columns[densities], adaptation.general)
-        adaptation = replace(adaptation, own=matrix, general=streams)
+        streams, columns = [], combined.columns[densities]
+        for number, (stream, transform) in enumerate(zip(STREAMS, adaptation.general, strict=True)):
+            mixtures, features = load_general().mixtures(number), general_features[:, stream]
+            prior = create_prior(mixtures, np.arange(mixtures.size[0])).times(GENERAL_RELEVANCE)
+            everything = np.ones(transform.shape, bool)
+            streams.append(_improved(mixtures, prior, features, columns, transform, everything))
+        adaptation = replace(adaptation, own=matrix, general=np.stack(streams))
     return EstimatedAdaptation(adaptation, speech_s)
-
-
-def _improve_general(features: NDArray[np.float32], densities: NDArray[np.intp], transforms: Array) -> Array:
-    """Return the transform of each stream of the general models [shape=(3, 13, 14)], improved."""
-    streams = []
-    for number, (stream, transform) in enumerate(zip(STREAMS, transforms, strict=True)):
-        mixtures = load_general().mixtures(number)
-        prior = create_prior(mixtures, np.arange(mixtures.size[0])).times(GENERAL_RELEVANCE)
-        free = np.ones(transform.shape, bool)
-        streams.append(_improved(mixtures, prior, features[:, stream], densities, transform, free))
-    return np.stack(streams)
 
 
 def _improved(

@@ -129,7 +129,14 @@ def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArr
         heard, idle, wrong = label_evidence(log_posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units)
         loud_s = np.flatnonzero(find_loud_frames(audio.log_energy)) / FRAME_RATE_HZ
         loud = _join([(at_s, at_s + 1 / FRAME_RATE_HZ) for at_s in loud_s])
-        missing = tuple(_find_unlabelled(stretch, spoken, loud) for stretch in heard)
+        unlabelled = list[Place]()
+        for start_s, end_s in heard:  # all the sound around it, as far as no phone is given
+            before_s = max((span.end_s for span in spoken if span.end_s <= start_s), default=0.0)
+            after_s = min((span.start_s for span in spoken if span.start_s >= end_s), default=np.inf)
+            around = [each for each in loud if each[0] < end_s and each[1] > start_s] or [(start_s, end_s)]
+            first_s, last_s = min(around[0][0], start_s), max(around[-1][1], end_s)
+            unlabelled.append((max(first_s, before_s), min(last_s, after_s)))
+        missing = tuple(unlabelled)
     else:
         quiet = find_quiet_frames(audio.log_energy)
         silent = _join([(span.start_s, span.end_s) for span in spoken if quiet[_frames_of(span)].all()])
@@ -137,15 +144,6 @@ def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArr
         missing, wrong = measure_fit(audio, units).missing, ()
     speech_s = sum(span.duration_s for span in spoken) + sum(end_s - start_s for start_s, end_s in missing)
     return TranscriptFit(0.0, missing, speech_s, None, idle, wrong)
-
-
-def _find_unlabelled(stretch: Place, spoken: list[Span[Unit]], loud: tuple[Place, ...]) -> Place:
-    """Return all the sound around a stretch in which phones are heard, as far as no phone is given."""
-    start_s, end_s = stretch
-    before_s = max((span.end_s for span in spoken if span.end_s <= start_s), default=0.0)
-    after_s = min((span.start_s for span in spoken if span.start_s >= end_s), default=np.inf)
-    around = [each for each in loud if each[0] < end_s and each[1] > start_s] or [stretch]
-    return max(min(around[0][0], start_s), before_s), min(max(around[-1][1], end_s), after_s)
 
 
 def _join(places: list[Place]) -> tuple[Place, ...]:

@@ -212,7 +212,12 @@ def align_within(
     badly even so, the words of a recording of up to ``FREE_FRAMES`` are aligned without times; if they fit better then,
     the times are not used. What fits badly in the end is logged as a warning.
     """
-    placed, windows, tolerance_s = _place_words(anchors, anchors.tolerance_s, min_frames, edge, frames, search)
+
+    def place_words(tolerance_s: NDArray[np.float64]) -> tuple[list[PlacedWord], Windows, NDArray[np.float64]]:
+        windows, tolerance_s = find_windows(anchors, tolerance_s, min_frames, edge, frames)
+        return search(windows), windows, tolerance_s
+
+    placed, windows, tolerance_s = place_words(anchors.tolerance_s)
     for factor in WIDENING_FACTORS:
         fits = average_fits(placed, anchors.groups, frames)
         wider_s = np.maximum(factor * anchors.tolerance_s, tolerance_s)
@@ -221,15 +226,13 @@ def align_within(
         doubted &= np.isin(np.arange(len(fits)), anchors.groups[tolerance_s < wider_s])
         if not doubted.any():
             break
-        wide_s = np.where(doubted[anchors.groups], wider_s, tolerance_s)
-        wide = _place_words(anchors, wide_s, min_frames, edge, frames, search)
+        wide = place_words(np.where(doubted[anchors.groups], wider_s, tolerance_s))
         gain = average_fits(wide[0], anchors.groups, frames) - fits
         better = doubted & (np.maximum(gain, _average_neighbours(gain)) >= MIN_IMPROVEMENT)
         if (better == doubted).all():
             placed, windows, tolerance_s = wide
         elif better.any():
-            mixed_s = np.where(better[anchors.groups], wider_s, tolerance_s)
-            placed, windows, tolerance_s = _place_words(anchors, mixed_s, min_frames, edge, frames, search)
+            placed, windows, tolerance_s = place_words(np.where(better[anchors.groups], wider_s, tolerance_s))
     free = _align_freely(placed, anchors, frames, search)
     if free is not None:
         return free
@@ -242,19 +245,6 @@ def align_within(
             *(len(wrong), len(last_fits), float(known[-1]) if len(known) else 0.0),
         )
     return placed, windows
-
-
-def _place_words(
-    anchors: Anchors,
-    tolerance_s: NDArray[np.float64],
-    min_frames: NDArray[np.intp],
-    edge: int,
-    frames: int,
-    search: Callable[[Windows], list[PlacedWord]],
-) -> tuple[list[PlacedWord], Windows, NDArray[np.float64]]:
-    """Return words aligned within windows that have room, these windows, and their tolerances."""
-    windows, tolerance_s = find_windows(anchors, tolerance_s, min_frames, edge, frames)
-    return search(windows), windows, tolerance_s
 
 
 def _align_freely(
@@ -277,9 +267,3 @@ def _average_neighbours(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean of each value and those beside it."""
     count = np.convolve(np.ones(len(values)), np.ones(3))[1:-1]
     return np.convolve(values, np.ones(3))[1:-1] / count
-
-
-def count_min_frames(words: Sequence[Sequence[Sequence[str]]], counts: dict[str, int]) -> NDArray[np.intp]:
-    """Return the fewest frames of each word, given its pronunciations: the states of the shortest."""
-    of_words = {id(word): min(sum(counts[unit] for unit in variant) for variant in word) for word in words}
-    return np.array([of_words[id(word)] for word in words], np.intp)

@@ -27,16 +27,12 @@ STEP = 8000
 class InstalledRecogniser(NamedTuple):
     """A recogniser that users install themselves.
 
-    package  : the module to import
-    extra    : of this package, that installs it
-    variable : the environment variable that names the folder of its model
-    parts    : files or folders of a model, one of each group
-    words    : returns the lines of a recording, given the module and the folder; none in other languages than English
+    package : the module to import
+    parts   : files or folders of a model, one of each group
+    words   : returns the lines of a recording, given the module and the folder; none in other languages than English
     """
 
     package: str
-    extra: str
-    variable: str
     parts: tuple[tuple[str, ...], ...]
     words: Callable[[Any, Path, Audio], list[TranscriptLine]]
 
@@ -49,25 +45,23 @@ def recognise_words(audio: Audio, kind: str) -> TimedTranscript | None:
     ``LIPMOTION_WHISPER_MODEL`` and ``LIPMOTION_VOSK_MODEL`` name the folders of models. Nothing is ever downloaded.
     Raises MissingDependencyError: the package is not installed. Raises InputError: no model, or one it cannot read.
     """
-    recogniser = INSTALLED_RECOGNISERS[kind]
+    recogniser, variable = INSTALLED_RECOGNISERS[kind], f"LIPMOTION_{kind.upper()}_MODEL"
     os.environ.setdefault("HF_HUB_OFFLINE", "1")  # faster-whisper reads it when it is imported
     try:
         module = import_module(recogniser.package)
     except ImportError as error:
         raise MissingDependencyError(
-            f"the recogniser {kind!r} needs {recogniser.package}: {install_command(recogniser.extra)}; then "
-            f"set {recogniser.variable} to the folder of its model (docs/transcripts.md)"
+            f"the recogniser {kind!r} needs {recogniser.package}: {install_command(kind)}; then set {variable} to the "
+            "folder of its model (docs/transcripts.md)"
         ) from error
-    named = os.environ.get(recogniser.variable, "")
+    named = os.environ.get(variable, "")
     if not named:
-        raise InputError(
-            f"the recogniser {kind!r} needs a model: set {recogniser.variable} to its folder (docs/transcripts.md)"
-        )
+        raise InputError(f"the recogniser {kind!r} needs a model: set {variable} to its folder (docs/transcripts.md)")
     folder = Path(named)
     missing = [group for group in recogniser.parts if not any((folder / name).exists() for name in group)]
     if missing:
         raise InputError(
-            f"{shorten(named)} ({recogniser.variable}): is no model of {kind}, required a folder with "
+            f"{shorten(named)} ({variable}): is no model of {kind}, required a folder with "
             f"{' or '.join(missing[0])}; see docs/transcripts.md"
         )
     transcript = sort_lines(recogniser.words(module, folder, audio))
@@ -130,11 +124,9 @@ def _load_vosk(module: Any, folder: str) -> Any:
 INSTALLED_RECOGNISERS = {
     "whisper": InstalledRecogniser(
         "faster_whisper",
-        "whisper",
-        "LIPMOTION_WHISPER_MODEL",
         (("model.bin",), ("tokenizer.json",)),  # without a tokenizer in the folder it would be fetched
         _transcribe_whisper,
     ),
-    "vosk": InstalledRecogniser("vosk", "vosk", "LIPMOTION_VOSK_MODEL", (("am", "final.mdl"),), _transcribe_vosk),
+    "vosk": InstalledRecogniser("vosk", (("am", "final.mdl"),), _transcribe_vosk),
 }
-"""By the name that ``--recogniser`` has for each."""
+"""By the name that ``--recogniser`` has for each, and the extra of this package that installs it."""

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
-from lipmotion.hmm.align import align_states, choose_pronunciations
+from lipmotion.hmm.align import align_states, place_words
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.hmm.network import penalise_silence, wrap_log_likelihoods
+from lipmotion.hmm.network import penalise, wrap_log_likelihoods
 from lipmotion.speech.features.analysed_audio import SILENT_ENERGY, Passage
 from lipmotion.speech.features.speaker_similarity import SpeakerSimilarity
 from lipmotion.speech.recognition.general import NOISES
@@ -72,7 +72,7 @@ def align_recognised_words(
     values : log likelihoods of the stretch [shape=(N, G)]
     loud   : frames that are too loud for silence [shape=(N,)]
     """
-    log_likelihoods = penalise_silence(hmm, wrap_log_likelihoods(values), loud)
+    log_likelihoods = penalise(hmm, wrap_log_likelihoods(values), loud, silent=True)
     modelled = [unit for unit in hmm.table.units if not is_silent(unit)]
     variants = {word: lexicon.pronunciations(word) for word in set(words)}
     units = {
@@ -80,7 +80,8 @@ def align_recognised_words(
         for word, of_word in variants.items()
     }
     try:
-        spoken = choose_pronunciations(hmm, log_likelihoods, [units[word] for word in words], PAUSE)
+        placed = place_words(hmm, log_likelihoods, [units[word] for word in words], PAUSE)
+        spoken = [item.spoken for item in placed]
         sequence = [unit for item in spoken for unit in item.units]
         states, path = align_states(hmm, log_likelihoods, sequence)
     except AlignmentError:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import groupby
 
@@ -14,14 +14,7 @@ from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.align import PlacedWord, SpokenWord, align_units, place_words, spread_windows
 from lipmotion.hmm.loudness import find_loud_frames, find_quiet_frames
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.hmm.network import (
-    LogLikelihoods,
-    UnitLoop,
-    build_unit_loop,
-    compute_log_likelihoods,
-    penalise_silence,
-    penalise_speech,
-)
+from lipmotion.hmm.network import LogLikelihoods, UnitLoop, build_unit_loop, compute_log_likelihoods, penalise
 from lipmotion.kernels.paths import Windows
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.speaker_similarity import (
@@ -31,7 +24,7 @@ from lipmotion.speech.features.speaker_similarity import (
     speaker_similarity,
 )
 from lipmotion.speech.recognition.adaptation import Adaptation
-from lipmotion.speech.recognition.anchors import Anchors, align_within, count_min_frames
+from lipmotion.speech.recognition.anchors import Anchors, align_within
 from lipmotion.speech.recognition.general import CombinedPhones, combine_likelihoods, combine_phones
 from lipmotion.speech.recognition.network.posteriors import (
     PosteriorStretch,
@@ -77,6 +70,7 @@ alone then. With 20 clips of GRID that raises ACC of opening on the validation l
 from 0.806 to 0.841 (transcripts)."""
 
 
+@dataclass(frozen=True, eq=False)
 class Recogniser:
     """Forced alignment and recognition with a model's own phone models and those of many voices.
 
@@ -86,12 +80,13 @@ class Recogniser:
     Raises InputError: another kind.
     """
 
-    def __init__(self, own: UnitHmm, kind: str = "auto", adaptation: Adaptation | None = None):
-        if kind not in RECOGNISER_KINDS:
-            raise InputError(f"unknown recogniser {kind!r}; required one of: {', '.join(RECOGNISER_KINDS)}")
-        self.own = own
-        self.kind = kind
-        self.adaptation = adaptation
+    own: UnitHmm
+    kind: str = "auto"
+    adaptation: Adaptation | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in RECOGNISER_KINDS:
+            raise InputError(f"unknown recogniser {self.kind!r}; required one of: {', '.join(RECOGNISER_KINDS)}")
 
     def recognise(self, audio: Audio, features: Features) -> Timeline[Unit]:
         """Return the most probable phones of a recording in time: Viterbi with a back-off bigram.
@@ -136,9 +131,9 @@ class Recogniser:
         )
         network = None if known else find_network(self.kind)
         if network is not None:
-            found = find_stretches(network, audio, each)
-            if mean_posterior(found) >= WORD_POSTERIORS[0] or not english:
-                return self._network_recognition(audio, similarity, found, english=english)
+            stretches = find_stretches(network, audio, each)
+            if mean_posterior(stretches) >= WORD_POSTERIORS[0] or not english:
+                return self._network_recognition(audio, similarity, stretches, english=english)
         with_words = self.kind in USING_WORDS and not known
         spoken = begin_decoding(audio, each) if with_words else None
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
@@ -158,7 +153,7 @@ class Recogniser:
         self,
         audio: AnalysedAudio,
         similarity: SpeakerSimilarity | None,
-        found: Sequence[PosteriorStretch],
+        stretches: Sequence[PosteriorStretch],
         *,
         english: bool,
     ) -> Recognition:
@@ -167,12 +162,12 @@ class Recogniser:
         loud = find_loud_frames(audio.log_energy)
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity, aligning=english)
         if english:
-            parts, recognised = decode_network(hmm, log_likelihoods, loud, found)
+            parts, recognised = decode_network(hmm, log_likelihoods, loud, stretches)
         else:
-            parts, recognised = list_wordless(hmm, self._loop, log_likelihoods, found), []
+            parts, recognised = list_wordless(hmm, self._loop, log_likelihoods, stretches), []
         labels = splice([LabelledFrames(0, SILENCE)], parts, len(loud))
         recognition = build_recognition(labels, recognised, len(loud), features.duration_s, similarity)
-        return replace(recognition, posterior=mean_posterior(found))
+        return replace(recognition, posterior=mean_posterior(stretches))
 
     def _free_labels(self, audio: AnalysedAudio, features: Features, path: NDArray[np.intp]) -> list[LabelledFrames]:
         """Return the phones of a recording as they are recognised without words, of their best path."""
@@ -202,7 +197,7 @@ class Recogniser:
         """
         audio = analysed(audio, features)
         hmm, log_likelihoods = self._log_likelihoods(audio, aligning=True)
-        log_likelihoods = penalise_silence(hmm, log_likelihoods, find_loud_frames(audio.log_energy))
+        log_likelihoods = penalise(hmm, log_likelihoods, find_loud_frames(audio.log_energy), silent=True)
         forms_of = {word: lexicon.spoken_forms(word) for word in set(words)}
         modelled = {PAUSE, *(unit for unit in hmm.table.units if not is_silent(unit))}
         units_of = {
@@ -212,10 +207,10 @@ class Recogniser:
         spoken, bounds = _aligned(hmm, log_likelihoods, [units_of[word] for word in words], anchors)
         labels: list[tuple[str, str]] = []
         for item in spoken:
-            said = len(labels)
+            count_before = len(labels)
             form = forms_of[words[item.word]][item.variant] if item.word >= 0 else [(unit, "") for unit in item.units]
             for phone, word in form:
-                if phone != PAUSE or item.units[len(labels) - said] == PAUSE:  # else it was not made
+                if phone != PAUSE or item.units[len(labels) - count_before] == PAUSE:  # else it was not made
                     labels.append((phone, word))
         return time_phones(labels, bounds, features.duration_s)
 
@@ -280,7 +275,7 @@ class Recogniser:
             general = audio.general_features if self.adaptation is None else self.adaptation.general_features(audio)
             hmm, log_likelihoods = self.combined.hmm, combine_likelihoods(self.combined, own, weight, general)
         audio.forget_warps()
-        return hmm, penalise_speech(hmm, log_likelihoods, find_quiet_frames(audio.log_energy))
+        return hmm, penalise(hmm, log_likelihoods, find_quiet_frames(audio.log_energy), silent=False)
 
 
 def _aligned(
@@ -297,7 +292,9 @@ def _aligned(
     else:
         counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
         edge, frames = counts[hmm.table.free[0]], log_likelihoods.frames
-        placed, windows = align_within(anchors, count_min_frames(words, counts), edge, frames, search)
+        shortest = {id(word): min(sum(counts[unit] for unit in variant) for variant in word) for word in words}
+        min_frames = np.array([shortest[id(word)] for word in words], np.intp)
+        placed, windows = align_within(anchors, min_frames, edge, frames, search)
         spoken = [item.spoken for item in placed]
         of_units = spread_windows(spoken, windows, frames)
     return spoken, align_units(hmm, log_likelihoods, [unit for item in spoken for unit in item.units], of_units)
@@ -308,10 +305,8 @@ def find_network(kind: str) -> str | None:
     return find_installed_recogniser() if kind == "auto" else None
 
 
-@lru_cache(maxsize=4)
-def open_recogniser(own: UnitHmm, kind: str = "auto", adaptation: Adaptation | None = None) -> Recogniser:
-    """Return the recogniser of some models; the last four are kept, with the networks that they search."""
-    return Recogniser(own, kind, adaptation)
+open_recogniser = lru_cache(maxsize=4)(Recogniser)
+"""Returns the recogniser of some models; the last four are cached, with the networks that they search."""
 
 
 def weigh_own_model(score: float) -> float:

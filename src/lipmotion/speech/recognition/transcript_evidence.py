@@ -95,8 +95,8 @@ class TranscriptEvidence:
     @property
     def said_share(self) -> float:
         """The share of the transcript's phones whose words are said, 0 to 1; 1 without words."""
-        said, count = (sum(len(word.phones) for word in self.words if word.is_said or every) for every in (False, True))
-        return said / count if count else 1.0
+        count = sum(len(word.phones) for word in self.words)
+        return sum(len(word.phones) for word in self.words if word.is_said) / count if count else 1.0
 
     @property
     def is_doubtful(self) -> bool:

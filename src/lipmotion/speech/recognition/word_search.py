@@ -73,11 +73,11 @@ def spot_words(samples: bytes) -> tuple[FoundWord, ...]:
         decoder.start_utt()
         if samples:
             decoder.process_raw(samples, no_search=False, full_utt=True)
-        found = _segments(decoder)
+        best = _segments(decoder)
         decoder.end_utt()
         lattice = _segments(decoder)
     words = []
-    for word, start, end, _ in found:
+    for word, start, end, _ in best:
         same = (each[3] for each in lattice if each[0] == word and max(start, each[1]) <= min(end, each[2]))
         words.append(FoundWord(word, max(same, default=0.0)))
     return tuple(words)
@@ -215,7 +215,7 @@ POSTERIOR_BONUS, REACH_FRAMES = 30.0, 4
 
 
 def decode_network(
-    hmm: UnitHmm, aligning: LogLikelihoods, loud: NDArray[np.bool_], found: Sequence[PosteriorStretch]
+    hmm: UnitHmm, aligning: LogLikelihoods, loud: NDArray[np.bool_], stretches: Sequence[PosteriorStretch]
 ) -> tuple[list[LabelledStretch], list[RecognisedWord]]:
     """Return the stretches in which a phone recogniser finds something, with their phones, and the words.
 
@@ -224,7 +224,7 @@ def decode_network(
     Raises MissingDependencyError: the language model of the words is not installed.
     """
     parts, recognised = list[LabelledStretch](), list[RecognisedWord]()
-    for stretch, posteriors in found:
+    for stretch, posteriors in stretches:
         if not (items := list_spoken(posteriors)):
             continue
         lexicon = Lexicon({str(number): variants for number, (_, variants) in enumerate(items)})
@@ -260,7 +260,7 @@ def list_spoken(posteriors: PhonePosteriors) -> list[tuple[RecognisedWord, tuple
 
 
 def list_wordless(
-    hmm: UnitHmm, loop: UnitLoop, free: LogLikelihoods, found: Sequence[PosteriorStretch]
+    hmm: UnitHmm, loop: UnitLoop, free: LogLikelihoods, stretches: Sequence[PosteriorStretch]
 ) -> list[LabelledStretch]:
     """Return the stretches in which something is said, with their phones: in any language, and where nobody is sure.
 
@@ -269,7 +269,7 @@ def list_wordless(
     leaves phones out, as it does in languages that it hardly knows, the models alone decide.
     """
     parts = list[LabelledStretch]()
-    for stretch, posteriors in found:
+    for stretch, posteriors in stretches:
         if _finds_phones(posteriors):
             frames = stretch.end - stretch.first
             row = np.minimum(np.arange(frames) // POSTERIOR_STEP, len(posteriors.values) - 1)

@@ -43,13 +43,13 @@ def remove_hum(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     steady, loud = np.quantile(np.abs(np.fft.rfft(judged * window)), (0.2, 0.9), axis=0)
     lines = steady > np.maximum(HUM_RATIO * median_filter(steady, HUM_WIDTH), HUM_SHARE * loud.max())
     # hum sounds in every tenth of a second; a voice on one note pauses for consonants
-    least = np.quantile(np.abs(np.fft.rfft(judged.reshape(-1, part) * np.hanning(part + 1)[:-1])), 0.05, axis=0)
-    lines &= 10 * least[np.rint(np.arange(len(lines)) / 10).astype(int)] > steady / 2
+    faintest = np.quantile(np.abs(np.fft.rfft(judged.reshape(-1, part) * np.hanning(part + 1)[:-1])), 0.05, axis=0)
+    lines &= 10 * faintest[np.rint(np.arange(len(lines)) / 10).astype(int)] > steady / 2
     if not lines.any():
         return samples
-    kept, clean = ~binary_dilation(lines, iterations=3), np.zeros(len(padded), np.float32)
+    rest, clean = ~binary_dilation(lines, iterations=3), np.zeros(len(padded), np.float32)
     for number, block in enumerate(blocks):
-        clean[number * HUM // 4 :][:HUM] += np.fft.irfft(np.fft.rfft(block * window) * kept).astype(np.float32) / 2
+        clean[number * HUM // 4 :][:HUM] += np.fft.irfft(np.fft.rfft(block * window) * rest).astype(np.float32) / 2
     clean = clean[HUM // 2 :][: len(samples)]
     within, before = (sound[HUM // 2 : -HUM // 2] for sound in (clean, samples))  # hum may be left at the ends
     voiced = np.square(within).sum() > HUM_REST * np.square(before).sum() and find_passages(log_energy(within))
@@ -166,12 +166,10 @@ WARP_PROBABILITY, TEMPO_PROBABILITY, CLEAN_PROBABILITY = 0.7, 0.6, 0.2
 ROOM_PROBABILITY, NOISE_PROBABILITY, BABBLE_PROBABILITY = 0.4, 0.75, 0.55
 FILTER_PROBABILITY, TELEPHONE_PROBABILITY, CLIPPING_PROBABILITY = 0.6, 0.25, 0.1  # fmt: skip
 """Probabilities of the conditions. Noise is babble or coloured noise; a filter is smooth, or that of a telephone."""
-NOISE_DB = (3.0, 30.0)
-"""Signal-to-noise ratios."""
+SNR_DB = (3.0, 30.0)
 ROOM_S, ROOM_DB = (0.15, 0.9), (-12.0, 0.0)
 """Reverberation times, and energies of the reverberation relative to the direct sound."""
-TALKERS = 7
-"""Largest number of voices of a babble."""
+MAX_TALKERS = 7
 MIN_DISTORTION_DB = -30.0
 """Noise and reverberation this far under the speech count as no distortion; as loud as the speech, as 1."""
 MU = 255.0
@@ -219,7 +217,7 @@ def apply_condition(audio: Audio, voices: Sequence[Audio], rng: np.random.Genera
         response *= np.sqrt(share / np.square(response).sum())
         samples, added = samples + fftconvolve(samples, response)[: len(samples)], share
     if rng.random() < NOISE_PROBABILITY:
-        share = 10 ** (-rng.uniform(*NOISE_DB) / 10)
+        share = 10 ** (-rng.uniform(*SNR_DB) / 10)
         is_babble = voices and rng.random() < BABBLE_PROBABILITY
         noise = _babble(voices, len(samples), rng) if is_babble else _colour(len(samples), rng)
         samples, added = samples + noise * np.sqrt(level * share), added + share
@@ -240,7 +238,7 @@ def _resample(samples: NDArray[np.floating], factor: float) -> Samples:
 def _babble(voices: Sequence[Audio], count: int, rng: np.random.Generator) -> Samples:
     """Return voices at random speeds and levels, of power 1 in all [shape=(count,)]."""
     total = np.zeros(count)
-    for _ in range(int(rng.integers(1, TALKERS + 1))):
+    for _ in range(int(rng.integers(1, MAX_TALKERS + 1))):
         voice = _resample(voices[int(rng.integers(len(voices)))].samples, rng.uniform(0.75, 1.3))
         level = np.sqrt(np.square(voice).mean()) + 1e-9
         begun = np.resize(np.roll(voice, -int(rng.integers(len(voice)))), count)

@@ -40,10 +40,9 @@ Samples = NDArray[np.float32]
 
 REACH = 10
 """The filter reaches this many samples of the lower rate to either side."""
-KEPT_BLOCK = 1 << 18
+DECIMATED_BLOCK = 1 << 18
 """Samples of the lower rate that are computed at a time: memory stays bounded for any length."""
-BETA = 5.0
-"""Shape of the filter's Kaiser window."""
+KAISER_BETA = 5.0
 
 
 def decimate(samples: Samples, factor: int) -> Samples:
@@ -59,11 +58,11 @@ def decimate(samples: Samples, factor: int) -> Samples:
         return samples
     half = REACH * factor
     at = np.arange(-half, half + 1)
-    taps = np.sinc(at / factor) * np.kaiser(2 * half + 1, BETA)
+    taps = np.sinc(at / factor) * np.kaiser(2 * half + 1, KAISER_BETA)
     taps = (taps / taps.sum()).astype(np.float32)
     result = np.zeros(-(-len(samples) // factor), np.float32)
-    for start in range(0, len(result), KEPT_BLOCK):
-        part = result[start : start + KEPT_BLOCK]
+    for start in range(0, len(result), DECIMATED_BLOCK):
+        part = result[start : start + DECIMATED_BLOCK]
         first = (start - REACH) * factor  # the sample that padded[0] is
         padded = np.zeros((len(part) + 2 * REACH + 1) * factor, np.float32)
         inside = samples[max(first, 0) : first + len(padded)]

@@ -121,7 +121,7 @@ def _find_system_data(program: str | None) -> Path | None:
     if program is None:
         return None
     try:
-        about = json.loads(run_program(PROGRAM, PACKAGE, given="{}"))
+        about = json.loads(run_program(PROGRAM, PACKAGE, stdin="{}"))
         return Path(about["data"])
     except (LipMotionError, ValueError, KeyError, TypeError):  # the library or its data are missing
         return None
@@ -147,16 +147,16 @@ def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[Synt
     ipa = voice.partition("+")[0] != LANGUAGE
     task = {"voice": voice, "texts": list(texts), "folder": str(folder), "ipa": ipa} | _library()
     sentences = _answer(run_program(PROGRAM, PACKAGE, len(texts), json.dumps(task), folder))
-    labels = (label.lstrip(STRESS_MARKS) for said in sentences for label, _, _ in said)
+    labels = (label.lstrip(STRESS_MARKS) for starts_of_phones in sentences for label, _, _ in starts_of_phones)
     phone_map, unknown = complete_map(labels, NO_IPA if ipa else ESPEAK_PHONES, ipa=ipa)
     if unknown:
         LOG.warning("espeak-ng says phones that no table has, shown as the nearest or as ax: %s", " ".join(unknown))
-    for number, (text, said) in enumerate(zip(texts, sentences, strict=True)):
+    for number, (text, starts_of_phones) in enumerate(zip(texts, sentences, strict=True)):
         path = folder / f"{number}.wav"
         audio = read_audio(path)
-        starts = [(label.lstrip(STRESS_MARKS), start_s) for label, start_s, _ in said]
+        starts = [(label.lstrip(STRESS_MARKS), start_s) for label, start_s, _ in starts_of_phones]
         phones = correct_times(starts, audio, phone_map)
-        words = _spell_words(phones, [place for _, _, place in said], text)
+        words = _spell_words(phones, [place for _, _, place in starts_of_phones], text)
         yield SynthesisedSentence(audio, phones, path, words, phone_map)
         path.unlink()
 
@@ -169,9 +169,9 @@ def _spell_words(phones: Timeline[str], places: Sequence[int], text: str) -> Tim
     groups = [(number, list(group)) for number, group in groupby(range(len(phones)), key=numbers.__getitem__)]
     following = [*(number for number, _ in groups[1:]), len(words)]
     spans = []
-    for place, ((number, said), stop) in enumerate(zip(groups, following, strict=True)):
+    for place, ((number, members), stop) in enumerate(zip(groups, following, strict=True)):
         written = words[number if place else 0 : max(stop, number + 1)]
-        spans.append(Span(phones[said[0]].start_s, phones[said[-1]].end_s, " ".join(written)))
+        spans.append(Span(phones[members[0]].start_s, phones[members[-1]].end_s, " ".join(written)))
     return Timeline(tuple(spans))
 
 

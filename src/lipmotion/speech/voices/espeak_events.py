@@ -94,9 +94,7 @@ def _speak(library: Any, rate_hz: int, text: str, path: Path) -> list[tuple[str,
         sys.exit(f"the text {text[:40]!r} was not spoken")
     library.espeak_Synchronize()
     with wave.open(str(path), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(rate_hz)
+        file.setparams((1, 2, rate_hz, 0, "NONE", ""))
         file.writeframes(bytes(sound))
     return starts
 
@@ -125,9 +123,9 @@ def main() -> None:
         sys.exit("espeak-ng finds no data; apt install espeak-ng-data")
     if "voice" not in task:
         library.espeak_Info.restype = ctypes.c_char_p
-        found = ctypes.c_char_p()
-        version = library.espeak_Info(ctypes.byref(found))
-        json.dump({"version": version.decode(), "data": os.path.realpath((found.value or b"").decode())}, sys.stdout)
+        path = ctypes.c_char_p()
+        version = library.espeak_Info(ctypes.byref(path))
+        json.dump({"version": version.decode(), "data": os.path.realpath((path.value or b"").decode())}, sys.stdout)
         return
     voice = task["voice"].encode()
     properties = ctypes.byref(_Voice(languages=voice))

@@ -212,11 +212,8 @@ def choose_voice() -> SyntheticVoice:
 
     Raises MissingDependencyError: no synthesiser is installed.
     """
-    for maker, name in DEFAULT_VOICES:
-        voice = next((voice for voice in SYNTHESISERS[maker].voices() if voice.name == name), None)
-        if voice is not None:
-            return voice
-    voice = next(iter(list_voices()), None)
+    voices = ((voice, name) for maker, name in DEFAULT_VOICES for voice in SYNTHESISERS[maker].voices())
+    voice = next((voice for voice, name in voices if voice.name == name), None) or next(iter(list_voices()), None)
     if voice is None:
         raise explain_missing()
     return voice
@@ -254,11 +251,11 @@ def speak_sentences(
     with open_temporary() as folder:
         plain = [" ".join(text.split()) for text in texts]
         sentences = synthesiser.synthesise(voice.name, plain, folder) if plain else iter(())
-        for said, its_words in zip(sentences, words, strict=True):
-            phone_map = said.phone_map or synthesiser.phone_map
-            written = its_words if said.words is None else said.words
-            units = convert_phones(said.phones, phone_map, written, known, said.audio.duration_s)
-            yield VoicedSentence(said.audio, units, said.sound)
+        for sentence, its_words in zip(sentences, words, strict=True):
+            phone_map = sentence.phone_map or synthesiser.phone_map
+            written = its_words if sentence.words is None else sentence.words
+            units = convert_phones(sentence.phones, phone_map, written, known, sentence.audio.duration_s)
+            yield VoicedSentence(sentence.audio, units, sentence.sound)
 
 
 def _is_other(name: str, synthesiser: Synthesiser) -> bool:

@@ -39,16 +39,16 @@ def convert_phones(
     duration_s : of the sound; what no label covers is silence
     Raises InputError: a label that is not in the map, or no phone at all.
     """
-    said: list[tuple[str, float, float]] = []
+    timed: list[tuple[str, float, float]] = []
     for span in labels:
         if span.label not in phone_map:
             raise InputError(f"the synthesiser says {span.label!r}, which is no phone; known: {' '.join(phone_map)}")
         names = phone_map[span.label]
-        if not names and said:
-            said[-1] = (*said[-1][:2], span.end_s)
+        if not names and timed:
+            timed[-1] = (*timed[-1][:2], span.end_s)
         each_s = span.duration_s / max(len(names), 1)
-        said += [(phone, span.start_s + i * each_s, span.start_s + (i + 1) * each_s) for i, phone in enumerate(names)]
-    phones = _cover([(phone, start, end) for phone, start, end in said if end > start], duration_s)
+        timed += [(phone, span.start_s + i * each_s, span.start_s + (i + 1) * each_s) for i, phone in enumerate(names)]
+    phones = _cover([(phone, start, end) for phone, start, end in timed if end > start], duration_s)
     spoken = [phone for phone in phones if not is_silent(phone[0])]
     if not spoken:
         raise InputError("the synthesiser says no phone; give another text")

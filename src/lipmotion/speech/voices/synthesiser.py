@@ -54,17 +54,17 @@ def complete_map(labels: Iterable[str], table: PhoneMap, *, ipa: bool) -> tuple[
     ipa   : whether the other labels are IPA; else those that are not in the table are read as if they were, and are
             reported. A label that begins with ``_`` is a silence.
     """
-    found: dict[str, tuple[str, ...]] = {}
+    complete: dict[str, tuple[str, ...]] = {}
     unknown: dict[str, None] = {}
     for label in labels:
         if label in table:
-            found[label] = table[label]
+            complete[label] = table[label]
         elif label.startswith("_"):
-            found[label] = (SILENCE,)
-        elif label not in found:
-            found[label], letters = read_ipa(label)
+            complete[label] = (SILENCE,)
+        elif label not in complete:
+            complete[label], letters = read_ipa(label)
             unknown |= dict.fromkeys(letters if ipa else [label])
-    return found, tuple(unknown)
+    return complete, tuple(unknown)
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ SHOWN_CHARACTERS = 200
 
 
 def run_program(
-    command: Sequence[str], package: str, sentences: int = 1, given: str = "", folder: Path | None = None
+    command: Sequence[str], package: str, sentences: int = 1, stdin: str = "", folder: Path | None = None
 ) -> str:
     """Return the standard output of a program. When it has ended, in whatever way, so have the programs it started.
 
@@ -154,7 +154,7 @@ def run_program(
     name = package if command[0] == sys.executable else command[0]
     try:
         with tempfile.TemporaryFile() as task, tempfile.TemporaryFile() as printed, tempfile.TemporaryFile() as errors:
-            task.write(given.encode())
+            task.write(stdin.encode())
             task.seek(0)
             process = subprocess.Popen(
                 [program, *command[1:]], stdin=task, stdout=printed, stderr=errors, start_new_session=True

@@ -10,16 +10,7 @@ import numpy as np
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.printable import printable
-from lipmotion_studio.study.analysis.crossed import (
-    BOTH,
-    CONFIDENCE,
-    Components,
-    analyse_ratings,
-    average_difference_effects,
-    combine_variances,
-    tabulate_ratings,
-)
-from lipmotion_studio.study.analysis.paired import analyse_pairs, average_share_effects, compare_orders, tabulate_pairs
+from lipmotion_studio.study.analysis import crossed, paired
 from lipmotion_studio.study.answers import ANCHOR, FIRST, MOS, PAIRED, RECORDING, Answer, read_answers
 
 MIN_ATTENTION = 2 / 3
@@ -110,7 +101,7 @@ def _check_anchor(mine: Sequence[Answer]) -> str:
 def _check_sides(mine: Sequence[Answer]) -> str:
     from scipy.special import bdtr
 
-    alike, pairs = compare_orders(tabulate_pairs(mine)).sum(axis=0).tolist()
+    alike, pairs = paired.compare_orders(paired.tabulate_pairs(mine)).sum(axis=0).tolist()
     if pairs and bdtr(alike, pairs, 0.5) < MIN_CHANCE:
         return f"{alike} of {pairs} pairs answered alike in both orders"
     return ""
@@ -128,7 +119,7 @@ def _find_fast(answers: Sequence[Answer]) -> dict[str, str]:
         by_rater.setdefault(each.rater, []).append(float(np.log(each.seconds)) - usual[each.kind, each.question])
     if len(by_rater) < MIN_PANEL:
         return {}
-    times = {rater: float(np.median(found)) for rater, found in by_rater.items()}
+    times = {rater: float(np.median(relative)) for rater, relative in by_rater.items()}
     panel = np.array(list(times.values()))
     middle = float(np.median(panel))
     spread = DEVIATIONS * NORMAL * float(np.median(np.abs(panel - middle)))
@@ -150,25 +141,27 @@ MAX_DEGREES = 1e6
 Figures = dict[str, Any]
 
 
-def compute_power(components: Components, difference: float, raters: int, sentences: int) -> float:
+def compute_power(components: crossed.Components, difference: float, raters: int, sentences: int) -> float:
     """Return the probability that the test of ``estimate_mean`` tells a mean difference from 0, at the 5 % level."""
     from scipy.special import ndtr, stdtrit
 
     rater, sentence, rest = components.rater / raters, components.sentence / sentences, components.residual
     rest /= raters * sentences
     if rater + sentence + rest <= 0:
-        return 1.0 if difference else 1 - CONFIDENCE
+        return 1.0 if difference else 1 - crossed.CONFIDENCE
     free = raters - 1, sentences - 1, (raters - 1) * (sentences - 1)
     of_rater, of_sentence, of_rest = np.random.default_rng(SEED).chisquare(free, (DRAWS, 3)).T / np.array(free)[:, None]
     noise = rest * of_rest
     parts = [np.maximum((part + rest) * draw - noise, 0) for part, draw in ((rater, of_rater), (sentence, of_sentence))]
-    variance, degrees = combine_variances(parts[0], parts[1], noise, free)
-    limit = stdtrit(np.minimum(degrees, MAX_DEGREES), (1 + CONFIDENCE) / 2) * np.sqrt(variance)
+    variance, degrees = crossed.combine_variances(parts[0], parts[1], noise, free)
+    limit = stdtrit(np.minimum(degrees, MAX_DEGREES), (1 + crossed.CONFIDENCE) / 2) * np.sqrt(variance)
     truth = np.sqrt(rater + sentence + rest)
     return float((ndtr((difference - limit) / truth) + ndtr((-difference - limit) / truth)).mean())
 
 
-def count_raters(components: Components, difference: float, sentences: int, power: float = USUAL_POWER) -> int | None:
+def count_raters(
+    components: crossed.Components, difference: float, sentences: int, power: float = USUAL_POWER
+) -> int | None:
     """Return the least number of raters that tells a difference; None: ``MAX_RATERS`` do not, for want of sentences."""
     low, high = 1, 2  # the power grows with the raters; one rater is no panel
     while compute_power(components, difference, high, sentences) < power:
@@ -182,22 +175,19 @@ def count_raters(components: Components, difference: float, sentences: int, powe
     return high if high <= MAX_RATERS else None
 
 
-def plan_ratings(components: Components | None, kind: str, sentences: int, power: float) -> list[Figures]:
-    """Return the raters needed for differences of means of a kind of judgement."""
-    if components is None or sentences < 2:
-        return []
-    differences: Sequence[float] = DIFFERENCES.get(kind, RANK_DIFFERENCES)
-    return [{"difference": d, "raters": count_raters(components, d, sentences, power)} for d in differences]
+def plan_study(components: crossed.Components | None, kind: str, sentences: int, power: float) -> list[Figures]:
+    """Return the raters needed for differences of means, or for preferences.
 
-
-def plan_pairs(components: Components | None, sentences: int, power: float) -> list[Figures]:
-    """Return the raters needed for preferences; ``components``: of ``paired.average_share_effects``."""
+    components : of ``average_difference_effects``, or of ``average_share_effects``
+    """
+    rows: list[Figures] = []
     if components is None or sentences < 2:
-        return []
-    rows = []
-    for share in SHARES:
-        scaled = Components(*(share * (1 - share) * np.array(components)).tolist())
+        return rows
+    for share in SHARES if kind == PAIRED else ():
+        scaled = crossed.Components(*(share * (1 - share) * np.array(components)).tolist())
         rows.append({"share": share, "raters": count_raters(scaled, share - 0.5, sentences, power)})
+    for difference in () if kind == PAIRED else DIFFERENCES.get(kind, RANK_DIFFERENCES):
+        rows.append({"difference": difference, "raters": count_raters(components, difference, sentences, power)})
     return rows
 
 
@@ -272,17 +262,15 @@ def _list_parts(answers: Sequence[Answer], baseline: str | None, power: float, s
             if not compared:
                 part["missing"] = "all comparisons are with the anchor"
                 continue
-            pairs = tabulate_pairs(compared)
-            components, planned = average_share_effects(pairs), sentences or len(pairs.sentences)
-            part |= analyse_pairs(pairs)
-            needed = plan_pairs(components, planned, power)
+            pairs = paired.tabulate_pairs(compared)
+            components, planned = paired.average_share_effects(pairs), sentences or len(pairs.sentences)
+            part |= paired.analyse_pairs(pairs)
         else:
-            ratings = tabulate_ratings(mine)
-            components, planned = average_difference_effects(ratings), sentences or ratings.values.shape[2]
-            part |= analyse_ratings(ratings, baseline)
-            needed = plan_ratings(components, kind, planned, power)
+            ratings = crossed.tabulate_ratings(mine)
+            components, planned = crossed.average_difference_effects(ratings), sentences or ratings.values.shape[2]
+            part |= crossed.analyse_ratings(ratings, baseline)
         part |= {"variance": components._asdict() if components else None, "planned_sentences": planned}
-        part["raters_needed"] = needed
+        part["raters_needed"] = plan_study(components, kind, planned, power)
     return parts
 
 
@@ -381,7 +369,7 @@ def _format_pairs(part: Figures, everybody: Figures | None) -> list[str]:
 
 def _format_scope(rows: Sequence[Figures]) -> list[str]:
     """Return what the intervals are over, where it is not raters and sentences."""
-    scopes = sorted({row["over"] for row in rows} - {BOTH})
+    scopes = sorted({row["over"] for row in rows} - {crossed.BOTH})
     limited = [row for row in rows if row["over"] in scopes]
     named = [f"{row['condition']}–{row['other']}" if "other" in row else row["condition"] for row in limited]
     return [f"  intervals over {' / '.join(scopes)} only: {', '.join(named)}"] if scopes else []

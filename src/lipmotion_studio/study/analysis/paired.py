@@ -265,7 +265,7 @@ def analyse_strengths(table: PairTable) -> Figures:
         texts = (", ".join(table.conditions[place] for place in group) for group in groups)
         return {"missing": f"no comparison links the groups {'; '.join(texts)}"}
     model = fit_strengths(first, second)
-    moved = compute_deviations(model, table.shown, table.is_first)
+    deviations = compute_deviations(model, table.shown, table.is_first)
     names = table.conditions
 
     def make_row(value: float, change: crossed.Array) -> Figures:
@@ -277,15 +277,15 @@ def analyse_strengths(table: PairTable) -> Figures:
         return {"strength": value, "low": low, "high": high}
 
     strengths = model.strengths
-    rows = [{"condition": name, **make_row(float(strengths[i]), moved[:, i])} for i, name in enumerate(names)]
+    rows = [{"condition": name, **make_row(float(strengths[i]), deviations[:, i])} for i, name in enumerate(names)]
     return {
         "conditions": sorted(rows, key=lambda each: -each["strength"]),
         "pairs": [
             {"condition": names[i], "other": names[j]}
-            | make_row(float(strengths[i] - strengths[j]), moved[:, i] - moved[:, j])
+            | make_row(float(strengths[i] - strengths[j]), deviations[:, i] - deviations[:, j])
             for i, j in combinations(range(len(names)), 2)
         ],
-        "order": make_row(model.order, moved[:, -1]),
+        "order": make_row(model.order, deviations[:, -1]),
         "is_shrunk": model.is_shrunk,
     }
 

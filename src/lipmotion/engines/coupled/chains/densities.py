@@ -146,20 +146,20 @@ def infer_components(posterior: Single, responsibilities: Single | None) -> Sing
 
 
 def reestimate_group(
-    group: StreamGroup, statistics: EmissionStatistics, floors: Sequence[Single], least: float, streams: Sequence[int]
+    group: StreamGroup, sums: EmissionStatistics, floors: Sequence[Single], min_frames: float, streams: Sequence[int]
 ) -> StreamGroup:
     """Return the group with the mixtures that maximise the expected log likelihood (M-step).
 
     floors  : the least variance of each stream of the group [each shape=(D_s,)]
-    least   : densities with less data than so many frames stay as they are
+    min_frames : densities with less data than so many frames stay as they are
     streams : the streams whose means and variances are re-estimated; those of other streams stay
     """
     mixtures = group.mixtures.copy()
-    enough = np.flatnonzero(statistics.occupancy.sum(axis=0) >= least)
-    occupancy = statistics.occupancy.T[enough]
+    enough = np.flatnonzero(sums.occupancy.sum(axis=0) >= min_frames)
+    occupancy = sums.occupancy.T[enough]
     with np.errstate(divide="ignore"):
         mixtures.log_weights[enough] = np.log(occupancy / occupancy.sum(axis=1, keepdims=True))
-    for stream, columns, products, floor in zip(group.streams, group.columns, statistics.products, floors, strict=True):
+    for stream, columns, products, floor in zip(group.streams, group.columns, sums.products, floors, strict=True):
         if stream not in streams:
             continue
         frames = products[:, enough, -1].T[:, :, None]

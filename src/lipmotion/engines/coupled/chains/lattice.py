@@ -140,8 +140,8 @@ class FactorialTransitions:
             np.where(moved + stayed > 0, moved / np.maximum(moved + stayed, 1e-300), old)
             for moved, stayed, old in zip(parts[::2], parts[1::2], self.advance, strict=True)
         )
-        least, most = MIN_ADVANCE, 1 - MIN_ADVANCE
-        return replace(self, advance=(np.clip(first, least, most), np.clip(second, least, most)))
+        low, high = MIN_ADVANCE, 1 - MIN_ADVANCE
+        return replace(self, advance=(np.clip(first, low, high), np.clip(second, low, high)))
 
     def loop(self, chain: int, units: Index) -> Loop:
         """Return one chain, restricted to some of its units, as the kernel takes it."""

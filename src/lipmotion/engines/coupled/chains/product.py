@@ -71,7 +71,7 @@ class Structure:
                   move in the same frame. In Eq. 2 it depends on the joint state before alone, so that chains in step
                   must fall out of step, for a frame at least, nearly wherever one moves
     Source: Xie & Liu 2007, Fig. 3 and Eqs. 17–19.
-    Raises InputError: an unknown kind, or a number of chains or limit that does not fit it.
+    Raises InputError: a number of chains or a limit that does not fit the kind.
     """
 
     kind: str
@@ -84,8 +84,6 @@ class Structure:
     moves_together: bool = False
 
     def __post_init__(self) -> None:
-        if self.kind not in STRUCTURES:
-            raise InputError(f"structure is {self.kind!r}, required one of: {', '.join(STRUCTURES)}")
         if (self.kind in (HMM, MULTISTREAM)) != (len(self.chains) == 1):
             raise InputError(f"structure {self.kind} with {len(self.chains)} chains; hmm and multistream have one")
         if self.moves_together and self.kind != COUPLED:
@@ -205,12 +203,8 @@ class Product:
     @cached_property
     def lead(self) -> Index:
         """The asynchrony: how many states each chain is ahead of the first in each joint state [shape=(C, S)]."""
-        count = self.structure.states
-        progress = [
-            [state + count * ahead for state, ahead in zip(joint.states, joint.ahead, strict=True)]
-            for joint in self.joint_states
-        ]
-        positions = np.array(progress).T
+        _, states, ahead = (np.array(part, np.intp).T for part in zip(*self.joint_states, strict=True))
+        positions = states + self.structure.states * ahead
         return positions - positions[0]
 
 
@@ -220,13 +214,10 @@ def find_reachable(structure: Structure, grammar: Grammar) -> Product:
     All chains go through corresponding units; those without a limit of asynchrony are not listed, but ``lattice``'s.
     """
     chains = range(len(structure.chains))
-    none_ahead, first_states = (False,) * len(chains), (0,) * len(chains)
-    initial_states = {
-        JointState(tuple(structure.corresponding_units[c][unit] for c in chains), first_states, none_ahead): float(
-            probability
-        )
-        for unit, probability in enumerate(grammar.initial[0])
-    }
+    initial_states = {}
+    for unit, probability in enumerate(grammar.initial[0].tolist()):
+        units = tuple(structure.corresponding_units[c][unit] for c in chains)
+        initial_states[JointState(units, (0,) * len(chains), (False,) * len(chains))] = probability
     reached: dict[JointState, list[_Successor]] = {}
     waiting = deque(initial_states)
     while waiting:

@@ -181,21 +181,18 @@ def m_step(
         else group
         for group, own in zip(chains.groups, statistics.emissions, strict=True)
     ]
-    new_transitions = (
-        chains.transitions.reestimated(statistics.transition_counts) if transitions else chains.transitions
-    )
-    return replace(chains, groups=tuple(groups), transitions=new_transitions)
+    chains = replace(chains, groups=tuple(groups))
+    if not transitions:
+        return chains
+    return replace(chains, transitions=chains.transitions.reestimated(statistics.transition_counts))
 
 
 def compute_variance_floors(observations: Sequence[AudioVisualObservations]) -> tuple[Single, ...]:
     """Return the least variance of every stream [each shape=(D_s,)], from its variance where it was observed."""
     floors = []
     for stream in range(len(observations[0].streams)):
-        masks = [utterance.observed[stream] for utterance in observations]
-        rows = [
-            utterance.streams[stream] if mask is None else utterance.streams[stream][mask]
-            for utterance, mask in zip(observations, masks, strict=True)
-        ]
+        pairs = ((utterance.streams[stream], utterance.observed[stream]) for utterance in observations)
+        rows = [values if mask is None else values[mask] for values, mask in pairs]
         floors.append(np.maximum(FLOOR_SHARE * np.concatenate(rows).var(axis=0), MIN_VARIANCE).astype(np.float32))
     return tuple(floors)
 
@@ -256,11 +253,9 @@ def with_joint_state_densities(
                 chain_states, transitions.advance, transitions.rows, structure.state_counts, strict=True
             )
         )
-        factorial = FactorialProduct(structure, product.grammar)
-        new_transitions, chain_states = (
-            FactorialTransitions(factorial, (first, second), frequent),
-            factorial.chain_states,
-        )
+        new_product = FactorialProduct(structure, product.grammar)
+        chain_states = new_product.chain_states
+        new_transitions = FactorialTransitions(new_product, (first, second), frequent)
     number = np.full(structure.state_counts, -1)
     number[tuple(frequent.T)] = np.arange(len(frequent))
     frequent_number = number[chain_states[0], chain_states[1]]

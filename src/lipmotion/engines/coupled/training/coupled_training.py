@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -105,12 +104,12 @@ THREADS = Checkpoint(parallel_map=_run_threaded)
 """Nothing is stored; threads of this process share the work."""
 
 
-def fit_coupled(
+def grow_models(
     examples: Sequence[Example], config: CoupledConfig, monitor: Monitor, work: Checkpoint = THREADS
-) -> Fit[CoupledModel]:
-    """Return a coupled model trained on examples of speech with its motion, and figures of the training.
+) -> Iterator[Callable[[], Fit[CoupledModel]]]:
+    """Yield functions that return models of 1, 2, 4, … Gaussians, and figures of the training; the last is the result.
 
-    Its figures are ``frames``, ``joint_states``, and ``converged``: whether EM with the greatest number of Gaussians
+    Figures are ``frames``, ``joint_states``, and ``converged``: whether EM with the greatest number of Gaussians
     ended for want of gain (1), not after the greatest number of steps (0).
     Examples without observed motion are for the second stage of training, which re-estimates the densities of speech
     from more speakers (``speech_only``). The first stage ignores them, and so does what follows the second: the
@@ -118,13 +117,6 @@ def fit_coupled(
     Raises CorpusError: no example with observed motion, or examples of different channels.
     Raises InputError: no such unit set, or a structure that does not fit together.
     """
-    return deque(grow_models(examples, config, monitor, work), maxlen=1)[0]()
-
-
-def grow_models(
-    examples: Sequence[Example], config: CoupledConfig, monitor: Monitor, work: Checkpoint = THREADS
-) -> Iterator[Callable[[], Fit[CoupledModel]]]:
-    """Yield functions that return the models of 1, 2, 4, … Gaussians on the way to that of ``fit_coupled``."""
     structure = config.structure_with(list_unit_sets(config.chains))
     moving = [example for example in examples if mark_known_dynamics(example.valid).any()]
     space, values = fit_reduced_motion(moving or examples, config.components)

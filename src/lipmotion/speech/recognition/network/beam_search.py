@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
-from lipmotion.speech.recognition.network.posteriors import PhonePosteriors
+from lipmotion.speech.recognition.network.posteriors import WORD_BOUNDARY, PhonePosteriors
 from lipmotion.units import PHONES, is_silent
 from lipmotion.units.lexicon import find_english_data
 from lipmotion.units.phones import FULL_FORMS
@@ -197,7 +197,6 @@ NEVER = -1e9
 
 Scores = NDArray[np.float64]
 Indices = NDArray[np.int64]
-WordEnds = dict[tuple[int, ...], tuple[float, int, int]]
 
 
 class DecodedWord(NamedTuple):
@@ -228,7 +227,9 @@ def score_stretch(posteriors: PhonePosteriors) -> Scored:
         form = FULL_FORMS.get(phone, phone)
         if form in SOUNDS:
             sounds[:, SOUNDS.index(form)] += phones[:, column]
-    boundary = np.exp(posteriors.word_boundary.astype(float))
+    boundary = np.zeros(len(phones))
+    if WORD_BOUNDARY in posteriors.tokens:
+        boundary = np.exp(posteriors.values[:, posteriors.tokens.index(WORD_BOUNDARY)].astype(float))
     blank = (phones[:, -1] - boundary).clip(min=0) * np.exp(-BLANK_LOSS)
     total = sounds.sum(axis=1) + blank + boundary
     sounds, blank, boundary = (
@@ -290,8 +291,8 @@ class _BeamSearch:
     named: list[tuple[int, ...]] = field(default_factory=lambda: [()])
 
     def step(self, paths: _Paths, rows: Scored, row: int) -> _Paths:
-        tree = self.english.tree
         """Return the paths after one more row of posteriors."""
+        tree = self.english.tree
         sounds, between, inside = rows.sounds[row], rows.between[row], rows.blank[row]
         root = paths.node == 0
         said = np.where(root, NEVER, paths.sound + sounds[tree.sound[paths.node]])
@@ -327,7 +328,7 @@ class _BeamSearch:
         ending = np.flatnonzero(tree.is_end[paths.node] & (paths.sound > limit))
         if len(ending) > MAX_ENDS:
             ending = ending[np.argsort(-paths.sound[ending], kind="stable")[:MAX_ENDS]]
-        ended: WordEnds = {}
+        ended: dict[tuple[int, ...], tuple[float, int, int]] = {}
         for place in ending.tolist():
             node, before = int(paths.node[place]), self.named[int(paths.context[place])]
             base, origin = float(paths.sound[place] - tree.score[node]), int(paths.origin[place])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import platform
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from hashlib import sha256
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
 from lipmotion.extensions import Registry
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, Passage, analysed
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.voice_activity import Stretch, find_sound, read_stretch
 from lipmotion.types import Audio, JoinedRows, ParallelMap, TokenPosteriors
 from lipmotion.types.audio import from_sixteen_bits
@@ -114,13 +114,6 @@ class PhonePosteriors:
     values: NDArray[np.floating[Any]]
     tokens: tuple[str, ...]
 
-    @property
-    def word_boundary(self) -> NDArray[np.float32]:
-        """Logarithms of the posteriors of the boundary of words [shape=(N,)]; −∞ where the network has none."""
-        if WORD_BOUNDARY not in self.tokens:
-            return np.full(len(self.values), -np.inf, np.float32)
-        return self.values[:, self.tokens.index(WORD_BOUNDARY)]
-
     @cached_property
     def of_phones(self) -> NDArray[np.float32]:
         """Logarithms of the posteriors of ``PHONES``, and last of none of them [shape=(N, 48)]."""
@@ -176,26 +169,24 @@ def find_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> 
             by_passage[part.first].append(PosteriorStretch(stretch, posteriors))
         if audio.is_passage:
             return by_passage[0]
+        placed = []
         for part in audio.passages:
             part.audio.cached(key, partial(by_passage.__getitem__, part.first))
-        return [placed for part in audio.passages for placed in _place_stretches(by_passage[part.first], part)]
+            for (first, end), posteriors in by_passage[part.first]:
+                start, stop = max(part.first + first, part.own.start), min(part.first + end, part.own.stop)
+                skipped = -(-(start - part.first - first) // POSTERIOR_STEP)
+                values = posteriors.values[skipped : skipped + -(-(stop - start) // POSTERIOR_STEP)]
+                if len(values):
+                    placed.append(PosteriorStretch(Stretch(start, stop), PhonePosteriors(values, tokens)))
+        return placed
 
     return audio.cached(key, compute)
 
 
-def _place_stretches(found: Sequence[PosteriorStretch], passage: Passage) -> Iterator[PosteriorStretch]:
-    for (first, end), posteriors in found:
-        start, stop = max(passage.first + first, passage.own.start), min(passage.first + end, passage.own.stop)
-        skipped = -(-(start - passage.first - first) // POSTERIOR_STEP)
-        values = posteriors.values[skipped : skipped + -(-(stop - start) // POSTERIOR_STEP)]
-        if len(values):
-            yield PosteriorStretch(Stretch(start, stop), PhonePosteriors(values, posteriors.tokens))
-
-
-def mean_posterior(found: Sequence[PosteriorStretch]) -> float:
+def mean_posterior(stretches: Sequence[PosteriorStretch]) -> float:
     """Return the mean posterior of all phones that are found in some stretches, 0 to 1; 0 where there are none."""
-    counts = [sum(each.token != WORD_BOUNDARY for each in posteriors.best_tokens) for _, posteriors in found]
-    means = [posteriors.mean_posterior(0, len(posteriors.values)) for _, posteriors in found]
+    counts = [sum(each.token != WORD_BOUNDARY for each in posteriors.best_tokens) for _, posteriors in stretches]
+    means = [posteriors.mean_posterior(0, len(posteriors.values)) for _, posteriors in stretches]
     return float(np.dot(counts, means) / max(sum(counts), 1))
 
 
