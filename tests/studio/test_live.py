@@ -104,16 +104,23 @@ def test_a_client_that_hangs_holds_nobody_up(monkeypatch):
             assert received.get()
 
 
-def test_pages_of_other_sites_may_not_listen_and_what_is_taken_or_missing_is_reported(capsys, monkeypatch):
+def test_pages_of_other_sites_may_not_listen(capsys):
     with opened("websocket", capsys) as (_, address):
         for origin in ("https://example.org", "null", "http://localhost.example.org"):
             with pytest.raises(InvalidStatus, match="403"), connect(address, origin=Origin(origin), proxy=None):
                 pass
         with connect(address, origin=Origin("http://localhost:8000"), proxy=None):
             pass
+
+
+def test_an_address_that_is_taken_is_reported(capsys):
+    with opened("websocket", capsys) as (_, address):
         port = port_of(address)
         with pytest.raises(errors.InputError, match=f"websocket:{port}"), open_consumer(f"websocket:{port}", print):
             pass
+
+
+def test_a_missing_package_is_reported(monkeypatch):
     monkeypatch.setitem(sys.modules, "websockets.asyncio.server", None)
     with pytest.raises(errors.MissingDependencyError, match="live"), open_consumer("websocket", print):
         pass
