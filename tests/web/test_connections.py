@@ -23,7 +23,7 @@ from lipmotion_studio.web import connections  # noqa: E402
 from lipmotion_studio.web.listening import open_socket  # noqa: E402
 from lipmotion_studio.web.replies import ERRORS  # noqa: E402
 
-LARGE, SMALL = 1 << 26, b"small"
+LARGE, SMALL = 1 << 24, b"small"
 PATIENCE_S = 60.0
 ASKED = b"GET /small HTTP/1.1\r\nhost: x\r\n"
 
