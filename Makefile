@@ -25,8 +25,8 @@ READER ?=
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SOURCES := $(shell find src -type f -not -name '*.pyc') pyproject.toml README.md
-DRAWING := $(addprefix tests/,addons appearance architecture articulation engines export faces fuzz hmm kernels measures meshes \
-  motion oracles pipeline/film portable programs stats storage studio study types units vision web)
+DRAWING := $(addprefix tests/,addons appearance architecture articulation engines export faces formats fuzz hmm kernels \
+  measures meshes motion oracles pipeline/film portable programs stats storage studio study types units vision web)
 TIMED := $(BIN)/python scripts/processor_time.py
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal --slowest 20
 .PHONY: demo test test-all test-long test-portable test-explore test-agents check coverage fuzz bench model site requirements clean
