@@ -98,7 +98,7 @@ def attack(server: Served, folder: Path, count: int) -> set[int]:
     before = {path for path in folder.rglob("*") if path.name.startswith("foreign")}
     requests = hostile_requests(count, f"127.0.0.1:{server.port}", server.token)
     replies = attacked(server.port, requests, (FOREIGN.encode(), b'"format": "lipmotion'))
-    statuses = {status for status, _ in replies}
+    statuses = {reply.status for reply, _ in replies}
     assert not {status for status in statuses if status >= 500} - {501, 503}
     assert {path for path in folder.rglob("*") if path.name.startswith("foreign")} == before
     return statuses

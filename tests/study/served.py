@@ -81,8 +81,10 @@ class Connection:
         self._connection.close()
 
 
-def attacked(port: int, requests: Iterable[Hostile], secrets: Iterable[bytes]) -> Iterator[tuple[int, bytes]]:
-    """Send hostile requests, and what is no request; give statuses and bodies of the replies.
+def attacked(
+    port: int, requests: Iterable[Hostile], secrets: Iterable[bytes]
+) -> Iterator[tuple[http.client.HTTPResponse, bytes]]:
+    """Send hostile requests, and what is no request; give the replies and their bodies.
 
     Raises AssertionError: a reply holds what nobody may read.
     """
@@ -96,7 +98,7 @@ def attacked(port: int, requests: Iterable[Hostile], secrets: Iterable[bytes]) -
             reply = raw.getresponse()
             body = reply.read()
             assert [secret for secret in (b"root:", *secrets) if secret in body] == [], hostile
-            yield reply.status, body
+            yield reply, body
     for content in (b"\x16\x03\x01" * 200, b"GET / HTTP/9.9\r\n\r\n", b"GET /" + b"a" * 100_000, b"\r\n" * 500):
         with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as plain:
             plain.sendall(content)
