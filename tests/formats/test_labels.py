@@ -164,6 +164,17 @@ def test_files_beside_a_recording(tmp_path):
     assert label_files.find_labels(recording, ignored=frozenset({tmp_path / "a.txt"})).words == ("too",)
 
 
+@pytest.mark.parametrize(("place", "first"), [("wavs", "LJ001"), (".", "wavs/LJ001.wav"), (".", "LJ001")])
+def test_the_words_of_ljspeech_stand_in_one_table(tmp_path, place, first) -> None:
+    recording, table = tmp_path / "wavs" / "LJ001.wav", tmp_path / place / "metadata.csv"
+    recording.parent.mkdir()
+    table.write_text(f"LJ0010|no|no\n{first}|In 2 parts|in two parts\nLJ002|other\n")
+    assert label_files.find_labels(recording).words == ("in", "two", "parts")
+    assert label_files.find_labels(recording.with_name("LJ003.wav")).words is None
+    recording.with_suffix(".txt").write_text("its own")
+    assert label_files.find_labels(recording).words == ("its", "own")
+
+
 @pytest.mark.recordings
 def test_real_ones(recordings: Path):
     folder = recordings / "speech-open"

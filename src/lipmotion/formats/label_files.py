@@ -56,6 +56,8 @@ MASTER = re.compile(r'^(?:#!MLF!#|\.)[ \t\r]*\n"(.*)"[ \t\r]*$', re.MULTILINE)
 MARKUP = re.compile(r'\{\\rtf|<[!?a-zA-Z]|\{\s*"|\[\s*[\[{]')  # the start of RTF, HTML, XML and JSON
 CHAPTER = ".trans.txt"
 """Ends the name of the transcripts of a chapter in LibriSpeech: in each line the name of a recording, and its words."""
+METADATA = "metadata.csv"
+"""The transcripts of LJSpeech, beside its recordings or a folder above: ``name|…|words``, a line for each."""
 JUDGED_LINES = 1000  # lines of a text that are judged for whether they hold times
 NUMBERED = re.compile(r"[-+.]?\d|nan\b|[-+]?inf\b")
 TIME = re.compile(r"(?<![\w.])(?:\d*\.\d+|\d{5,})(?![\w.])")
@@ -88,8 +90,8 @@ def find_labels(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> R
     """Return the labels from the files beside a recording that have its name, with a suffix of ``FOR_WORDS``.
 
     Those of ``RECOGNISED`` may have a language as well (``take.en.vtt``), or the whole name (``take.mp4.srt``); JSON
-    that is no transcript, as motion, is passed over. Without any, those of its chapter, as in LibriSpeech: of
-    ``19-198-0004.flac`` its line in ``19-198.trans.txt``.
+    that is no transcript, as motion, is passed over. Without any, its line among those of its chapter, as in
+    LibriSpeech (of ``19-198-0004.flac`` in ``19-198.trans.txt``), or of all, as in LJSpeech (``METADATA``).
     ignored : files that are no labels (the lists of the splits)
     Raises InputError: one of them cannot be read, or the recording is not in its chapter.
     """
@@ -100,12 +102,13 @@ def find_labels(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> R
             labels = _read(path, unknown_json=path.suffix == ".json")
             read += [(path, labels)] if labels is not None else []
             seen.append(path)
-    chapter = recording.with_name(recording.stem.rpartition("-")[0] + CHAPTER)
-    if not seen and chapter.is_file():
-        lines = dict(line.strip().partition(" ")[::2] for line in _read_text(chapter).splitlines())
-        if recording.stem not in lines:
-            raise InputError(f"{chapter}: has no line of {recording.stem}; required this name, a blank and its words")
-        read.append((chapter, _read_plain(lines[recording.stem], chapter)))
+    name = re.escape(recording.stem)
+    for path in [] if seen else find_tables(recording):
+        line = rf"{name}(?: +(.*))?" if path.name != METADATA else rf"(?:[^|\n]*/)?{name}(?:\.\w+)?\|(?:.*\|)?([^|\n]*)"
+        if not read and (row := re.search(rf"^[ \t]*{line}$", _read_text(path), re.MULTILINE)):
+            read.append((path, _read_plain(row[1] or "", path)))
+        elif path.name != METADATA:
+            raise InputError(f"{path}: has no line of {recording.stem}; required this name, a blank and its words")
     in_order = sorted(read, key=lambda item: (*FOR_PHONES, item[0].suffix).index(item[0].suffix))
     transcripts = (labels.transcript for _, labels in read if labels.transcript)
     return RecordingLabels(next(transcripts, None), next((each.phones for _, each in in_order if each.phones), None))
@@ -119,6 +122,13 @@ def find_label_files(recording: Path) -> list[Path]:
         if suffix in RECOGNISED:
             names += [recording.with_suffix(f".en{suffix}"), recording.with_name(recording.name + suffix)]
     return [path for path in names if path.is_file()]
+
+
+def find_tables(recording: Path) -> list[Path]:
+    """Return the files of many recordings' words that ``find_labels`` reads where a recording has no other file."""
+    chapter = recording.with_name(recording.stem.rpartition("-")[0] + CHAPTER)
+    tables = (folder / METADATA for folder in recording.absolute().parents[:2])
+    return [path for path in (chapter, *tables) if path.is_file()]
 
 
 def read_labels(path: Path) -> RecordingLabels:

@@ -432,3 +432,13 @@ def test_another_file_of_the_same_size_and_time_is_noticed(tmp_path):
     other.replace(path)
     os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
     assert not file.is_unchanged()
+
+
+def test_words_of_all_in_one_table_count_unless_a_recording_has_its_own(tmp_path):
+    path, table, own = tmp_path / "wavs" / "a.wav", tmp_path / "metadata.csv", tmp_path / "wavs" / "a.txt"
+    path.parent.mkdir()
+    for file in (path, table):
+        file.write_bytes(b"a")
+    assert {each.path for each in list_input_files(BatchLine("a", str(path)))} == {str(path), str(table)}
+    own.write_bytes(b"a")
+    assert {each.path for each in list_input_files(BatchLine("a", str(path)))} == {str(path), str(own)}

@@ -22,7 +22,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import find_version, load_provided
 from lipmotion.formats.base import list_suffixes
 from lipmotion.formats.cues import CUE_FORMATS
-from lipmotion.formats.label_files import LABEL_SUFFIXES, find_label_files
+from lipmotion.formats.label_files import LABEL_SUFFIXES, find_label_files, find_tables
 from lipmotion.meshes.model.rig_tables import find_table
 from lipmotion.pipeline.batch.lines import CONTROL, OWN_FILES, OWN_FOLDER, BatchLine
 from lipmotion.pipeline.job import Job
@@ -121,7 +121,7 @@ def _read_status(path: Path) -> tuple[int, int]:
 def list_input_paths(line: BatchLine) -> list[Path]:
     """Return the files that are read for a line: its recording and, if the row has no words, its label files."""
     recording = Path(line.recording)
-    return [recording] + ([] if line.transcript else find_label_files(recording))
+    return [recording] + ([] if line.transcript else find_label_files(recording) or find_tables(recording))
 
 
 def list_input_files(line: BatchLine) -> list[InputFile]:
