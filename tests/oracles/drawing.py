@@ -12,6 +12,7 @@ from lipmotion_faces.kernels.shading import MIN_FACING_COSINE
 
 Real = NDArray[np.float64]
 Colours = NDArray[np.float32]
+Samples = tuple[int, int, int, int]
 
 
 def draw(
@@ -39,28 +40,34 @@ def draw(
     picture[top:bottom, left:right] = tone[level.astype(int)]
 
 
-def _triangle(
-    corner: Real, z: Real, colour: Colours, samples: tuple[int, int, int, int], depth: Colours, light: Colours
-) -> None:
+def _triangle(corner: Real, z: Real, colour: Colours, samples: Samples, depth: Colours, light: Colours) -> None:
+    if (covered := _cover(corner, samples)) is None:
+        return
+    window, inside, of_b, of_c = covered
+    share_b, share_c = of_b.astype(np.float32), of_c.astype(np.float32)
+    away = np.float32(z[0]) + (share_b * np.float32(z[1] - z[0]) + share_c * np.float32(z[2] - z[0]))
+    seen = inside & (away < depth[window])
+    depth[window][seen] = away[seen]
+    shares = share_b[seen, None] * (colour[1] - colour[0]) + share_c[seen, None] * (colour[2] - colour[0])
+    light[window][seen] = colour[0] + shares
+
+
+def _cover(corner: Real, samples: Samples) -> tuple[tuple[slice, slice], NDArray[np.bool_], Real, Real] | None:
+    """Return the samples around a triangle, which it covers, and its second and third weight; None: nothing is seen."""
     (xa, ya), (xb, yb), (xc, yc) = corner.tolist()
     twice_area = (xb - xa) * (yc - ya) - (xc - xa) * (yb - ya)
     x0, x1 = max(samples[0], int(np.floor(corner[:, 0].min()))), min(samples[2], int(np.ceil(corner[:, 0].max())))
     y0, y1 = max(samples[1], int(np.floor(corner[:, 1].min()))), min(samples[3], int(np.ceil(corner[:, 1].max())))
     if twice_area <= 0 or x0 >= x1 or y0 >= y1:
-        return
+        return None
     px, py = np.arange(x0, x1)[None] + 0.5, np.arange(y0, y1)[:, None] + 0.5
     of_a = (xc - xb) * (py - yb) - (yc - yb) * (px - xb)
     of_b = (xa - xc) * (py - yc) - (ya - yc) * (px - xc)
     of_c = (xb - xa) * (py - ya) - (yb - ya) * (px - xa)
     inside = (of_a >= bias(xb, yb, xc, yc)) & (of_b >= bias(xc, yc, xa, ya)) & (of_c >= bias(xa, ya, xb, yb))
-    inverse = 1.0 / twice_area
-    share_b, share_c = (of_b * inverse).astype(np.float32), (of_c * inverse).astype(np.float32)
-    away = np.float32(z[0]) + (share_b * np.float32(z[1] - z[0]) + share_c * np.float32(z[2] - z[0]))
     window = slice(y0 - samples[1], y1 - samples[1]), slice(x0 - samples[0], x1 - samples[0])
-    seen = inside & (away < depth[window])
-    depth[window][seen] = away[seen]
-    shares = share_b[seen, None] * (colour[1] - colour[0]) + share_c[seen, None] * (colour[2] - colour[0])
-    light[window][seen] = colour[0] + shares
+    inverse = 1.0 / twice_area
+    return window, inside, of_b * inverse, of_c * inverse
 
 
 def bias(xa: float, ya: float, xb: float, yb: float) -> float:
@@ -134,33 +141,26 @@ def _mark(
     points: Real,
     planes: Real,
     surface: textured.TexturedTriangles,
-    samples: tuple[int, int, int, int],
+    samples: Samples,
     depth: Colours,
     marks: Whole,
     solid: Colours,
     blended: bool,
 ) -> None:
     a, c, b = surface.triangles[number].tolist()  # clockwise on the screen, whose rows go down
-    (xa, ya, za), (xb, yb, zb), (xc, yc, zc) = points[[a, b, c]].tolist()
-    x0, x1 = max(samples[0], int(np.floor(min(xa, xb, xc)))), min(samples[2], int(np.ceil(max(xa, xb, xc))))
-    y0, y1 = max(samples[1], int(np.floor(min(ya, yb, yc)))), min(samples[3], int(np.ceil(max(ya, yb, yc))))
-    if (xb - xa) * (yc - ya) - (xc - xa) * (yb - ya) <= 0 or x0 >= x1 or y0 >= y1:
+    if (covered := _cover(points[[a, b, c], :2], samples)) is None:
         return
-    px, py = np.arange(x0, x1)[None] + 0.5, np.arange(y0, y1)[:, None] + 0.5
-    of_a = (xc - xb) * (py - yb) - (yc - yb) * (px - xb)
-    of_b = (xa - xc) * (py - yc) - (ya - yc) * (px - xc)
-    of_c = (xb - xa) * (py - ya) - (yb - ya) * (px - xa)
-    inside = (of_a >= bias(xb, yb, xc, yc)) & (of_b >= bias(xc, yc, xa, ya)) & (of_c >= bias(xa, ya, xb, yb))
-    inverse = 1.0 / ((xb - xa) * (yc - ya) - (xc - xa) * (yb - ya))
-    away = (za + (of_b * inverse * (zb - za) + of_c * inverse * (zc - za))).astype(np.float32)
-    window = slice(y0 - samples[1], y1 - samples[1]), slice(x0 - samples[0], x1 - samples[0])
+    window, inside, of_b, of_c = covered
+    za, zb, zc = points[[a, b, c], 2].tolist()
+    away = (za + (of_b * (zb - za) + of_c * (zc - za))).astype(np.float32)
     seen = inside & (away < depth[window]) & (away <= solid[window])
     kind = surface.looks[number, 1]
     if kind != textured.SOLID and seen.any():
         cut, factor = surface.alphas[number]
         least = textured.SEEN_OPACITY if blended else cut if kind == textured.CUT else textured.HIDING_OPACITY
         rows, columns = np.nonzero(seen)
-        places = np.stack([px[0, columns], py[rows, 0]], axis=1)
+        first = window[1].start + samples[0] + 0.5, window[0].start + samples[1] + 0.5
+        places = np.stack([columns + first[0], rows + first[1]], axis=1)
         alpha = _texel(np.full(len(places), number), places, planes, surface)[:, 3]
         seen[rows, columns] = alpha >= least / max(factor, 1e-9)
     depth[window][seen] = away[seen]
