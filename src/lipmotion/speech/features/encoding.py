@@ -100,9 +100,7 @@ def encode_window(log_mel: Array, encoder: Encoder) -> Array:
         padded = np.pad(x, ((1, 1), (0, 0)))
         columns = [padded[first : first + len(x) : stride] for first in range(3)]
         x = _gelu(np.concatenate(columns, axis=1) @ kernel + bias)
-    half = x.shape[1] // 2  # what tells the network where in its window a row is: Vaswani et al. 2017, §3.5
-    angles = np.arange(len(x))[:, None] * np.exp(-np.log(10_000) / (half - 1) * np.arange(half))
-    x += np.concatenate([np.sin(angles), np.cos(angles)], axis=1).astype(np.float32)
+    x += _positions(x.shape)
     for (attend, attend_bias), (merge, merge_bias), (widen, widen_bias), (narrow, narrow_bias) in encoder.layers:
         queries, keys, values = np.split(_standardise(x) @ attend + attend_bias, 3, axis=1)
         q, k, v = (part.reshape(len(x), HEADS, -1).swapaxes(0, 1) for part in (queries, keys, values))
@@ -135,8 +133,14 @@ def _standardise(x: Array) -> Array:
     return result
 
 
-Linear = tuple[Array, Array]
-"""A matrix and a bias."""
+@cache
+def _positions(shape: tuple[int, int]) -> Array:
+    """Return what tells the network where in its window a row is: Vaswani et al. 2017, §3.5."""
+    angles = np.arange(shape[0])[:, None] * np.exp(-np.log(10_000) / (shape[1] // 2 - 1) * np.arange(shape[1] // 2))
+    return np.concatenate([np.sin(angles), np.cos(angles)], axis=1).astype(np.float32)
+
+
+Linear = tuple[Array, Array]  # a matrix and a bias
 
 
 class Encoder(NamedTuple):
