@@ -26,8 +26,9 @@ __all__ = [
     "Picture",
     "Stageable",
     "Staging",
+    "rotate_head",
+    "stage_liveliness",
 ]
-__all__ += ["rotate_head", "stage_liveliness"]
 
 PoseT = TypeVar("PoseT")
 Picture = NDArray[np.uint8]

@@ -110,9 +110,7 @@ def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
     lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", "xmin = 0", f"xmax = {end_s}"]
     lines += ["tiers? <exists>", f"size = {len(tiers)}", "item []:"]
     for number, (name, intervals) in enumerate(tiers, 1):
-        filled: list[
-            tuple[float, float, str]
-        ] = []  # what is a gap has no text: Praat requires intervals that follow each other
+        filled = list[tuple[float, float, str]]()  # and gaps: Praat requires intervals that follow each other
         reached_s = 0.0
         for start_s, stop_s, text in [*intervals, (end_s, end_s, "")]:
             filled += [(reached_s, start_s, "")] if start_s > reached_s else []

@@ -104,10 +104,10 @@ def write_scene(path: Path, scene: Scene, sound: Path | None = None) -> None:
         write_usda(path, with_sound)
         return
     if (
-        path.suffix.lower() == GLTF
-        and original is not None
+        weights is not None
+        and path.suffix.lower() == GLTF
+        and original
         and original.suffix.lower() in ANIMATED_SUFFIXES
-        and weights is not None
     ):
         write = partial(write_animated_gltf, sound_s=scene.sound_s, stepped=scene.stepped, thinning=scene.thinning)
         if write(path, original, weights, with_sound.sound):

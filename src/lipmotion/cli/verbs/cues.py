@@ -73,11 +73,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     unset: dict[str, Any] = {"default": argparse.SUPPRESS}
     add("-d", "--dialogFile", metavar="FILE", dest="transcript", type=_dialogue, help="--transcript FILE", **unset)
     text = "--recogniser: pocketSphinx is auto, phonetic is fast"
-    named: dict[str, Any] = {
-        "metavar": "pocketSphinx|phonetic",
-        "type": lambda name: RECOGNISERS.get(name.lower(), name),
-    }
-    add("-r", "--recognizer", dest="recogniser", help=text, **named, **unset)
+    names, to_ours = "pocketSphinx|phonetic", (lambda name: RECOGNISERS.get(name.lower(), name))
+    add("-r", "--recognizer", metavar=names, dest="recogniser", type=to_ours, help=text, **unset)
     add("--extendedShapes", metavar="GHX", dest="shapes", help="--shapes", **unset)
     text = "--fps, for every format; in .dat shapes have their letters then"
     add("--datFrameRate", metavar="FPS", dest="fps", action=_DatFrameRate, type=float, help=text, **unset)

@@ -19,8 +19,7 @@ from lipmotion.printable import printable
 from lipmotion.storage.sources import is_file
 
 LOG = logging.getLogger("lipmotion")
-SILENT_HZ = 16_000
-"""Rate of the silence of videos without a sound."""
+SILENT_HZ = 16_000  # rate of the silence of videos without a sound
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
