@@ -185,7 +185,7 @@ def put(value, where=(0,)):
 
 DAMAGED = [
     *({name.replace("/", "__"): None} for name in sorted(joint_to_arrays(HMM))[::3]), {"log_stay": lambda a: a[:-1]},
-    {"log_stay": put(0.0)}, {"log_stay": put(np.nan)}, {"durations": put(0.0)}, {"durations": lambda a: a[:, 0]},
+    {"log_stay": put(0.0)}, {"log_stay": put(np.nan)},
     {"bigram": lambda a: a[:-1]}, {"units": put("b")}, {"free": put("q")}, {"spoken": lambda a: a * 0},
     {"spoken": lambda a: a[1:]}, {"streams": put("q")}, {"streams": put("motion")}, {"speech__means": lambda a: a[:-1]},
     {"speech__means": put(np.inf)}, {"speech__variances": put(0.0)}, {"speech__variances": lambda a: a[:, :1]},

@@ -15,7 +15,7 @@ from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
 from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.hmm.multistream.densities import MOTION, StreamObservations, StreamWeights, stream_observations
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_arrays, joint_to_arrays
-from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, grow_joint, measure_durations, train_joint
+from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, grow_joint, train_joint
 from lipmotion.hmm.multistream.recognise import StatePath, align, merge_gaussians, recognise_units, select_densities
 from lipmotion.hmm.multistream.unit_states import Inventory, RecognisedUnit, frames_to_units, units_to_frames
 from lipmotion.kernels.banded import solve_mlpg
@@ -229,8 +229,7 @@ class JointEngine(Engine[JointModel]):
     def growing_models(self, examples: Sequence[Example], monitor: Monitor) -> Iterator[JointModel]:
         """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``."""
         utterances, inventory, classes, make_model = self._prepare(self._with_channels(examples))
-        for hmm in grow_joint(utterances, inventory, classes, self.config.hmm, monitor):
-            yield make_model(replace(hmm, durations=measure_durations(hmm, utterances)))
+        yield from map(make_model, grow_joint(utterances, inventory, classes, self.config.hmm, monitor))
 
     def _with_channels(self, examples: Sequence[Example]) -> Sequence[Example]:
         """Return examples with the channels that are modelled. Raises InputError: there is no such channel."""
