@@ -275,72 +275,47 @@ class _InLogs:
         self.audio_back, self.visual_back = self.audio.reverse(), self.visual.reverse()
         self.initial, self.final = log_ends(audio, visual)
         self.frame_bytes = self.initial.nbytes
+        self.possible = [log > -np.inf for log in logs[:2]]
+        for possible, states in zip(self.possible, logs.pairs.T, strict=True):
+            np.logical_or.at(possible.T, states, -np.inf < logs.pair.T)
 
     def forward(self, start: int, stop: int, before: Array | None, results: list[tuple[Array, Array]]) -> float:
         for t in range(start, stop):
-            density, *possible = self._density(t)
-            prior, leaving = self.initial, self.initial
+            prior = moved = self.initial
             if before is not None:
-                moved = self.audio.forward(before, possible[0])
-                prior, leaving = self.visual.forward(moved.T, possible[1]).T, moved[:, -len(self.visual.leaving) :]
-            before = prior + density
-            results.append((before, leaving))
+                moved = self.audio.forward(before, self.possible[0][t])
+                prior = self.visual.forward(moved.T, self.possible[1][t]).T
+            before = prior + self.logs.joint(t)
+            results.append((before, moved[:, -len(self.visual.leaving) :]))
         return 0.0
 
     def end(self, before: Array) -> _StepBack:
-        return _StepBack(*self._met(before, self.final.copy(), self._density(len(self.logs.audio) - 1)[0]), *_NONE)
+        return _StepBack(*self._met(before, self.final, len(self.logs.audio) - 1), *_NONE)
 
     def back(self, before: Array, backward: Array, leaving: Array, t: int) -> _StepBack:
         units_audio, units_visual = len(self.audio.leaving), len(self.visual.leaving)
-        density, possible, _ = self._density(t)
+        possible = self.possible[0][t, ::-1]
         moved = self.visual_back.forward(backward.T[::-1], np.ones(backward.shape[1], bool))[::-1].T
-        frame, beta = self._met(before, self.audio_back.forward(moved[::-1], possible[::-1])[::-1], density)
+        frame, beta = self._met(before, self.audio_back.forward(moved[::-1], possible)[::-1], t)
         entered = [np.zeros((units, units)) for units in (units_audio, units_visual)]
         _count_entered(before[-units_audio:], moved[:units_audio], frame.log_overlap, entered[0])
         _count_entered(leaving.T, backward[:, :units_visual].T, frame.log_overlap, entered[1])
         return _StepBack(frame, beta, *entered)
 
-    def _density(self, t: int) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return the log densities of a frame [shape=(Na, Nv)], and which states of each loop can be."""
-        audio, visual, pair, pairs = self.logs
-        density, *possible = (
-            np.empty(self.initial.shape),
-            np.zeros(audio.shape[1], bool),
-            np.zeros(visual.shape[1], bool),
-        )
-        _fill_densities(audio[t], visual[t], pair[t], pairs, density, *possible)
-        return density, possible[0], possible[1]
-
-    def _met(self, before: Array, beta: Array, density: Array) -> tuple[_Frame, Array]:
-        """Return the posteriors of a frame, and its backward probabilities ``beta`` with densities, in their place."""
+    def _met(self, before: Array, beta: Array, t: int) -> tuple[_Frame, Array]:
+        """Return the posteriors of a frame, and its backward probabilities ``beta`` with densities."""
         sums = [np.zeros(part.shape[1]) for part in self.logs[:3]]
-        log_overlap = _meet_in_logs(before, beta, density, self.logs.pairs, *sums)
-        return _Frame(*sums, log_overlap), beta
-
-
-@compiled
-def _fill_densities(
-    audio: Array, visual: Array, pair: Array, pairs: Index, density: Array, rows: Array, columns: Array
-) -> None:
-    """Fill in the log densities of joint states [shape=(N, M)], and in which rows and columns any is finite."""
-    for i in range(len(audio)):
-        for j in range(len(visual)):
-            density[i, j] = np.float64(audio[i]) + np.float64(visual[j])
-    for p in range(len(pairs)):
-        density[pairs[p, 0], pairs[p, 1]] = pair[p]
-    for i in range(len(audio)):
-        for j in range(len(visual)):
-            if density[i, j] > -np.inf:
-                rows[i] = columns[j] = True
+        best, total = _meet_in_logs(before, beta, self.logs.pairs, *sums)
+        log_overlap = best + math.log(total) if total else -math.inf
+        return _Frame(*(part / (total or 1) for part in sums), log_overlap), beta + self.logs.joint(t)
 
 
 @compiled
 def _meet_in_logs(
-    before: Array, beta: Array, density: Array, pairs: Index, audio: Array, visual: Array, pair: Array
-) -> float:
-    """Fill in the posteriors of a frame, add ``density`` to ``beta``; return the logarithm of the sum of the products.
-
-    before, beta : logarithms of forward and backward probabilities [shapes=(N, M)]
+    before: Array, beta: Array, pairs: Index, audio: Array, visual: Array, pair: Array
+) -> tuple[float, float]:
+    """Fill in the sums of the products of probabilities [shapes=(N, M)] along both axes, and those of pairs, relative
+    to the greatest; return its logarithm, and the sum of all.
     """
     best, total = -np.inf, 0.0
     for i in range(len(before)):
@@ -349,20 +324,14 @@ def _meet_in_logs(
     for i in range(len(before) if best > -np.inf else 0):
         for j in range(before.shape[1]):
             log = before[i, j] + beta[i, j] - best
-            if log > -np.inf:
-                share = math.exp(log)
-                total += share
-                audio[i] += share
-                visual[j] += share
+            share = math.exp(log) if log > -np.inf else 0.0
+            total += share
+            audio[i] += share
+            visual[j] += share
     for p in range(len(pairs) if total else 0):
-        pair[p] = math.exp(before[pairs[p, 0], pairs[p, 1]] + beta[pairs[p, 0], pairs[p, 1]] - best) / total
-    for i in range(len(before)):
-        audio[i] /= total if total else 1
-        for j in range(before.shape[1]):
-            beta[i, j] += density[i, j]
-    for j in range(before.shape[1]):
-        visual[j] /= total if total else 1
-    return best + math.log(total) if total else -np.inf
+        i, j = pairs[p]
+        pair[p] = math.exp(before[i, j] + beta[i, j] - best)
+    return best, total
 
 
 @compiled
