@@ -103,12 +103,8 @@ def infer_factorial(
     results = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
     result = next((each for each in results if each is not None), None)
     if result is None:  # there is no path
-        of_audio, of_visual = (
-            LoopCounts(*(np.zeros_like(part) for part in (loop.stay, loop.onward, loop.enter, loop.initial)))
-            for loop in (audio, visual)
-        )
-        in_audio, in_visual, in_pairs = (np.zeros(log.shape) for log in (logs.audio, logs.visual, logs.pair))
-        return FactorialPosteriors(in_audio, in_visual, in_pairs, of_audio, of_visual, -np.inf)
+        counts = [LoopCounts(*map(np.zeros_like, (*loop[:2], *loop[3:5]))) for loop in (audio, visual)]
+        return FactorialPosteriors(*(np.zeros(log.shape) for log in logs[:3]), *counts, -np.inf)
     return result._replace(pair=result.pair[:, np.argsort(order)])
 
 
@@ -221,8 +217,7 @@ class _Scaled:
         return log_total
 
     def end(self, before: Array) -> _StepBack:
-        final = np.exp(self.final)
-        frame = _frame(np.multiply(before, final, dtype=np.float64), self.logs.pairs, self.whole)
+        frame = _frame(np.log(before.astype(np.float64)), self.final, self.logs.pairs, self.whole)
         backward, log = self._shares(self.final + self.logs.joint(len(self.logs.audio) - 1))
         return _StepBack(frame if log > -math.inf else frame._replace(log_overlap=-math.inf), backward, *_NONE)
 
@@ -290,33 +285,26 @@ class _InLogs:
         return 0.0
 
     def end(self, before: Array) -> _StepBack:
-        return _StepBack(*self._met(before, self.final, len(self.logs.audio) - 1), *_NONE)
+        last = self.logs.joint(len(self.logs.audio) - 1)
+        return _StepBack(_frame(before, self.final, self.logs.pairs), self.final + last, *_NONE)
 
     def back(self, before: Array, backward: Array, leaving: Array, t: int) -> _StepBack:
         units_audio, units_visual = len(self.audio.leaving), len(self.visual.leaving)
         possible = self.possible[0][t, ::-1]
         moved = self.visual_back.forward(backward.T[::-1], np.ones(backward.shape[1], bool))[::-1].T
-        frame, beta = self._met(before, self.audio_back.forward(moved[::-1], possible)[::-1], t)
-        entered = [np.zeros((units, units)) for units in (units_audio, units_visual)]
-        _count_entered(before[-units_audio:], moved[:units_audio], frame.log_overlap, entered[0])
-        _count_entered(leaving.T, backward[:, :units_visual].T, frame.log_overlap, entered[1])
-        return _StepBack(frame, beta, *entered)
-
-    def _met(self, before: Array, beta: Array, t: int) -> tuple[_Frame, Array]:
-        """Return the posteriors of a frame, and its backward probabilities ``beta`` with densities."""
-        sums = [np.zeros(part.shape[1]) for part in self.logs[:3]]
-        best, total = _meet_in_logs(before, beta, self.logs.pairs, *sums)
-        log_overlap = best + math.log(total) if total else -math.inf
-        return _Frame(*(part / (total or 1) for part in sums), log_overlap), beta + self.logs.joint(t)
+        beta = self.audio_back.forward(moved[::-1], possible)[::-1]
+        frame = _frame(before, beta, self.logs.pairs)
+        of_audio = _count_entered(before[-units_audio:], moved[:units_audio], frame.log_overlap)
+        of_visual = _count_entered(leaving.T, backward[:, :units_visual].T, frame.log_overlap)
+        return _StepBack(frame, beta + self.logs.joint(t), of_audio, of_visual)
 
 
 @compiled
-def _meet_in_logs(
-    before: Array, beta: Array, pairs: Index, audio: Array, visual: Array, pair: Array
-) -> tuple[float, float]:
-    """Fill in the sums of the products of probabilities [shapes=(N, M)] along both axes, and those of pairs, relative
-    to the greatest; return its logarithm, and the sum of all.
+def _meet_in_logs(before: Double, beta: Double, pairs: Index) -> tuple[Double, Double, Double, float, float]:
+    """Return the sums of the products of probabilities [shapes=(N, M)] along both axes, and those of pairs, relative to
+    the greatest; its logarithm; and the sum of all.
     """
+    audio, visual, pair = np.zeros(before.shape[0]), np.zeros(before.shape[1]), np.zeros(len(pairs))
     best, total = -np.inf, 0.0
     for i in range(len(before)):
         for j in range(before.shape[1]):
@@ -331,30 +319,31 @@ def _meet_in_logs(
     for p in range(len(pairs) if total else 0):
         i, j = pairs[p]
         pair[p] = math.exp(before[i, j] + beta[i, j] - best)
-    return best, total
+    return audio, visual, pair, best, total
 
 
 @compiled
-def _count_entered(last: Array, first: Array, log_overlap: float, entered: Array) -> None:
-    """Add up the probabilities of leaving units and of entering units [shapes=(U, M)], from their logarithms."""
+def _count_entered(last: Array, first: Array, log_overlap: float) -> Double:
+    """Return the sums of the products of leaving units and of entering units [shapes=(U, M)], from logarithms."""
+    entered = np.zeros((len(last), len(first)))
     for u in range(len(last)):
         for j in range(last.shape[1]):
             if last[u, j] > -np.inf:
                 for v in range(len(first)):
                     if first[v, j] > -np.inf:
                         entered[u, v] += math.exp(min(last[u, j] + first[v, j] - log_overlap, LARGEST_EXPONENT))
+    return entered
 
 
 _NONE = np.zeros(()), np.zeros(())
 """Expected transitions out of the last frame."""
 
 
-def _frame(joint: Double, pairs: Index, whole: float) -> _Frame:
-    """Return the posteriors of a frame from products of its forward and backward probabilities, of sum ``whole``."""
-    total = float(joint.sum())
-    joint = joint / (total if total > 0 else 1)
-    log_overlap = math.log(total / whole) if total > 0 else -math.inf
-    return _Frame(joint.sum(axis=1), joint.sum(axis=0), joint[tuple(pairs.T)], log_overlap)
+def _frame(before: Double, beta: Double, pairs: Index, whole: float = 1.0) -> _Frame:
+    """Return the posteriors of a frame from logarithms of forward, which sum to ``whole``, and backward probabilities."""
+    *sums, best, total = _meet_in_logs(before, beta, pairs)
+    log_overlap = best + math.log(total / whole) if total else -math.inf
+    return _Frame(*(part / (total or 1) for part in sums), log_overlap)
 
 
 def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:

@@ -68,8 +68,8 @@ def train_stages(
     options: Options, examples: Sequence[Example], monitor: Monitor = silent_monitor, one: TrainedSystem | None = None
 ) -> Iterator[TrainedSystem]:
     """Yield coupled chains with 1, 2, 4, … Gaussians a state, up to those of the options; ``one``: after this first."""
-    config, begin_s = CoupledConfig(**options), process_time() - (one.seconds if one else 0)
-    count = 2 if one else 1
+    config, count = CoupledConfig(**options), 2 if one else 1
+    begin_s = process_time() - (one.seconds if one else 0)
     for make_model in grow_models(examples, config, monitor, THREADS, one and one.model):
         own = replace(config, mixtures=min(count, config.mixtures), visual_mixtures=min(count, config.visual_mixtures))
         model = make_model().model
@@ -220,8 +220,7 @@ def select_systems(names: Sequence[str] | None) -> list[str]:
     if unknown:
         raise InputError(f"no system {unknown[0]!r}; there are: {', '.join(COMPARED_SYSTEMS)}")
     chosen = [COMPARED_SYSTEMS[name] for name in names]
-    needed = {REFERENCE_SYSTEM} | {system.same_model_as for system in chosen}
-    needed |= {name.removesuffix(SPLIT) for name in names}
+    needed = {REFERENCE_SYSTEM, *(each.same_model_as for each in chosen), *(name.removesuffix(SPLIT) for name in names)}
     return [name for name in COMPARED_SYSTEMS if name in {*names, *needed}]
 
 

@@ -19,7 +19,7 @@ from lipmotion.hmm.multistream.densities import (
     stream_observations,
 )
 from lipmotion.hmm.multistream.model import joint_from_arrays, joint_to_arrays
-from lipmotion.hmm.multistream.multistream_training import train_joint
+from lipmotion.hmm.multistream.multistream_training import grow_joint
 from lipmotion.hmm.multistream.recognise import (
     FrameDensities,
     align,
@@ -269,7 +269,7 @@ def test_the_densities_are_those_of_the_leaves_in_units_of_the_motion():
 
 
 def test_what_was_learned_comes_back():
-    hmm = train_joint(utterances(30), inventory(), CLASSES, config())
+    *_, hmm = grow_joint(utterances(30), inventory(), CLASSES, config())
     for each in utterances(4, seed=9):
         motion, path = each.observed.streams[MOTION], align(hmm, each.observed, each.units, each.bounds)
         off = solve_trajectory(select_densities(hmm, path))[0] - motion.values[:, :2]

@@ -29,7 +29,8 @@ MOTION_ONLY = StreamWeights(0, 0, 0, 0, 1)
 
 def trained(data=TRAIN, **changes):
     events: list[types.Progress] = []
-    return multistream_training.train_joint(data, inventory(), CLASSES, config(**changes), events.append), events
+    *_, hmm = multistream_training.grow_joint(data, inventory(), CLASSES, config(**changes), events.append)
+    return hmm, events
 
 
 @pytest.fixture(scope="module")

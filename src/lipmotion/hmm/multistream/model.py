@@ -318,8 +318,6 @@ NAMES = {
     "streams": ArraySpec(np.str_, "S"),
 }
 TIMES = {**BIGRAM, "log_stay": ArraySpec(np.float64, "R", -1e4, NEGATIVE)}
-LEGACY = ("durations",)
-"""Arrays of earlier files that nothing reads."""
 MIN_STORED_SCALE = MIN_SCALE / 10
 """Below ``MIN_SCALE``, for rounding to half precision; squares of values divided by less overflow in float32."""
 STREAM = {
@@ -362,9 +360,8 @@ def joint_from_arrays(arrays: Arrays, config: JointConfig) -> JointHmm:
     with format_errors("the joint model"):
         named = check_arrays(arrays, NAMES)
         units, free, streams = (tuple(named[key].tolist()) for key in ("units", "free", "streams"))
-        refuse_undeclared(
-            arrays, NAMES, TIMES, LEGACY, (name for name in arrays if name.partition("/")[0] in streams and "/" in name)
-        )
+        of_streams = (name for name in arrays if name.partition("/")[0] in streams and "/" in name)
+        refuse_undeclared(arrays, NAMES, TIMES, ["durations"], of_streams)  # which earlier files have
         if config.states > arrays["log_stay"].size:
             raise ValueError(f"{config.states} states a unit, of {arrays['log_stay'].size} in all")
         inventory = Inventory(units, free, config.states)

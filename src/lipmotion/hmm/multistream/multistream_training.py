@@ -255,19 +255,6 @@ class TrainingUtterance:
     bounds: NDArray[np.intp] | None = None
 
 
-def train_joint(
-    utterances: Sequence[TrainingUtterance],
-    inventory: Inventory,
-    classes: Mapping[str, frozenset[str]],
-    config: JointConfig,
-    monitor: Monitor = silent_monitor,
-    work: Checkpoint = NO_CHECKPOINT,
-) -> JointHmm:
-    """Return models of all streams, trained together: the last of ``grow_joint``, which says what it takes."""
-    *_, hmm = grow_joint(utterances, inventory, classes, config, monitor, work)
-    return hmm
-
-
 def grow_joint(
     utterances: Sequence[TrainingUtterance],
     inventory: Inventory,
