@@ -45,8 +45,8 @@ MIN_POSTERIOR = 1e-20
 """Smaller posteriors and counts are set to 0, as those of states that cannot be are not quite 0."""
 MIN_PROBABILITY = 1e-100
 """Least probability of a transition, or of beginning or ending in a state: products of smaller ones may underflow."""
-FEW = 0.2
-"""Where fewer joint states can be, logarithms are fastest, as they take no time for others."""
+SPARSE_SHARE = 0.2
+"""A smaller share of possible joint states is fastest in logarithms, which take no time for others."""
 LARGEST_EXPONENT = 700.0
 """Expected transitions are divided by the probability of the transition: the quotient must stay finite."""
 
@@ -81,8 +81,8 @@ def infer_factorial(
     stretch : frames whose forward probabilities are stored at once; those of the others are computed twice;
         None: √T, or as many as ``ROOM_BYTES`` hold
     Log densities in single precision are processed in single precision where that loses nothing, which takes half the
-    time. Where double precision may lose paths that count, because they were some 250 nats below a frame's best, the
-    recording is processed in logarithms.
+    time. Where few joint states are possible, or double precision may lose paths that count, because they were some 250
+    nats below a frame's best, the recording is processed in logarithms.
     Source: Ghahramani & Jordan (1997), "Factorial hidden Markov models", appendix B. Forward and backward probabilities
     are raised to a least one, never set to 0, and so are upper bounds; how much may come of that follows from the
     overlap of both in each frame.
@@ -98,13 +98,14 @@ def infer_factorial(
         for part in (loop.stay, loop.onward, loop.leave[:, None] * loop.enter, loop.initial, loop.final)
     )
     least = min(float(part.min(where=part > 0, initial=1.0)) for part in probabilities)
-    if least >= MIN_PROBABILITY and share > FEW:
+    if least >= MIN_PROBABILITY and share > SPARSE_SHARE:
         ways += [_Scaled(audio, visual, logs, kind) for kind in OFF if kind in (DOUBLE, logs.audio.dtype)]
     results = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
     result = next((each for each in results if each is not None), None)
     if result is None:  # there is no path
-        counts = [LoopCounts(*map(np.zeros_like, (*loop[:2], *loop[3:5]))) for loop in (audio, visual)]
-        return FactorialPosteriors(*(np.zeros(log.shape) for log in logs[:3]), *counts, -np.inf)
+        first, second = (LoopCounts(*map(np.zeros_like, (*loop[:2], *loop[3:5]))) for loop in (audio, visual))
+        in_audio, in_visual, in_pairs = (np.zeros(log.shape) for log in logs[:3])
+        return FactorialPosteriors(in_audio, in_visual, in_pairs, first, second, -np.inf)
     return result._replace(pair=result.pair[:, np.argsort(order)])
 
 
@@ -340,10 +341,10 @@ _NONE = np.zeros(()), np.zeros(())
 
 
 def _frame(before: Double, beta: Double, pairs: Index, whole: float = 1.0) -> _Frame:
-    """Return the posteriors of a frame from logarithms of forward, which sum to ``whole``, and backward probabilities."""
-    *sums, best, total = _meet_in_logs(before, beta, pairs)
-    log_overlap = best + math.log(total / whole) if total else -math.inf
-    return _Frame(*(part / (total or 1) for part in sums), log_overlap)
+    """Return the posteriors of a frame from logarithms of forward (of sum ``whole``) and backward probabilities."""
+    audio, visual, pair, best, total = _meet_in_logs(before, beta, pairs)
+    log_overlap, whole = (best + math.log(total / whole), total) if total else (-math.inf, 1.0)
+    return _Frame(audio / whole, visual / whole, pair / whole, log_overlap)
 
 
 def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:

@@ -177,7 +177,7 @@ def find_factorial_path(
 
     def search(start: int, stop: int, score: Array) -> tuple[Array, list[tuple[NDArray[Any], NDArray[Any]]]]:
         """Return the scores after the frames of a stretch, and for each the decisions [shapes=(Na, Nv), (Nv, Na)]."""
-        decisions = []
+        decisions = list[tuple[NDArray[Any], NDArray[Any]]]()
         for t in range(start, stop):
             score, by_audio = loops[0].best_forward(score)
             turned, by_visual = loops[1].best_forward(np.ascontiguousarray(score.T))
@@ -187,7 +187,7 @@ def find_factorial_path(
 
     initial, final = log_ends(audio, visual)
     score = initial + logs.joint(0)
-    befores, decisions = [], []
+    befores, decisions = [], list[tuple[NDArray[Any], NDArray[Any]]]()
     for start in range(1, frames, stretch):
         befores.append((start, score))
         score, decisions = search(start, min(start + stretch, frames), score)

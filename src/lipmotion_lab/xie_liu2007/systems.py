@@ -70,7 +70,7 @@ def train_stages(
     """Yield coupled chains with 1, 2, 4, … Gaussians a state, up to those of the options; ``one``: after this first."""
     config, count = CoupledConfig(**options), 2 if one else 1
     begin_s = process_time() - (one.seconds if one else 0)
-    for make_model in grow_models(examples, config, monitor, THREADS, one and one.model):
+    for make_model in grow_models(examples, config, monitor, THREADS, one.model if one else None):
         own = replace(config, mixtures=min(count, config.mixtures), visual_mixtures=min(count, config.visual_mixtures))
         model = make_model().model
         yield TrainedSystem(CoupledEngine(own), model, process_time() - begin_s)

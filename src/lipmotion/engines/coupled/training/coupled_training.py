@@ -177,7 +177,7 @@ def grow_models(
     names, weights = (SPEECH, *(s.name for s in visual)), (config.audio_weight, *(weight_of[s.name] for s in visual))
     mixtures = (config.mixtures, *(config.visual_mixtures for _ in visual if structure.kind != HMM))
     report = _reporter("chains", MAX_STEPS * max(mixtures).bit_length(), sub_monitor(monitor, 0, first_share))
-    for grown in grow_chains(structure, names, data, mixtures, weights, report, work, start and start.chains):
+    for grown in grow_chains(structure, names, data, mixtures, weights, report, work, start.chains if start else None):
         yield partial(finish, grown)
 
 
