@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion import mouth_region
+from lipmotion.motion.eigenlips import EYE_DISTANCE_PX, MOUTH_CORNER, MOUTH_HEIGHT
 from lipmotion.speech.sound.pauses import STEP_S, measure_levels_db
 from lipmotion.types import Audio, Motion
 from lipmotion_faces.appearance.lower_face import CORNER, HEIGHT, WIDTH, FaceShape
@@ -123,14 +123,14 @@ def _levels(sentence: ToySentence, frames: int) -> Array:
 
 def _shapes(motion: Motion) -> Array:
     """Return opening, width, outer and place of the chin in every frame, px of the face [shape=(T, 4)]."""
-    distances = [motion[name] * mouth_region.EYE_DISTANCE_PX for name in ("opening", "width", "outer")]
+    distances = [motion[name] * EYE_DISTANCE_PX for name in ("opening", "width", "outer")]
     return np.column_stack([*distances, toy_chin_px(motion)])
 
 
 def _picture(x: Values, y: Values, shape: Array, pixel_px: float, noise: float, draw: np.random.Generator) -> Pictures:
     """Return the toy person at some positions [each shape=(H, W)], px of the face, uint8 [shape=(H, W, 3)]."""
     opening, width, outer, chin = shape.tolist()
-    middle = mouth_region.CORNER[1] + mouth_region.HEIGHT / 2
+    middle = MOUTH_CORNER[1] + MOUTH_HEIGHT / 2
     x, y = x.astype(np.float32), y.astype(np.float32)
     picture: Values = np.array(WALL, np.float32) * (1 + 0.1 * np.sin(x / 17) * np.cos(y / 23))[..., None]
     picture = _over(picture, NECK, np.clip(0.5 + (NECK_PX - np.abs(x)) / pixel_px, 0, 1) * (y > 40))

@@ -14,7 +14,7 @@ from PIL import Image
 from PIL.Image import Resampling
 
 from lipmotion.corpora import Corpus
-from lipmotion.motion.mouth_region import HEIGHT, WIDTH
+from lipmotion.motion.eigenlips import MOUTH_HEIGHT, MOUTH_WIDTH
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Audio, Channel, Monitor, Motion, Span, Timeline, Unit, with_progress
 from lipmotion_faces import Staging, stage_face
@@ -30,7 +30,7 @@ MOUTH_SCALE = 4
 """Mouth pictures of a corpus are enlarged by this factor."""
 STAGING = Staging(size=640, blinks=False, gaze=False, brows=False, head=False)
 """Only the mouth moves, so that nothing else differs between systems."""
-LOWER_FACE = (slice(340, 340 + MOUTH_SCALE * HEIGHT), slice(176, 176 + MOUTH_SCALE * WIDTH))
+LOWER_FACE = (slice(340, 340 + MOUTH_SCALE * MOUTH_HEIGHT), slice(176, 176 + MOUTH_SCALE * MOUTH_WIDTH))
 """The part of the drawn picture that is shown, as large as a filmed mouth."""
 DECIMALS = 5
 RECORDED = "recorded"

@@ -14,7 +14,6 @@ from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_recording
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Request, SpeechInput, as_request
-from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.network.posteriors import WORD_BOUNDARY, find_installed_recogniser, find_stretches
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
@@ -153,6 +152,10 @@ def recognise_words(speech: SpeechInput, *, model: Model | str | Path | None = N
         )
     audio = analysed(read_recording(request))
     recogniser = open_recogniser(chosen.phones, request.recogniser, chosen.adaptation)
+    if workers == 1:
+        return recogniser.recognition(audio, audio.mfcc())
+    from lipmotion.pipeline.workers import map_in_processes
+
     return recogniser.recognition(audio, audio.mfcc(), map_in_processes(workers))
 
 

@@ -22,7 +22,7 @@ from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.hmm.unit_training import TranscribedUtterance, UnitInventory, train_hmm
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.motion.space import resample_track
-from lipmotion.motion.speaker_maps import add_habits, map_to_mean_person
+from lipmotion.motion.speaker_estimation import add_habits, map_to_mean_person
 from lipmotion.pipeline.analysis.transcribe import align_or_recognise, warn_of_guesses
 from lipmotion.pipeline.model import GEOMETRY, Model, load_model, with_prior
 from lipmotion.pipeline.training.channels import (
