@@ -137,7 +137,7 @@ def test_rules_are_kept() -> None:
         text, name = path.read_text(encoding="utf-8"), path.relative_to(SOURCE).as_posix()
         found += [(rule, name, line) for rule in rules for line in rule(text)]
     printing = [(rule, name) for rule, name, _ in found if rule is printed]
-    assert {*printing} == {(printed, "lipmotion/cli/terminal/progress.py")}
+    assert {*printing} == {(printed, "lipmotion/cli/terminal/printing.py")}
     assert len(found) == len(printing), [each for each in found if each[0] is not printed]
 
 

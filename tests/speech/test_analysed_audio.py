@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from lipmotion import errors, types
-from lipmotion.speech.features import analysed_audio, speaker_similarity
-from lipmotion.speech.features.mfcc import HOP, log_energy, mfcc, spectrum
-from lipmotion.speech.recognition.general import general_features
+from lipmotion.speech.features.mfcc import HOP, general_features, log_energy, mfcc, spectrum
+from lipmotion.speech.sound import analysed_audio, speaker_similarity
 from lipmotion.speech.sound.voice_activity import find_passages
 from speech.made_voices import hiss, spoken
 from testing.toy import ToySentence, toy_sentences

@@ -6,6 +6,7 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion import load_model
+from lipmotion.speech.features.mfcc import general_features
 from lipmotion.speech.recognition import agreement, general
 from lipmotion.speech.recognition import transcript_evidence as module
 from lipmotion.speech.recognition.transcript_evidence import (
@@ -214,7 +215,7 @@ def sentences() -> list[ToySentence]:
 def test_it_is_the_mean_over_phones_of_the_best_state_of_what_is_said(sentences: list[ToySentence]) -> None:
     """Frame by frame, by name."""
     sentence = sentences[0]
-    density = general.load_general().log_density(general.general_features(sentence.audio))
+    density = general.load_general().log_density(general_features(sentence.audio))
     names = {"ax": "AH", "axr": "ER", "ix": "IH"}
     spoken = [
         (n, number, span.label.phone)

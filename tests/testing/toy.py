@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.eigenlips import EYE_DISTANCE_PX, MOUTH_HEIGHT, MOUTH_WIDTH
-from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit, Utterance
 from lipmotion.units import is_silent
 from lipmotion.units.spelling import parse_table

@@ -47,7 +47,7 @@ from lipmotion.pipeline.edits import (
 from lipmotion.pipeline.generation import apply_excerpt, cut_speech, find_excerpt, find_person, generate_motion
 from lipmotion.pipeline.model import Model, load_model, with_prior
 from lipmotion.pipeline.request import Request, SpeechInput, as_request
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.types import (
     WEIGHT,
     Constraints,

@@ -21,8 +21,7 @@ from lipmotion_faces import Staging, stage_face
 from lipmotion_faces.video.mp4 import SOUND_HZ, write_mp4
 from lipmotion_lab.evaluation.evaluate import BILABIAL
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES, OPENING, ComparedClip, HeldOutRecordings
-from lipmotion_lab.report.charts import add_caption, draw_curve
-from lipmotion_lab.report.html import Html, build_page, element, joined
+from lipmotion_lab.report.html import Html, add_caption, build_page, draw_curve, element, joined
 from lipmotion_lab.report.section import Section, write_text
 
 FPS = 25.0

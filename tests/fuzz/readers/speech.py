@@ -26,7 +26,7 @@ from fuzz.inputs import (
 )
 from lipmotion import Corpus, Request, animate, load_model, read_motion, write
 from lipmotion.formats.label_files import read_labels
-from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Motion, Span, TimedWord, Timeline, Track, TranscriptLine, Unit, Utterance
 from lipmotion.units import PHONES, Lexicon

@@ -5,16 +5,9 @@ import pytest
 from pocketsphinx import Decoder
 
 from lipmotion import errors, types
+from lipmotion.speech.features.mfcc import general_features
 from lipmotion.speech.recognition import general as acoustic
-from lipmotion.speech.recognition.general import (
-    PHONES,
-    STATES,
-    STREAMS,
-    find_density,
-    general_features,
-    load_bigram,
-    load_general,
-)
+from lipmotion.speech.recognition.general import PHONES, STATES, STREAMS, find_density, load_bigram, load_general
 from lipmotion.units import PHONES as OURS
 from testing.formant_synthesiser import synthesise
 from testing.toy import ToySentence

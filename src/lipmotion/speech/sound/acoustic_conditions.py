@@ -13,9 +13,8 @@ from lipmotion.errors import InputError
 from lipmotion.hmm.loudness import find_loud_frames
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP, WINDOW, check_samples, log_energy, spectrum
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.sound.voice_activity import find_passages
-from lipmotion.types import Audio, ConditionSpectrum
+from lipmotion.types import SPEECH_RATE_HZ, Audio, ConditionSpectrum
 
 NOISE_KINDS = ("white", "babble")
 MIN_TALKERS = 2

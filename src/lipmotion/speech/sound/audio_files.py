@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.storage.sources import check_source, is_text, list_video, open_media, read_duration
-from lipmotion.types import Audio
+from lipmotion.types import SPEECH_RATE_HZ, Audio
 
 HOLE_S = 0.04
 """A frame this much later than the end of the one before leaves a hole; time stamps are rounded to 1 ms or better."""
@@ -181,7 +181,6 @@ class _TrackDecoder:
 
 LOG = logging.getLogger("lipmotion")
 
-SPEECH_RATE_HZ = 16_000
 SHORTEST_S = 0.1
 """Shorter recordings hold no sentence; the features need 25 ms around every frame."""
 CANCELLED_SHARE = 0.2

@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.types import Audio, to_sixteen_bits
+from lipmotion.types import SPEECH_RATE_HZ, Audio, to_sixteen_bits
 
 BLOCK = 1 << 16
 """Samples that are resampled at a time."""
