@@ -33,8 +33,8 @@ LARGEST_SAMPLE = 1e6
 """Samples beyond are damage, whatever their full scale was; their squares would not be finite."""
 KNEE_HZ = 6500.0
 """Frequencies are warped in full up to here, or until they are as high as this."""
-BLOCK = 4096
-"""Frames transformed at a time: memory stays bounded for any length."""
+BLOCK = 256
+"""Frames transformed at a time: they fit into the cache, and memory stays bounded for any length."""
 
 
 def mfcc(audio: Audio, warp: float = 1.0) -> Features:
