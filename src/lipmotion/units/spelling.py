@@ -37,6 +37,9 @@ APOSTROPHES = re.compile("[’‘ʼʻ′´`‛ʹ＇]")
 UNSPOKEN = re.compile("\u00ad\\s*\n\\s*|[™®©]")
 """A soft hyphen at the end of a line, and signs that Unicode's NFKC makes letters of."""
 DASHES = str.maketrans({"‐": "-", "‒": "-", "²": " squared", "³": " cubed", "″": '"'})
+POWERS = re.compile("(?<=\\d)[⁰¹²³⁴-⁹]+")
+NOTES = re.compile("(?:(?<=[^\\W\\d_]{4})|(?<=[.,;:!?”’)]))[¹²³⁴-⁹][⁰¹²³⁴-⁹]*")
+"""What is raised: powers (``10⁵``), and the numbers of notes, which are not said."""
 PLAIN = str.maketrans({"ß": "ss", "æ": "ae", "œ": "oe", "ø": "o", "đ": "d", "ð": "th", "þ": "th", "ł": "l", "ı": "i"})
 """Letters of Latin alphabets that Unicode does not divide into a letter and an accent."""
 
@@ -48,6 +51,7 @@ def convert_to_plain(text: str) -> str:
         if marks:  # at most so many on a letter, as Unicode Standard Annex 15: they are sorted in quadratic time
             text = re.sub(f"([{marks}]{{{MAX_MARKS}}})[{marks}]+", r"\1", text)
         text = re.sub(r"(?<=\d)(?=[¼-¾⅐-⅞])", " ", UNSPOKEN.sub("", APOSTROPHES.sub("'", text)))
+        text = POWERS.sub(lambda power: f"^{unicodedata.normalize('NFKC', power[0])}", NOTES.sub("", text))
         text = unicodedata.normalize("NFKC", text.translate(DASHES)).translate(DASHES)
         text = "".join(letter for letter in text if unicodedata.category(letter) != "Cf")
         text = re.sub(r"\d", lambda digit: str(int(digit[0])), text)

@@ -10,23 +10,26 @@ from functools import cache
 
 from lipmotion.errors import AlignmentError, InputError, shorten
 from lipmotion.units.lexicon import SOUNDED, expand_lengthened, list_entries
-from lipmotion.units.spelling import convert_to_plain, normalise_text
+from lipmotion.units.spelling import ACCENTS, convert_to_plain, normalise_text
 from lipmotion.units.written_forms import FORMS, NUMERIC, WORD, list_readings
 
 CHINESE = "[\u3400-\u4dbf\u4e00-\u9fff]"
 INITIALS = re.compile("[A-Z]{2,5}s?")
 """What may be letters that are said one by one."""
 RANGE = re.compile(
-    r"(?:(?<=\d[ap]m)|(?<=\d [ap]m)|(?<=:\d\d)|(?<=\d%)|(?<=\d(?:st|nd|rd|th)))\s?[-–]\s?(?=\d)"
+    r"(?:(?<=\d[ap]m)|(?<=\d [ap]m)|(?<=\d [ap]\.m\.)|(?<=:\d\d)|(?<=\d%)|(?<=\d(?:st|nd|rd|th)))\s?[-–]\s?(?=\d)"
     r"|(?<=\d)-(?=\d{1,2}\s?[ap]m\b)|(?<=\d)(?:-|\s?–\s?)(?=[$£€]\d)",
     re.IGNORECASE,
 )
 """The dash of ``9am-5pm``, ``5:00-6:30``, ``5%-10%``, ``$5-$10`` and ``1st-3rd``."""
+COMMA = re.compile(r"(?<![\d.,])(\d+(?:\.\d{3})*),(\d\d?)(?=\s?(?:[€%°]|(?:km|kg|cm|mm|m|g|l|h)\b))")
+EUROS = re.compile(r"(?<=€)\s?(\d+(?:\.\d{3})*),(\d\d)(?!\d)")
+"""Numbers with a decimal comma, where their unit says so: ``1,5 km``, ``€1.234,56``."""
 CURRENCY = re.compile(r"(?<=\d) ?(?:USD|EUR|GBP)\b|\b(?:USD|EUR|GBP) ?(?=\d)")
 GROUPED = re.compile(
-    r"(?<![\w.,])(?<!\d )[1-9](?:\d{0,2}(?:(?:'\d{3})+|(?: \d{3})* 000)|\d?(?: \d{3}){2,})(?![\d']| \d)"
+    r"(?<![\w.,])(?<!\d )[1-9](?:\d{0,2}(?:(?:'\d{3})+|(?:\.\d{3}){2,}|(?: \d{3})* 000)|\d?(?: \d{3}){2,})(?![\d']| \d|\.\d)"
 )
-"""Numbers whose thousands are parted by blanks or apostrophes: ``1 000 000``, ``1'000'000``."""
+"""Numbers whose thousands are parted by blanks, points or apostrophes: ``1 000 000``, ``1'000'000``."""
 SMILEY = re.compile(r"(?<!\w)(?:[:;=8][-o']?[)(\]DPpO3|/\\]+|<3+|[xX]D+|\^_+\^|[tT]_[tT])(?!\w)")
 REFERENCE = re.compile(r"&(?:[a-zA-Z]{2,8}|#\d{1,6}|#x[\da-fA-F]{1,5});")
 CHARACTERS_PER_S = 200
@@ -66,7 +69,10 @@ def tokenise(text: str) -> tuple[str, ...]:
     """
     text = SMILEY.sub(" ", REFERENCE.sub(lambda match: html.unescape(match[0]), text))
     text = re.sub(r"\bWW(?=II?\b)", "World War ", re.sub("№ ?", "No. ", text))
-    plain = re.sub(r"\bUS(?=\$)", "", RANGE.sub("–", convert_to_plain(text)))
+    plain = re.sub(r"\b(?:[AC]|US|CA|AU|NZ|HK)(?=\$)", "", RANGE.sub("–", ACCENTS.sub("", convert_to_plain(text))))
+    plain = re.sub(r"([$£€])-(?=\d)", r"-\1", plain)
+    for form in (COMMA, EUROS):
+        plain = form.sub(lambda number: f"{number[1].replace('.', '')}.{number[2]}", plain)
     plain = CURRENCY.sub(lambda match: {"U": "$", "E": "€", "G": "£"}[match[0].strip()[0]], plain)
     plain = GROUPED.sub(lambda match: re.sub(r"\D", ",", match[0]), plain)
     shouted = not any(letter.islower() for letter in plain)
@@ -84,8 +90,8 @@ def _scanner() -> re.Pattern[str]:
     word = rf"{WORD}(?=[,;!?]|\s+(?-i:[a-z])|\s*\Z)"  # most are words and no more; the rest takes a tenfold time
     forms = [rf"(?:{form})(?:'s)?(?![^\W_])" for form, _ in FORMS[:-1]]  # initials are words
     numeric, worded = ("|".join(part) for part in (forms[: len(NUMERIC)], forms[len(NUMERIC) :]))
-    signs = r"(?<!\w)w/o?(?=[\s.,;!?]|\Z)|[&@×÷]|[+=](?![+=])(?<![+=]{2})|#(?=\w)|[~≈±](?=\d)"
-    dashes = r"(?<![^\s(])-(?=[.$£€]?\d)|−(?=\d)|(?<=[mdht\d%])–(?=[$£€]?\d)"
+    signs = r"(?<!\w)w/o?(?=[\s.,;!?]|\Z)|[&@×÷≥≤≠]|[+=](?![+=])(?<![+=]{2})|#(?=\w)|[~≈±](?=\d)"
+    dashes = r"(?<![^\s(])-(?=[.$£€]?\d)|−(?=\d)|(?<=[mdht\d%.])–(?=[$£€]?\d)"
     begun = rf"(?<![^\W_])(?:{word}|(?=[^\W\d_])(?:{worded})|(?![\s,;!?])(?:{numeric}))"
     grouped = "|".join([begun, signs, dashes, WORD, r"\d+(?:\.\d+)*"])
     return re.compile(re.sub(r"(?<!\\)\((?!\?)", "(?:", grouped), re.IGNORECASE)
