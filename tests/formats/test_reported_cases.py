@@ -137,6 +137,30 @@ ELAN = """<?xml version="1.0" encoding="UTF-8"?>
 <ALIGNABLE_ANNOTATION ANNOTATION_ID="a3" TIME_SLOT_REF1="s3" TIME_SLOT_REF2="s4">
 <ANNOTATION_VALUE>papa</ANNOTATION_VALUE></ALIGNABLE_ANNOTATION></ANNOTATION></TIER></ANNOTATION_DOCUMENT>
 """
+
+
+def test_textgrids_as_people_spell_them(write: Any) -> None:
+    plain = grid(words=[(0.5, 1.5, "mama"), (1.5, 2, "")])
+    for text in (f'! of "Anna", 5\n\n{plain}', plain.replace(".5", ",5"), plain.replace("\n", " ! 1\n")):
+        assert times(write(text, "a.TextGrid")) == [(0.5, 1.5)]
+    with pytest.raises(InputError, match="in order of time"):
+        read_transcript(write('"Praat chronological TextGrid text file"\n0 2\n', "a.TextGrid"))
+
+
+def test_times_of_elan_are_those_of_its_recording(write: Any, caplog: pytest.LogCaptureFixture) -> None:
+    for unit in ("milliseconds", "PAL-frames"):
+        media = (
+            f'<HEADER TIME_UNITS="{unit}"><MEDIA_DESCRIPTOR MEDIA_URL="a.wav" TIME_ORIGIN="1000"/></HEADER><TIME_ORDER>'
+        )
+        path = write(ELAN.replace("<TIME_ORDER>", media).encode("utf-16"), "a.eaf")
+        if unit == "milliseconds":
+            assert timed(path, speaker="bob").lines[0].start_s == pytest.approx(2)
+            assert "1.00 s after the start of a.wav" in caplog.text
+        else:
+            with pytest.raises(InputError, match="PAL-frames, required milliseconds"):
+                read_transcript(path)
+
+
 MFA = {name.replace("__", " - "): {"entries": [list(row) for row in rows]} for name, rows in TWO.items()}
 SPEAKERS = {
     "a.TextGrid": grid(**TWO),
@@ -302,6 +326,7 @@ LINES = {
     "ELAN's text": "default\t\t00:00:00.400\t0.4\t00:00:01.600\t1.6\t00:00:01.200\t1.2\thello big moon\n",
     "HTML's breaks": "1\n00:00:00,400 --> 00:00:01,600\nhello<br/>big&lt;br&gt;moon\n",
     "SubViewer": "[INFORMATION]\n[TITLE]no\n[SUBTITLE]\n00:00:00.40,00:00:01.60\nhello big[br]moon\n",
+    "ruby": "WEBVTT\n\n00:00.400 --> 00:01.600\n<ruby>hello<rt>no</rt></ruby> big moon\n",
     "MPL2": "[4][16]hello big|/moon\n[16][17]\n",
     "SBV": "0:00:00.400,0:00:01.600\nhello big\nmoon\n",
     "TTML": TTML.format("", BODY.format("00:00:00.4", "end", "1600ms")),

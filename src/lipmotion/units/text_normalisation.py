@@ -27,7 +27,8 @@ EUROS = re.compile(r"(?<=€)\s?(\d+(?:\.\d{3})*),(\d\d)(?!\d)")
 """Numbers with a decimal comma, where their unit says so: ``1,5 km``, ``€1.234,56``."""
 CURRENCY = re.compile(r"(?<=\d) ?(?:USD|EUR|GBP)\b|\b(?:USD|EUR|GBP) ?(?=\d)")
 GROUPED = re.compile(
-    r"(?<![\w.,])(?<!\d )[1-9](?:\d{0,2}(?:(?:'\d{3})+|(?:\.\d{3}){2,}|(?: \d{3})* 000)|\d?(?: \d{3}){2,})(?![\d']| \d|\.\d)"
+    r"(?<![\w.,])(?<!\d )[1-9](?:\d{0,2}(?:(?:'\d{3})+|(?:\.\d{3}){2,}|(?: \d{3})* 000)|\d?(?: \d{3}){2,})"
+    r"(?![\d']| \d|\.\d)"
 )
 """Numbers whose thousands are parted by blanks, points or apostrophes: ``1 000 000``, ``1'000'000``."""
 SMILEY = re.compile(r"(?<!\w)(?:[:;=8][-o']?[)(\]DPpO3|/\\]+|<3+|[xX]D+|\^_+\^|[tT]_[tT])(?!\w)")
