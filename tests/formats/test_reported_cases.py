@@ -112,6 +112,15 @@ def test_units_of_time_follow_from_how_long_words_last(write: Any, per_s: int) -
         assert times(path)[2] == pytest.approx((1.2, 1.6))
 
 
+def test_the_first_word_of_protocol_buffers_begins_at_0(write: Any) -> None:
+    word = {"word": "hi", "startTime": {}, "endTime": {"nanos": 500_000_000}}
+    assert times(write({"results": [{"alternatives": [{"words": [word]}]}]})) == [(0, 0.5)]
+
+
+def test_a_word_of_minutes_is_one_in_milliseconds(write: Any) -> None:
+    assert times(write({"words": [{"text": "hi", "start": 400, "end": 800}]})) == [(0.4, 0.8)]
+
+
 def test_samples_are_read_where_their_rate_is_known(write: Any) -> None:
     rows = "0 3050 h#\n3050 4559 sh\n4559 5723 ix\n5723 6642 hv\n6642 8772 eh\n8772 9190 dcl\n9190 10337 jh\n"
     rows += "10337 11517 dx\n11517 12500 ax-h\n12500 13000 q\n13000 14000 pcl\n14000 15000 p\n15000 16000 nx\n"
@@ -303,6 +312,16 @@ OTHERS: dict[str, Any] = {
         for w, a, b in W for k, letter in enumerate(w + " ")]},
     "ELAN's table": "Begin Time - ss.msec\tEnd Time - ss.msec\tAnnotation\n"
     + "".join(f"{a}\t{b}\t{w}\n" for w, a, b in W),
+    "Speechmatics, live": [
+        {"message": f"Add{kind}Transcript", "results": [
+            {"type": "word", "start_time": a, "end_time": b, "alternatives": [{"content": w}]}]}
+        for w, a, b in W for kind in ("Partial", "")
+    ],
+    "Azure, assessed": {"NBest": [{"Words": [
+        {"Word": w, "Offset": 1e7 * a, "Duration": 1e7 * (b - a), "PronunciationAssessment": {"ErrorType": error}}
+        for w, a, b, error in [*((*row, "None") for row in W), ("silent", 0, 0, "Omission")]]}]},
+    "minutes of ISO": [{"word": w, "offset": f"PT0M{a}S", "duration": f"PT{b - a:.3f}S"} for w, a, b in W],
+    "two units": [{"word": w, "start": f"{a}s", "duration": f"{1000 * (b - a):.0f}ms"} for w, a, b in W],
     "hundredths": [{"word": w, "start": round(a / 10), "end": round(b / 10)} for w, a, b in MS],
 }  # fmt: skip
 
