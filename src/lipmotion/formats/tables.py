@@ -278,6 +278,9 @@ def _read_timecodes(codes: list[tuple[int, float, str]]) -> Array:
     day_s, mark = DAY_S, codes[0][2]
     if mark == "." and len(codes) > MISREAD_ROWS and (frames == frames[0]).all():
         mark = ""
+    hundredths, passes = np.rint(100 * frames), np.count_nonzero(np.diff(seconds))
+    if mark == "." and passes > 1 and hundredths.max() + 1 in TIMECODE_RATES and np.allclose(hundredths, 100 * frames):
+        frames, mark = hundredths, ":"
     if not mark and len(codes) > MISREAD_ROWS and np.median(np.diff(seconds)) == 1:
         LOG.warning("rows are a second apart: the last field of the timecodes is taken for frames (MM:SS:FF)")
         seconds, frames, mark = seconds // 60, seconds % 60, ":"

@@ -43,7 +43,8 @@ _ARKIT = {name.lower(): name for name in (*ARKIT_MOUTH, *ARKIT_OTHERS)}
 _SIDES = {"l": "left", "r": "right", "left": "left", "right": "right"}
 
 
-_COPY = re.compile(r"[._ ]\d{1,4}$")  # what programs add to a name that is there already: ``jawOpen.001``
+_COPY = re.compile(r"(?:[._ ](?:\d{1,4}|(?i:copy|mesh|head|face|body|weight|(?:mesh)?shape)))+$|(?<=[a-z])Shape$")
+"""What programs add to a name: ``jawOpen.001``, ``jawOpen_Head``, ``jawOpenShape``."""
 
 
 def to_arkit(name: str) -> str | None:
