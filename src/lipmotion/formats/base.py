@@ -158,9 +158,8 @@ def find_motion_format(path: Path) -> MotionFormat:
     try:
         return _format_of(path)
     except InputError as error:
-        raise ExportError(
-            f"{path}: cannot write motion as {_suffix(path)}; use one of {', '.join(list_suffixes())}"
-        ) from error
+        what = f"{path}: cannot write motion as {_suffix(path)};"
+        raise ExportError(f"{what} use one of {', '.join(list_suffixes())}") from error
 
 
 def write_motion(path: Path, generation: Generation, *, source: dict[str, str], model: dict[str, str]) -> None:

@@ -365,10 +365,8 @@ def split_ipa(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
             raise InputError(f"{where}: {long}, required a phone: {LONGEST_SYMBOL} at most")
         unknown = "" if pause else read_ipa(label.text)[1]
         if unknown:
-            raise InputError(
-                f"{where}: {label.position} is {shorten(label.text)!r}, which is no phone (not IPA: {unknown!r}); "
-                f"required IPA, X-SAMPA, or: {' '.join(PHONES)}"
-            )
+            what = f"{where}: {label.position} is {shorten(label.text)!r}, which is no phone (not IPA: {unknown!r});"
+            raise InputError(f"{what} required IPA, X-SAMPA, or: {' '.join(PHONES)}")
     phones_of: dict[int, list[str]] = defaultdict(list)
     # no sound goes on beyond silence
     tokens = ["<sil>" if pause else label.text for label, pause in zip(labels, unspoken, strict=True)]

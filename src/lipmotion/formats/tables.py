@@ -262,10 +262,8 @@ def _parse_timecode(text: str, line: int) -> tuple[int, float, str]:
     """Return whole seconds since midnight, frames (fractions included), and what stands before the frames."""
     code = _TIMECODE.fullmatch(text)
     if code is None or int(code[2]) > 59 or int(code[3]) > 59:
-        raise ValueError(
-            f"line {line} begins with {shorten(text)!r}, required a timecode as 12:30:59:29.500; spreadsheets "
-            "shorten it: take the file as it was recorded"
-        )
+        what = f"line {line} begins with {shorten(text)!r}, required a timecode as 12:30:59:29.500;"
+        raise ValueError(f"{what} spreadsheets shorten it: take the file as it was recorded")
     seconds, mark = (int(code[1]) * 60 + int(code[2])) * 60 + int(code[3]), code[4] or ""
     if mark and mark in ".,":
         return seconds, float("0." + re.sub("[.,]", "", code[5])), "."

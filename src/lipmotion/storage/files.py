@@ -132,10 +132,8 @@ def _reached(folder: Path, *, create: bool = False) -> Iterator[int | None]:
                 with suppress(FileExistsError):
                     os.mkdir(place if handle is None else name, dir_fd=handle)
             if is_link(place):
-                raise ExportError(
-                    f"{place}: is a link, required a folder: nothing is written outside of {root}; remove the link, or "
-                    "give another name"
-                )
+                what = f"{place}: is a link, required a folder: nothing is written outside of {root}; remove the link,"
+                raise ExportError(f"{what} or give another name")
             if handle is not None:
                 outer, handle = handle, os.open(name, _FOLDER | _NO_LINK, dir_fd=handle)
                 os.close(outer)
@@ -187,10 +185,8 @@ def check_own(path: Path) -> None:
 
 def _check_own(path: Path, status: os.stat_result) -> None:
     if not stat.S_ISREG(status.st_mode) or status.st_nlink > 1:
-        raise ExportError(
-            f"{path}: is a link, a folder, a pipe or a device, or a file that has another name, too; required a file "
-            "that lipmotion writes itself; remove it, or give another folder"
-        )
+        what = f"{path}: is a link, a folder, a pipe or a device, or a file that has another name, too;"
+        raise ExportError(f"{what} required a file that lipmotion writes itself; remove it, or give another folder")
 
 
 def open_own(path: Path, buffering: int = -1) -> IO[bytes]:

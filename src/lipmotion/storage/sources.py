@@ -139,9 +139,8 @@ def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES, *, 
     except UnicodeDecodeError as error:
         text = content.decode("cp1252", "replace") if western and encoding == "utf-8" else "\0"
         if CONTROL.search(text):
-            raise InputError(
-                f"{path}: not a readable {encoding.upper()} {kind} ({error}); save it as UTF-8 text"
-            ) from error
+            what = f"{path}: not a readable {encoding.upper()} {kind} ({error});"
+            raise InputError(f"{what} save it as UTF-8 text") from error
     LOG.warning("%s: not UTF-8; read as Windows-1252 (western Europe); save it as UTF-8 if letters are wrong", path)
     return text
 
@@ -333,9 +332,8 @@ def open_media(path: Path, *, content: Any = None) -> Any:
     try:
         return av.open(f"file:{path}" if content is None else content, options=options)
     except av.ArgumentError as error:
-        raise ValueError(
-            "damaged, or of a format that is not read; playlists and indexes of other files are not followed"
-        ) from error
+        what = "damaged, or of a format that is not read;"
+        raise ValueError(f"{what} playlists and indexes of other files are not followed") from error
 
 
 @cache

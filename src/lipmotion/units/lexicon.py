@@ -111,10 +111,8 @@ class Lexicon:
         for number, line in enumerate(StringIO(text), start=1):
             where, length = f"{path}, line {number}", len(line.rstrip("\n"))
             if length > LONGEST_LINE:
-                raise InputError(
-                    f"{where}: {length} characters, required at most {LONGEST_LINE}; write one pronunciation of a word "
-                    "a line"
-                )
+                what = f"{where}: {length} characters, required at most {LONGEST_LINE};"
+                raise InputError(f"{what} write one pronunciation of a word a line")
             word, *labels = line.split("#", maxsplit=1)[0].split() or [""]
             if not word:
                 continue
@@ -204,10 +202,8 @@ def find_english_data() -> Path:
     """Return the folder of pocketsphinx's dictionary and models. Raises MissingDependencyError: it is not installed."""
     spec = find_spec("pocketsphinx")  # its data files are read, the package itself is not imported
     if spec is None or not spec.submodule_search_locations:
-        raise MissingDependencyError(
-            "the pronunciation dictionary and the phone models of many voices come with pocketsphinx: "
-            "pip install pocketsphinx"
-        )
+        what = "the pronunciation dictionary and the phone models of many voices come with pocketsphinx:"
+        raise MissingDependencyError(f"{what} pip install pocketsphinx")
     return Path(spec.submodule_search_locations[0]) / "model" / "en-us"
 
 

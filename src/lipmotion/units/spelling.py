@@ -76,10 +76,8 @@ def guess_pronunciation(word: str) -> tuple[str, ...]:
     plain = remove_accents(word)
     foreign = sorted(letter for letter in set(word) if re.search(r"[^a-z']", remove_accents(letter)))
     if foreign or not plain.strip("'"):
-        raise InputError(
-            f"cannot guess how {shorten(word)!r} is said ({shorten(' '.join(foreign)) or 'no letters'}): "
-            "give the language of the words (--language), or add it to a lexicon file"
-        )
+        what = f"cannot guess how {shorten(word)!r} is said ({shorten(' '.join(foreign)) or 'no letters'}):"
+        raise InputError(f"{what} give the language of the words (--language), or add it to a lexicon file")
     phones: list[str] = []
     letters = re.sub(r"([b-df-hj-np-tv-z])\1+", r"\1", plain)  # doubled consonants sound once
     at = 0

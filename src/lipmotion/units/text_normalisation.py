@@ -125,20 +125,16 @@ def check_text(text: str, duration_s: float) -> None:
     """Raise AlignmentError for a text that nobody can say within this duration."""
     allowed = ALWAYS_ALLOWED_CHARACTERS + int(CHARACTERS_PER_S * duration_s)
     if len(text) > allowed:
-        raise AlignmentError(
-            f"the transcript has {len(text)} characters, required at most {allowed} for {duration_s:.2f} s of sound: "
-            "nobody says so much; give the words of this recording"
-        )
+        what = f"the transcript has {len(text)} characters, required at most {allowed} for {duration_s:.2f} s of sound:"
+        raise AlignmentError(f"{what} nobody says so much; give the words of this recording")
 
 
 def check_phones(count: int, duration_s: float) -> None:
     """Raise InputError for more phones in time than there are frames in this duration."""
     allowed = ALWAYS_ALLOWED_PHONES + int(PHONES_PER_S * duration_s)
     if count > allowed:
-        raise InputError(
-            f"{count} units in time, required at most {allowed} for {duration_s:.2f} s of sound; give those of this "
-            "recording"
-        )
+        what = f"{count} units in time, required at most {allowed} for {duration_s:.2f} s of sound;"
+        raise InputError(f"{what} give those of this recording")
 
 
 MAX_CHARACTERS = 50_000
@@ -173,17 +169,13 @@ def split_sentences(text: str) -> list[str]:
     ['Dr. Smith said: wait!', 'Then he left...']
     """
     if len(text) > MAX_CHARACTERS:
-        raise InputError(
-            f"the text has {len(text)} characters, required at most {MAX_CHARACTERS}, about an hour of speech; "
-            "speak it in parts"
-        )
+        what = f"the text has {len(text)} characters, required at most {MAX_CHARACTERS}, about an hour of speech;"
+        raise InputError(f"{what} speak it in parts")
     plain = clean_text(text)
     longest = max(plain.split(), key=len, default="")
     if len(longest) > LONGEST_WORD and longest.isascii():
-        raise InputError(
-            f"a word of {len(longest)} characters ({shorten(longest)!r}), required at most {LONGEST_WORD}; "
-            "write words with blanks between them"
-        )
+        what = f"a word of {len(longest)} characters ({shorten(longest)!r}), required at most {LONGEST_WORD};"
+        raise InputError(f"{what} write words with blanks between them")
     parts = []
     for sentence in _divide(plain):
         rest = sentence

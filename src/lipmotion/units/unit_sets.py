@@ -96,9 +96,8 @@ class UnitSet:
         if label.phone:
             return self.unit(label.phone)
         if label.unit not in self.units:
-            raise InputError(
-                f"unknown unit {label.unit!r} without a phone; give a phone, or one of {' '.join(self.units)}"
-            )
+            what = f"unknown unit {label.unit!r} without a phone; give a phone,"
+            raise InputError(f"{what} or one of {' '.join(self.units)}")
         return label.unit
 
     def label(self, unit: str) -> Unit:
@@ -268,8 +267,6 @@ def load_unit_set(name_or_path: str | Path) -> UnitSet:
     if str(name_or_path) in known:
         return known[str(name_or_path)]
     if not os.path.exists(name_or_path):  # noqa: PTH110 - False, not an error, for a name that no file can have
-        raise InputError(
-            f"no unit set {str(name_or_path)!r}; there are: {', '.join(known)}; or give a table file, "
-            "a unit and its phones a line"
-        )
+        what = f"no unit set {str(name_or_path)!r}; there are: {', '.join(known)}; or give a table file,"
+        raise InputError(f"{what} a unit and its phones a line")
     return read_unit_table(Path(name_or_path))

@@ -140,28 +140,22 @@ class _TrackDecoder:
     def _silence(self, duration_s: float) -> int:
         """Return the number of samples of a hole's silence. Raises InputError: the hole is too long."""
         if duration_s > LONGEST_HOLE_S:
-            raise InputError(
-                f"{self._name}: the time stamps of its sound jump by {duration_s:.0f} s, at most "
-                f"{LONGEST_HOLE_S:.0f} s are bridged; {AGAIN}"
-            )
+            what = f"{self._name}: the time stamps of its sound jump by {duration_s:.0f} s,"
+            raise InputError(f"{what} at most {LONGEST_HOLE_S:.0f} s are bridged; {AGAIN}")
         return round(duration_s * self.rate_hz)
 
     def _check_silence(self) -> None:
         max_s = LONGEST_HOLE_S + MAX_SILENCE_RATIO * self._sound_s
         if self.silence_s > max_s:
-            raise InputError(
-                f"{self._name}: the time stamps of its sound leave holes of {self.silence_s:.0f} s beside "
-                f"{self._sound_s:.1f} s of sound, at most {max_s:.0f} s are bridged; {AGAIN}"
-            )
+            what = f"{self._name}: the time stamps of its sound leave holes of {self.silence_s:.0f} s beside"
+            raise InputError(f"{what} {self._sound_s:.1f} s of sound, at most {max_s:.0f} s are bridged; {AGAIN}")
         self._check_length(self._sound_s + self.silence_s)
 
     def _check_length(self, length_s: float) -> None:
         max_s = LONGEST_HOLE_S + self._size / MIN_BYTES_PER_S
         if length_s > max_s:
-            raise InputError(
-                f"{self._name}: {self._size} bytes of sound last {length_s:.0f} s, required at most {max_s:.0f} s "
-                f"({MIN_BYTES_PER_S:.0f} bytes a second); {AGAIN}"
-            )
+            what = f"{self._name}: {self._size} bytes of sound last {length_s:.0f} s,"
+            raise InputError(f"{what} required at most {max_s:.0f} s ({MIN_BYTES_PER_S:.0f} bytes a second); {AGAIN}")
 
     def _flush(self) -> None:
         if self._resampler is not None:
@@ -278,9 +272,8 @@ def _decode(path: Path, rate_hz: int, channel: int | None) -> _TrackDecoder:
         if isinstance(error, InputError):
             raise
         if is_text(path):
-            raise InputError(
-                f"{path}: is text, required a recording; give the recording first, its words with --transcript {path}"
-            ) from error
+            what = f"{path}: is text, required a recording; give the recording first,"
+            raise InputError(f"{what} its words with --transcript {path}") from error
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: not a readable recording ({reason}); give an audio or video file") from error
 
