@@ -104,17 +104,10 @@ MOTION_READERS: Registry[Callable[[Path], tuple[Motion, Timeline[Unit]]]] = Regi
 )
 """Readers of files that hold motion, but are not written as motion formats, by suffix as ``MOTION_FORMATS``."""
 OTHER_JSON = {
-    b'"lipmotion.motion"': ".json",
-    b'"mouthCues"': ".tsv",
-    b'"facsNames"': ".a2f.json",
-    b'"weightMat"': ".a2f.json",
-    b"lendShapes": ".jsonl",
-    b"lendshape": ".jsonl",
-    b"ategory": ".jsonl",
-    b'awOpen"': ".jsonl",
-    b'"viseme":': ".tsv",
+    b'"lipmotion.motion"': ".json", b'"mouthCues"': ".tsv", b'"facsNames"': ".a2f.json", b'"weightMat"': ".a2f.json",
+    b"lendShapes": ".jsonl", b"lendshape": ".jsonl", b"ategory": ".jsonl", b'awOpen"': ".jsonl", b'"viseme":': ".tsv",
     b'"visemes":': ".tsv",
-}
+}  # fmt: skip
 """What the beginnings of ``.json`` files hold, and the suffix of files that are read alike; the first counts."""
 JSON_HEAD = 1 << 16  # how many bytes of a ``.json`` are searched for them
 CUE_LINE = re.compile(

@@ -87,14 +87,8 @@ UNKNOWN_PHONES = "spn"
 """The unit, without a phone, of a span in which somebody speaks and nobody says what: as aligners label a word that is
 in no dictionary. Its word, where it is given, is that of the whole span."""
 
-CLOSURES = {
-    "pcl": ("p",),
-    "bcl": ("b",),
-    "tcl": ("t", "ch", "dx"),
-    "dcl": ("d", "jh", "dx"),
-    "kcl": ("k",),
-    "gcl": ("g",),
-}
+_CLOSED = parse_table("pcl=p bcl=b tcl=t_ch_dx dcl=d_jh_dx kcl=k gcl=g")
+CLOSURES = {closure: tuple(phones.split()) for closure, phones in _CLOSED.items()}
 """Closures of TIMIT to the phones that they open to; alone, a closure is the first of these."""
 OTHER_NAMES = {closure: phones[0] for closure, phones in CLOSURES.items()} | dict(
     zip("dx nx eng ux hv ax-h axh tq epi pau h#".split(), "d n ng uw hh ax ax t sil sil sil".split(), strict=True)
