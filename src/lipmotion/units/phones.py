@@ -77,10 +77,8 @@ def choose_drawn_shape(shape: str, drawn: str) -> str:
 
 
 SILENCE = "sil"
-PAUSE = "sp"
-"""A pause between words that is too short to be silence."""
-SHORT_PAUSE_S = 0.2
-"""Silence shorter than this is a pause between words."""
+PAUSE = "sp"  # a pause between words that is too short to be silence
+SHORT_PAUSE_S = 0.2  # silence shorter than this is a pause between words
 
 PHONES: tuple[str, ...] = tuple(sorted(VISEME_OF))
 UNKNOWN_PHONES = "spn"
@@ -96,13 +94,11 @@ OTHER_NAMES = {closure: phones[0] for closure, phones in CLOSURES.items()} | dic
 """Phones that TIMIT and Buckeye name otherwise: the tap of *city* is a d, of *winner* an n.
 Source: TIMIT, phoncode.doc; the Buckeye corpus manual."""
 
-REDUCED_VOWELS = {"ah": "ax", "er": "axr", "ih": "ix"}
-"""Vowels to their unstressed forms."""
+REDUCED_VOWELS = {"ah": "ax", "er": "axr", "ih": "ix"}  # vowels to their unstressed forms
 FULL_FORMS = {reduced: vowel for vowel, reduced in REDUCED_VOWELS.items()} | {"el": "l", "em": "m", "en": "n"}
 """Unstressed vowels and syllabic consonants to the phones that a dictionary writes for them."""
 
-LIP_CLOSING: tuple[str, ...] = (*VISEMES["bi"], "em")
-"""The phones in which the lips meet."""
+LIP_CLOSING: tuple[str, ...] = (*VISEMES["bi"], "em")  # the phones in which the lips meet
 
 SIMILAR_PHONES: dict[str, tuple[str, ...]] = {
     phone: tuple(others.split())

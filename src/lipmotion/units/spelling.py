@@ -22,17 +22,13 @@ SPELLINGS = parse_table(
 )
 """The longest match from the left wins. ARPAbet, lower case; an empty value is a silent letter."""
 LONG_VOWELS = {"a": "ey", "e": "iy", "i": "ay", "o": "ow", "u": "uw"}
-ACCENTS = re.compile("[\u0300-\u036f]")
-"""The accents of Latin letters; the marks of other scripts are sounds."""
+ACCENTS = re.compile("[\u0300-\u036f]")  # the accents of Latin letters; the marks of other scripts are sounds
 _LONGEST = max(map(len, SPELLINGS))
-_SILENT_E = re.compile(r"e'?s?")
-"""A silent e, with or without an s, at the end of a word."""
-_LONG_VOWEL = re.compile(r"[aeiou][bcdfgklmnpstvz]e('?s)?$")
-"""A long vowel: vowel, consonant, final e."""
+_SILENT_E = re.compile(r"e'?s?")  # a silent e, with or without an s, at the end of a word
+_LONG_VOWEL = re.compile(r"[aeiou][bcdfgklmnpstvz]e('?s)?$")  # a long vowel: vowel, consonant, final e
 
 
-MAX_MARKS = 30
-"""Largest number of accents on one letter; no language has so many."""
+MAX_MARKS = 30  # largest number of accents on one letter; no language has so many
 APOSTROPHES = re.compile("[’‘ʼʻ′´`‛ʹ＇]")
 UNSPOKEN = re.compile("\u00ad\\s*\n\\s*|[™®©]")
 """A soft hyphen at the end of a line, and signs that Unicode's NFKC makes letters of."""

@@ -14,8 +14,7 @@ from lipmotion.units.spelling import ACCENTS, convert_to_plain, normalise_text
 from lipmotion.units.written_forms import FORMS, NUMERIC, WORD, list_readings
 
 CHINESE = "[\u3400-\u4dbf\u4e00-\u9fff]"
-INITIALS = re.compile("[A-Z]{2,5}s?")
-"""What may be letters that are said one by one."""
+INITIALS = re.compile("[A-Z]{2,5}s?")  # what may be letters that are said one by one
 RANGE = re.compile(
     r"(?:(?<=\d[ap]m)|(?<=\d [ap]m)|(?<=\d [ap]\.m\.)|(?<=:\d\d)|(?<=\d%)|(?<=\d(?:st|nd|rd|th)))\s?[-–]\s?(?=\d)"
     r"|(?<=\d)-(?=\d{1,2}\s?[ap]m\b)|(?<=\d)(?:-|\s?–\s?)(?=[$£€]\d)",
@@ -37,10 +36,8 @@ CHARACTERS_PER_S = 200
 """Most characters a second: three times the fastest speech on record (655 words a minute), blanks and punctuation."""
 ALWAYS_ALLOWED_CHARACTERS = 10_000
 """Characters that a text may always have, as notes and blank lines beside the words of a short recording."""
-LARGEST_TRANSCRIPT_BYTES = 1 << 22
-"""Most bytes of a transcript file: three days of speech."""
-PHONES_PER_S = 100
-"""Most phones a second: with more, a phone has less than one frame of 10 ms on average."""
+LARGEST_TRANSCRIPT_BYTES = 1 << 22  # most bytes of a transcript file: three days of speech
+PHONES_PER_S = 100  # most phones a second: with more, a phone has less than one frame of 10 ms on average
 ALWAYS_ALLOWED_PHONES = 1000
 """Phones that a list may always have; if they are those of another recording, a warning is enough."""
 
@@ -137,10 +134,8 @@ def check_phones(count: int, duration_s: float) -> None:
         raise InputError(f"{what} give those of this recording")
 
 
-MAX_CHARACTERS = 50_000
-"""Most characters of a text: about an hour of speech."""
-LONGEST_SENTENCE = 400
-"""A longer sentence is divided at a comma, else between words; in characters."""
+MAX_CHARACTERS = 50_000  # most characters of a text: about an hour of speech
+LONGEST_SENTENCE = 400  # a longer sentence is divided at a comma, else between words; in characters
 LONGEST_WORD = 200
 """Most characters without a blank in scripts that have blanks; a longer one is no word, but would take minutes."""
 ABBREVIATIONS = (

@@ -22,20 +22,10 @@ from typing import NamedTuple
 from lipmotion.errors import InputError, shorten
 from lipmotion.storage.sources import read_text_file
 from lipmotion.types import Unit
-from lipmotion.units.phones import (
-    PAUSE,
-    PHONES,
-    SILENCE,
-    VISEME_OF,
-    describe_unknown_phone,
-    is_silent,
-    list_phone_classes,
-)
+from lipmotion.units.phones import PHONES, SILENCE, VISEME_OF, describe_unknown_phone, is_silent, list_phone_classes
 
-LARGEST_TABLE_BYTES = 1 << 18
-"""The most bytes of a table file; one of 47 phones has a few hundred."""
-CLOSED_UNIT = "closed"
-"""Name of the only unit that may hold silence and speech."""
+LARGEST_TABLE_BYTES = 1 << 18  # the most bytes of a table file; one of 47 phones has a few hundred
+CLOSED_UNIT = "closed"  # name of the only unit that may hold silence and speech
 
 
 @dataclass(frozen=True)
@@ -241,21 +231,13 @@ GROUPS: dict[str, tuple[UnitGroup, ...]] = {
     ),
     "phone": tuple(UnitGroup(phone, phone, "itself") for phone in PHONES),
 }
-_UNCOUNTED = {"sVis": "silence", "pbVis": "rest", "phone": PAUSE}
-"""Units that the paper's count leaves out."""
+_UNCOUNTED = {"sVis": "silence", "pbVis": "rest", "phone": "sp"}  # units that the paper's count leaves out
 
 
-UNIT_SETS: dict[str, UnitSet] = {
-    name: UnitSet(
-        name,
-        {phone: group.unit for group in groups for phone in group.phones.split()},
-        frozenset([_UNCOUNTED[name]] if name in _UNCOUNTED else []),
-    )
-    for name, groups in GROUPS.items()
-}
+_UNITS_OF = {name: {p: group.unit for group in groups for p in group.phones.split()} for name, groups in GROUPS.items()}
+UNIT_SETS = {name: UnitSet(name, of, frozenset(_UNCOUNTED.get(name, "").split())) for name, of in _UNITS_OF.items()}
 """The unit sets in the order of the paper's Table 1, except sVis, which is placed by its size."""
-VISEME_SET = UnitSet("viseme", VISEME_OF)
-"""The 13 visemes of Xie & Liu 2007, Table 1; not one of the five."""
+VISEME_SET = UnitSet("viseme", VISEME_OF)  # the 13 visemes of Xie & Liu 2007, Table 1; not one of the five
 
 
 def load_unit_set(name_or_path: str | Path) -> UnitSet:

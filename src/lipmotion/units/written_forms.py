@@ -14,8 +14,7 @@ from lipmotion.units.spelling import parse_table
 Reading = tuple[str, ...]
 Forms = tuple[tuple[str, str | Callable[[str], Iterator[str]]], ...]
 
-MAX_READINGS = 8
-"""Most readings of a form: alignment tries each."""
+MAX_READINGS = 8  # most readings of a form: alignment tries each
 ONES = (
     "zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen "
     "seventeen eighteen nineteen"
@@ -23,8 +22,7 @@ ONES = (
 TENS = "_ _ twenty thirty forty fifty sixty seventy eighty ninety".split()
 SCALES = ((10**9, "billion"), (10**6, "million"), (1000, "thousand"), (100, "hundred"))
 MONTHS = "january february march april may june july august september october november december".split()
-
-
+_MONTHS = {name[:3]: name for name in MONTHS}
 ORDINALS = parse_table("one=first two=second three=third five=fifth eight=eighth nine=ninth twelve=twelfth")
 """The ordinals that do not end in ``th`` after the cardinal."""
 CURRENCIES = parse_table(
@@ -234,24 +232,14 @@ def _stutter(text: str) -> Iterator[str]:
 
 
 SAID: dict[str, Callable[[str], str]] = {
-    "": _usual,
-    "w": str.lower,
+    **{"": _usual, "w": str.lower, "c": _plain, "o": _ordinal, "p": _pair, "n": _minutes, "t": _hour},
     "i": lambda amount: _cardinal(amount) if re.fullmatch(NUMBER, amount) else _usual(amount),
-    "c": _plain,
-    "o": _ordinal,
-    "p": _pair,
     "y": lambda digits: _usual(digits if len(digits) == 4 else f"{'19' if int(digits) > 50 else '20'}{digits}"),
-    "m": lambda text: (
-        MONTHS[int(text) - 1]
-        if text.isdecimal()
-        else next(name for name in MONTHS if name.startswith(text[:3].lower()))
-    ),
+    "m": lambda text: MONTHS[int(text) - 1] if text.isdecimal() else _MONTHS[text[:3].lower()],
     "q": lambda digits: "quarter" if digits == "4" else _ordinal(digits),
-    "n": _minutes,
     "N": lambda digits: _minutes(digits).replace("quarter", "a quarter"),
     "l": lambda digits: _minutes(str(60 - int(digits))),
     "L": lambda digits: _minutes(str(60 - int(digits))).replace("quarter", "a quarter"),
-    "t": _hour,
     "f": lambda digits: _hour(digits, 1),
     "e": lambda amount: _cardinal(_thousands(amount)),
     "k": lambda amount: _hundreds(_thousands(amount)),
@@ -270,8 +258,7 @@ SAID: dict[str, Callable[[str], str]] = {
 """What the ways of templates make of a part."""
 NUMBER = r"(?:\d{1,3}(?:,\d{3})+(?!\d)|\d+)"
 A = rf"(?:{NUMBER}(?:\.\d+)?|\.\d+)"
-R = rf"({A}(?:\s?[-–]\s?{A})?)"
-"""An amount, and one or a range of them."""
+R = rf"({A}(?:\s?[-–]\s?{A})?)"  # an amount, and one or a range of them
 WORD = r"[^\W\d_]+(?:'[^\W\d_]+)*"
 _NAME = "|".join(f"{name[:3].title()}(?:{name[3:]})?" for name in MONTHS).replace("Sep", "Sep(?:t(?!e))?")
 MONTH, MM, DD = rf"(?-i:({_NAME})\.?)", "(0?[1-9]|1[0-2])", r"(0?[1-9]|[12]\d|3[01])"

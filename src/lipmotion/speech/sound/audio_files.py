@@ -18,8 +18,7 @@ from lipmotion.types import Audio
 
 HOLE_S = 0.04
 """A frame this much later than the end of the one before leaves a hole; time stamps are rounded to 1 ms or better."""
-LONGEST_HOLE_S = 600.0
-"""A hole longer than this means that the time stamps are wrong."""
+LONGEST_HOLE_S = 600.0  # a hole longer than this means that the time stamps are wrong
 MAX_SILENCE_RATIO = 20.0
 """All holes together may last as long as the longest one allowed, and this many times the sound: a codec that sends
 nothing in pauses still sends 20 ms of every 400. More silence than that is no recording, but would fill the memory."""
@@ -30,8 +29,7 @@ LOWEST_HZ, HIGHEST_HZ = 4000, 1_000_000
 """Lowest and highest sampling rate: below, speech is not intelligible; no recorder samples at a higher one."""
 MAX_CHANNELS = 64
 AGAIN = "export the recording again"
-PIECE_BYTES = 1 << 20
-"""Sound is collected in pieces of this size, and without digital silence."""
+PIECE_BYTES = 1 << 20  # sound is collected in pieces of this size, and without digital silence
 
 
 def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
@@ -184,14 +182,11 @@ class _TrackDecoder:
 LOG = logging.getLogger("lipmotion")
 
 SPEECH_RATE_HZ = 16_000
-SHORTEST_S = 0.1
-"""Shorter recordings hold no sentence; the features need 25 ms around every frame."""
+SHORTEST_S = 0.1  # shorter recordings hold no sentence; the features need 25 ms around every frame
 CANCELLED_SHARE = 0.2
 """The mean of channels must have this share of the energy of unlike ones; else they cancel one another."""
-USABLE_SHARE = 0.5
-"""A damaged recording is refused when less than this share of its sound can be decoded."""
-MIN_HOLES_S = 0.005
-"""Holes that last less together are not mentioned: they would be rounded to 0."""
+USABLE_SHARE = 0.5  # a damaged recording is refused when less than this share of its sound can be decoded
+MIN_HOLES_S = 0.005  # holes that last less together are not mentioned: they would be rounded to 0
 CUT_SHORT_SHARE, ROUNDED_S, STATED = 0.9, 0.5, ("flac", "aiff", "mov,mp4,m4a,3gp,3g2,mj2")
 """A recording is called cut short when it holds less than this share of the duration that it states, or so many seconds
 less in a format that states it exactly."""
