@@ -318,8 +318,8 @@ OTHERS: dict[str, Any] = {
         for w, a, b in W for kind in ("Partial", "")
     ],
     "Azure, assessed": {"NBest": [{"Words": [
-        {"Word": w, "Offset": 1e7 * a, "Duration": 1e7 * (b - a), "PronunciationAssessment": {"ErrorType": error}}
-        for w, a, b, error in [*((*row, "None") for row in W), ("silent", 0, 0, "Omission")]]}]},
+        {"Word": w, "Offset": round(1e4 * a), "Duration": round(1e4 * (b - a)), "PronunciationAssessment": {"ErrorType": e}}
+        for w, a, b, e in [*((*row, "None") for row in MS), ("silent", 0, 0, "Omission")]]}]},
     "minutes of ISO": [{"word": w, "offset": f"PT0M{a}S", "duration": f"PT{b - a:.3f}S"} for w, a, b in W],
     "two units": [{"word": w, "start": f"{a}s", "duration": f"{1000 * (b - a):.0f}ms"} for w, a, b in W],
     "hundredths": [{"word": w, "start": round(a / 10), "end": round(b / 10)} for w, a, b in MS],

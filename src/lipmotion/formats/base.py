@@ -79,21 +79,15 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
     "motion format",
     "lipmotion.exporters",
     {
-        "json": "lipmotion.formats.motion_document:JSON",
-        "csv": "lipmotion.formats.tables:TABLE",
-        "npz": "lipmotion.formats.motion_document:NPZ",
-        "livelink.csv": "lipmotion.formats.tables:LIVE_LINK",
-        "blender.py": "lipmotion.formats.blender:MOTION_FORMAT",
-        "c3d": "lipmotion.formats.c3d:MOTION_FORMAT",
-        "fap": "lipmotion.formats.fap:MOTION_FORMAT",
-        "anim": "lipmotion.formats.game_engines:UNITY",
-        "tres": "lipmotion.formats.game_engines:GODOT",
-        "vmd": "lipmotion.formats.vmd:MOTION_FORMAT",
-        "bvh": "lipmotion.formats.c3d:BVH",
-        "a2f.json": "lipmotion.formats.motion_document:AUDIO2FACE",
+"json": "lipmotion.formats.motion_document:JSON", "csv": "lipmotion.formats.tables:TABLE",
+        "npz": "lipmotion.formats.motion_document:NPZ", "livelink.csv": "lipmotion.formats.tables:LIVE_LINK",
+        "blender.py": "lipmotion.formats.blender:MOTION_FORMAT", "c3d": "lipmotion.formats.c3d:MOTION_FORMAT",
+        "fap": "lipmotion.formats.fap:MOTION_FORMAT", "anim": "lipmotion.formats.game_engines:UNITY",
+        "tres": "lipmotion.formats.game_engines:GODOT", "vmd": "lipmotion.formats.vmd:MOTION_FORMAT",
+        "bvh": "lipmotion.formats.c3d:BVH", "a2f.json": "lipmotion.formats.motion_document:AUDIO2FACE",
         "motion3.json": "lipmotion.formats.game_engines:LIVE2D",
     },
-)
+)  # fmt: skip
 """Motion formats by suffix, without the first dot; a suffix may have several parts, as ``livelink.csv``."""
 _CUES = "lipmotion.formats.cues:read_cue_motion"
 _FRAMES = "lipmotion.formats.motion_document:read_frames"
@@ -395,6 +389,15 @@ def _read_each(text: str, at: int, brackets: str, take: Callable[[int], int]) ->
         if text[at : at + 1] == brackets[1]:
             return at + 1
         at = find_next_at(text, _pass(text, at, ","))
+
+
+def iterate_json(text: str, decoder: json.JSONDecoder | None = None) -> Iterator[tuple[int, Any]]:
+    """Yield the values of a text, one after another, each with its place. Raises JSONDecodeError: one is damaged."""
+    at = find_next_at(text, 0)
+    while at < len(text):
+        value, end = (decoder or json.JSONDecoder()).raw_decode(text, at)
+        yield at, value
+        at = find_next_at(text, end)
 
 
 def find_next_at(text: str, at: int) -> int:

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.formats.base import find_next_at
+from lipmotion.formats.base import iterate_json
 from lipmotion.formats.label_tiers import (
     EARLIEST_S,
     LINES,
@@ -233,18 +233,16 @@ def _decode_documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
         object_pairs_hook=lambda pairs: {plain(name): value for name, value in pairs},
         parse_constant=lambda _: None,  # NaN: missing
     )
-    at, line, counted = find_next_at(text, 0), 1, 0
-    while at < len(text):
-        line, counted = line + text.count("\n", counted, at), at
-        try:
-            value, at = decoder.raw_decode(text, at)
-        except json.JSONDecodeError as error:
-            what = f"line {error.lineno}: damaged JSON ({error.msg})"
-            raise DamagedJsonError(f"{where}: {what}; write it again") from error
-        except (ValueError, RecursionError) as error:
-            raise DamagedJsonError(f"{where}: damaged JSON: nested too deeply, or a number too long") from error
-        yield line, value
-        at = find_next_at(text, at)
+    line, counted = 1, 0
+    try:
+        for at, value in iterate_json(text, decoder):
+            line, counted = line + text.count("\n", counted, at), at
+            yield line, value
+    except json.JSONDecodeError as error:
+        what = f"line {error.lineno}: damaged JSON ({error.msg})"
+        raise DamagedJsonError(f"{where}: {what}; write it again") from error
+    except (ValueError, RecursionError) as error:
+        raise DamagedJsonError(f"{where}: damaged JSON: nested too deeply, or a number too long") from error
 
 
 def _parse_number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:

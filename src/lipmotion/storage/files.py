@@ -16,7 +16,7 @@ import sys
 import time
 import uuid
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -258,39 +258,31 @@ def find_place(target: Path) -> Path:
 
 
 @contextmanager
-def atomic_file(target: Path) -> Iterator[Path]:
-    """Give a temporary path to write to, with the target's suffix (lower case); rename it to ``target`` on success.
-
-    Where ``target`` is a link, the file that it points to is written; in a confined folder the file replaces the link.
-    Raises ExportError: the folder does not exist, or the file cannot be written (disk full, no permission).
-    """
-    place = find_place(target)
+def _replace(target: Path, place: Path, *, folder: bool) -> Iterator[Path]:
     temporary = _temporary(place, target.suffix)
     try:
         with _reached(place.parent):
-            remove_left_files(place)
+            temporary.mkdir() if folder else remove_left_files(place)
         yield temporary
         put_in_place(temporary, place)
     except OSError as error:
         raise write_error(target, error) from error
     finally:
-        with suppress(OSError):
-            temporary.unlink()
+        remove(temporary)
 
 
-@contextmanager
-def replace_folder(target: Path) -> Iterator[Path]:
+def atomic_file(target: Path) -> AbstractContextManager[Path]:
+    """Give a temporary path to write to, with the target's suffix (lower case); rename it to ``target`` on success.
+
+    Where ``target`` is a link, the file that it points to is written; in a confined folder the file replaces the link.
+    Raises ExportError: the folder does not exist, or the file cannot be written (disk full, no permission).
+    """
+    return _replace(target, find_place(target), folder=False)
+
+
+def replace_folder(target: Path) -> AbstractContextManager[Path]:
     """Give a temporary folder, which becomes ``target`` on success. Raises ExportError: it cannot be written."""
-    temporary = _temporary(target, target.suffix)
-    try:
-        with _reached(target.parent):
-            temporary.mkdir()
-        yield temporary
-        put_in_place(temporary, target)
-    except OSError as error:
-        raise write_error(target, error) from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+    return _replace(target, target, folder=True)
 
 
 @contextmanager
