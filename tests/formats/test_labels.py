@@ -170,6 +170,8 @@ def test_the_words_of_ljspeech_stand_in_one_table(tmp_path, place, first) -> Non
     recording.parent.mkdir()
     table.write_text(f"LJ0010|no|no\n{first}|In 2 parts|in two parts\nLJ002|other\n")
     assert label_files.find_labels(recording).words == ("in", "two", "parts")
+    table.write_text(f"{first}|again\n")
+    assert label_files.find_labels(recording).words == ("again",)
     assert label_files.find_labels(recording.with_name("LJ003.wav")).words is None
     recording.with_suffix(".txt").write_text("its own")
     assert label_files.find_labels(recording).words == ("its", "own")

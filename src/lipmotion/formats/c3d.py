@@ -273,10 +273,8 @@ def check(motion: Motion) -> None:
     for text in [text for channel in motion.channels for text in (channel.name, channel.unit)]:
         plain = text.isascii() and text.isprintable() and text == text.strip()
         if not plain or len(text) > LONGEST_LABEL_CHARACTERS:
-            raise ExportError(
-                f"the name or unit {text[:60]!r} of a channel does not fit into .c3d, required up to 64 ASCII "
-                "characters, without blanks at its ends"
-            )
+            what = f"the name or unit {text[:60]!r} of a channel does not fit into .c3d,"
+            raise ExportError(f"{what} required up to 64 ASCII characters, without blanks at its ends")
     points = len(_points(motion))
     if max(len(motion.names) - 3 * points, points + len(EYES)) > MAX_CURVES:
         raise ExportError(f"more than {MAX_CURVES} points, or other channels, which .c3d cannot name; write .npz")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import re
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from io import StringIO
 from itertools import islice
 from pathlib import Path
@@ -102,11 +103,10 @@ def find_labels(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> R
             labels = _read(path, unknown_json=path.suffix == ".json")
             read += [(path, labels)] if labels is not None else []
             seen.append(path)
-    name = re.escape(recording.stem)
     for path in [] if seen else find_tables(recording):
-        line = rf"{name}(?: +(.*))?" if path.name != METADATA else rf"(?:[^|\n]*/)?{name}(?:\.\w+)?\|(?:.*\|)?([^|\n]*)"
-        if not read and (row := re.search(rf"^[ \t]*{line}$", _read_text(path), re.MULTILINE)):
-            read.append((path, _read_plain(row[1] or "", path)))
+        words = _read_table(path, path.stat().st_size, path.stat().st_mtime_ns).get(recording.stem)
+        if words is not None and not read:
+            read.append((path, _read_plain(words, path)))
         elif path.name != METADATA:
             raise InputError(f"{path}: has no line of {recording.stem}; required this name, a blank and its words")
     in_order = sorted(read, key=lambda item: (*FOR_PHONES, item[0].suffix).index(item[0].suffix))
@@ -129,6 +129,18 @@ def find_tables(recording: Path) -> list[Path]:
     chapter = recording.with_name(recording.stem.rpartition("-")[0] + CHAPTER)
     tables = (folder / METADATA for folder in recording.absolute().parents[:2])
     return [path for path in (chapter, *tables) if path.is_file()]
+
+
+@lru_cache(maxsize=2)
+def _read_table(path: Path, _size: int, _changed_ns: int) -> dict[str, str]:
+    """Return the words of recordings by their names, of a file as ``find_tables`` has it; cached until it changes."""
+    words: dict[str, str] = {}
+    for line in StringIO(_read_text(path)):
+        name, *rest = re.split(r"\|" if path.name == METADATA else " +", line.strip(), maxsplit=1)
+        if rest or path.name != METADATA:
+            for key in {Path(name).name, Path(name).stem if path.name == METADATA else name}:
+                words.setdefault(key, rest[0].rpartition("|")[2] if rest else "")
+    return words
 
 
 def read_labels(path: Path) -> RecordingLabels:

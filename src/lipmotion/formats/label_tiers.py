@@ -56,6 +56,7 @@ RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")
 """A phone or unit, and its confidence from 0 to 1."""
 MAX_LABELS = 250_000  # most labels of a file: phones of five hours of speech
 TYPICAL_PHONE_S, TYPICAL_WORD_S = 0.08, 0.3  # how long a phone, and a word, alone or of a line, last
+LONGEST_WORD_S = 100.0  # a single word that lasts longer than this is in another unit
 UNIT_LIMITS = ((150, 1), (6000, 1000), (300_000, 0), (3_200_000, 1_000_000))
 """If they last up to so many times as long as is typical, so many units are a second; 0: these are samples."""
 WHOLE_LIMITS = ((15, 1), (70, 0), (220, 100), *UNIT_LIMITS[1:])
@@ -134,7 +135,7 @@ def find_time_unit(spans: Sequence[tuple[float, float, str]], role: str, where: 
         if math.inf > end > start and classify_label(text) is SpokenAs.SPEECH
     ]
     all_whole = all(time == int(time) for span in spans for time in span[:2] if math.isfinite(time))
-    if len(lengths) < 1 + (usual == 1):
+    if not lengths or (len(lengths) < 2 and usual == 1 and lengths[0] < LONGEST_WORD_S):
         return usual if all_whole else 1
     times = median(lengths) / (TYPICAL_PHONE_S if role == PHONE_LABELS else TYPICAL_WORD_S)
     limits = WHOLE_LIMITS if all_whole and role in (WORDS, PHONE_LABELS) else UNIT_LIMITS
@@ -364,10 +365,8 @@ def split_ipa(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
             raise InputError(f"{where}: {long}, required a phone: {LONGEST_SYMBOL} at most")
         unknown = "" if pause else read_ipa(label.text)[1]
         if unknown:
-            raise InputError(
-                f"{where}: {label.position} is {shorten(label.text)!r}, which is no phone (not IPA: {unknown!r}); "
-                f"required IPA, X-SAMPA, or: {' '.join(PHONES)}"
-            )
+            what = f"{where}: {label.position} is {shorten(label.text)!r}, which is no phone (not IPA: {unknown!r});"
+            raise InputError(f"{what} required IPA, X-SAMPA, or: {' '.join(PHONES)}")
     phones_of: dict[int, list[str]] = defaultdict(list)
     # no sound goes on beyond silence
     tokens = ["<sil>" if pause else label.text for label, pause in zip(labels, unspoken, strict=True)]

@@ -89,10 +89,8 @@ def resample_evenly(time_s: Array, rows: Array) -> tuple[Array, float]:
         hertz = nearest
     frames = round(float(passed_s[-1]) * hertz) + 1
     if frames > LONGEST_GAP * len(time_s) + SPARE_FRAMES:
-        raise InputError(
-            f"{len(time_s)} rows in {passed_s[-1]:.1f} s at {hertz:g} rows a second: most of the time there are none; "
-            "cut the take where it has gaps"
-        )
+        what = f"{len(time_s)} rows in {passed_s[-1]:.1f} s at {hertz:g} rows a second:"
+        raise InputError(f"{what} most of the time there are none; cut the take where it has gaps")
     missing = np.maximum(np.rint(steps * hertz) - 1, 0)
     if missing.any():
         spans = _name_spans([(passed_s[start], passed_s[stop]) for start, stop in find_runs(missing > 0)])

@@ -16,10 +16,11 @@ from lipmotion.types import Timeline, Unit
 from lipmotion.units import RECOGNISED, group_words, list_recognised_phones
 
 TOKEN = re.compile(
-    r'"(?P<text>[^"]*)"|![^\n]*|<(?P<flag>\w+)>|(?<!\S)(?P<number>[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)(?!\S)'
+    r'"(?P<text>[^"]*)"|![^\n]*|<(?P<flag>\w+)>|(?<!\S)(?P<number>[-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)(?!\S)'
 )
 """What Praat itself reads: texts in quotes, flags, and numbers between blanks. All else (``xmin =``) is ignored."""
-TEXTGRID = re.compile(r'\s*(?:File type\s*=\s*)?"?oo(Text|Binary)File')  # how Praat's files begin
+TEXTGRID = re.compile(r'\s*(?:![^\n]*\n\s*)*(?:(?:File type\s*=\s*)?"?oo(?:Text|Binary)File|"Praat chronological)')
+"""How Praat's files begin, perhaps after comments."""
 INTERVALS, POINTS = "IntervalTier", "TextTier"
 
 
@@ -34,7 +35,8 @@ def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
     total = 0
     place = "the header"
     try:
-        _take(tokens, "text")
+        if "chronological" in _take(tokens, "text"):
+            raise InputError(f"{where}: a TextGrid in order of time; save it as a text file in Praat")
         if _take(tokens, "text") != "TextGrid":
             raise InputError(f"{where}: a Praat file of another kind; save a TextGrid")
         _take(tokens, "number"), _take(tokens, "number")  # from when to when it lasts

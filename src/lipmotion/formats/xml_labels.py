@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import re
 from collections import defaultdict
@@ -12,6 +13,7 @@ from lipmotion.errors import InputError, shorten
 from lipmotion.formats.label_tiers import LINES, OTHER, LabelTier, TimedLabel, check_count, find_tier
 from lipmotion.types.values import parse_clock
 
+LOG = logging.getLogger("lipmotion")
 ROOT = re.compile(r"\s*(?:<\?xml[^>]{0,200}\?>\s*)?(?:<!--.{0,2000}?-->\s*)*<(?:\w+:)?(\w+)", re.DOTALL)
 """The first element of XML; those of ``READ_ROOTS`` hold labels in time."""
 READ_ROOTS = ("ANNOTATION_DOCUMENT", "tt", "transcript", "timedtext")
@@ -24,7 +26,7 @@ def read_xml_tiers(text: str, where: str) -> list[LabelTier]:
     if re.search(r"<!(?:DOCTYPE|ENTITY)", text, re.IGNORECASE):
         raise InputError(f"{where}: its XML declares entities, which are not read; save it without them")
     try:
-        root = ElementTree.fromstring(text.encode().lstrip())  # noqa: S314 (no entities)
+        root = ElementTree.fromstring(text.lstrip())  # noqa: S314 (no entities)
     except (ElementTree.ParseError, ValueError, RecursionError) as error:
         raise InputError(f"{where}: damaged XML ({error}); save it again") from error
     check_count(sum(1 for _ in root.iter()) // 4, where)
@@ -34,9 +36,23 @@ def read_xml_tiers(text: str, where: str) -> list[LabelTier]:
 
 
 def _read_elan(root: Element, where: str) -> list[LabelTier]:
-    """Return the tiers of ELAN. Annotations without times divide another one: they are one label with its time."""
+    """Return the tiers of ELAN. Annotations without times divide another one: they are one label with its time.
+
+    Times are those of the recording, which may begin later than another one. Raises InputError: they are of frames.
+    """
+    unit = next((each.get("TIME_UNITS") for each in root.iter("HEADER")), None) or "milliseconds"
+    if unit != "milliseconds":
+        raise InputError(f"{where}: its times are {shorten(unit)}, required milliseconds; save it again in ELAN")
+    media = [(each.get("TIME_ORIGIN") or "0", each.get("MEDIA_URL", "")) for each in root.iter("MEDIA_DESCRIPTOR")]
+    origin_s, url = max(((_parse_seconds(f"{origin}ms", {}, where), url) for origin, url in media), default=(0.0, ""))
+    if origin_s:
+        what = "its times begin %.2f s after the start of %s: they are moved by that"
+        LOG.warning(f"%s: {what}; cut the recording there if it is another one", where, origin_s, shorten(url))
     slots_s = {each.get("TIME_SLOT_ID"): each.get("TIME_VALUE") for each in root.iter("TIME_SLOT")}
-    times_s = {name: _parse_seconds(f"{value}ms", {}, where) if value else math.nan for name, value in slots_s.items()}
+    times_s = {
+        name: origin_s + _parse_seconds(f"{value}ms", {}, where) if value else math.nan
+        for name, value in slots_s.items()
+    }
     spans_s: dict[str | None, tuple[float, float]] = {}
     owners: dict[str | None, str | None] = {}
     for each in root.iter("ALIGNABLE_ANNOTATION"):

@@ -21,8 +21,7 @@ COMMON_WORDS = {
 """The commonest words of languages in Latin letters, as any frequency list has them."""
 MIN_COMMON, AHEAD = 3, 1.5
 """A text is in a language with so many of its common words in it, and so many times as many as of any other one."""
-MIN_KNOWN = 0.85
-"""A text of which the dictionary knows so large a share is English."""
+MIN_KNOWN = 0.85  # a text of which the dictionary knows so large a share is English
 MIN_PHONES, MIN_WORDS = 4, 12
 """Shorter words than the first are in the dictionary by chance, and of fewer words than the second nothing is said."""
 NOT_ENGLISH, IS_ENGLISH = 0.2, 0.5

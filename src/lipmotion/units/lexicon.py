@@ -18,8 +18,7 @@ from lipmotion.units.phones import OTHER_NAMES, PAUSE, PHONES, REDUCED_VOWELS, i
 from lipmotion.units.spelling import guess_pronunciation, normalise_text, remove_accents
 from lipmotion.units.written_forms import list_readings
 
-LONGEST_WORD = 30
-"""Letters of the longest word that is read by the network: longer ones are web addresses and noise."""
+LONGEST_WORD = 30  # letters of the longest word that is read by the network: longer ones are web addresses and noise
 
 
 @lru_cache(maxsize=4096)
@@ -55,17 +54,14 @@ WEAK_WORDS = frozenset("a an the of and from was but than that's her were your f
 """Monosyllables that are unstressed in running speech."""
 LARGEST_LEXICON_BYTES, MAX_LINES = 1 << 25, 1 << 20
 """Most bytes and lines of a user's file; the dictionary of 134,000 words has 3.3 million bytes."""
-LONGEST_LINE = 2000
-"""Most characters of a line: a word, its phones and a comment."""
+LONGEST_LINE = 2000  # most characters of a line: a word, its phones and a comment
 OFTEN_LENGTHENED = frozenset("no so go do to who hello yo bro ho he me we she be the long stop".split())
 """Words that are meant rather than those with their vowel twice (``noo``, ``loong``, ``stoop``)."""
 LENGTHENED, REPEATED = re.compile(r"(.)\1\1|^(..+?)\2"), re.compile(r"([a-z]{2,4}?)\1+h?")
 SOUNDED = re.compile(r"(?=.*(.)\1\1|.*rr\Z|p[sf]{2})(?!([^fhmrsvz])\2*\Z)[b-df-hj-np-tv-xz]+\Z")
 """Sounds in letters: ``brrr``, ``psst``, ``fff``; no dictionary has them, and their letters are not spelled."""
-LONGEST_LENGTHENED, MAX_LENGTHENED = 100, 5
-"""A word of more letters, or with more that are doubled, is none of these."""
-VARIANT_NUMBER = re.compile(r"\(\d+\)$")
-"""The number by which the dictionary marks a further pronunciation."""
+LONGEST_LENGTHENED, MAX_LENGTHENED = 100, 5  # a word of more letters, or with more that are doubled, is none of these
+VARIANT_NUMBER = re.compile(r"\(\d+\)$")  # the number by which the dictionary marks a further pronunciation
 MAX_VARIANTS = 32
 """Most pronunciations of a word: alignment tries each after each of the word before. The dictionary has up to six."""
 
@@ -111,10 +107,8 @@ class Lexicon:
         for number, line in enumerate(StringIO(text), start=1):
             where, length = f"{path}, line {number}", len(line.rstrip("\n"))
             if length > LONGEST_LINE:
-                raise InputError(
-                    f"{where}: {length} characters, required at most {LONGEST_LINE}; write one pronunciation of a word "
-                    "a line"
-                )
+                what = f"{where}: {length} characters, required at most {LONGEST_LINE};"
+                raise InputError(f"{what} write one pronunciation of a word a line")
             word, *labels = line.split("#", maxsplit=1)[0].split() or [""]
             if not word:
                 continue
@@ -204,10 +198,8 @@ def find_english_data() -> Path:
     """Return the folder of pocketsphinx's dictionary and models. Raises MissingDependencyError: it is not installed."""
     spec = find_spec("pocketsphinx")  # its data files are read, the package itself is not imported
     if spec is None or not spec.submodule_search_locations:
-        raise MissingDependencyError(
-            "the pronunciation dictionary and the phone models of many voices come with pocketsphinx: "
-            "pip install pocketsphinx"
-        )
+        what = "the pronunciation dictionary and the phone models of many voices come with pocketsphinx:"
+        raise MissingDependencyError(f"{what} pip install pocketsphinx")
     return Path(spec.submodule_search_locations[0]) / "model" / "en-us"
 
 

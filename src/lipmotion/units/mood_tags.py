@@ -18,14 +18,15 @@ LOG = logging.getLogger("lipmotion")
 TAG = re.compile(
     r"[\[<{](/?)([^\W\d_][^\[\]<>{}\n]{0,80})[\]>}]|\*(?P<did>[a-z]+s)\*|"
     + DEED.pattern
-    + r"|<<[^<>\n]{1,200}>>|<[/!#?|][^<>\n]{0,80}>|\\[nN]|\{[^{}\n]{0,200}\}|\[/?\]|\[\d{1,3}\]"
+    + r"|<<[^<>\n]{1,200}>>|<[/!#?|][^<>\n]{0,80}>|\\[nN]|\{[^{}\n]{0,200}\}|\[/?\]|\[\d[\d:.,]{0,12}m?s?\]"
     r"|\([a-z-]{2,20}: ?[$\"'][^()\n]{0,200}\)|#line:\w+|\[\[(?:slnc|rate|volm|pbas|emph|inpt|rset)\b[^\[\]\n]{0,80}]]"
 )
 """Tags of moods, and markup of games and voices (Ren'Py, Unity, Yarn, Twine, SSML): ``{w=0.5}``, ``<color=red>``."""
 LINK = re.compile(
     r"\[\[(?!(?:slnc|rate|volm|pbas|emph|inpt|rset)\b)(?:[^\[\]\n]*<-)?([^\[\]|\n]*?)(?:(?:\||->)[^\[\]\n]*)?\]\]"
+    r"|!?\[([^\[\]\n]{0,200})\]\([^()\s]{1,400}\)"
 )
-"""A link (``[[Go north|North]]``), of which what is shown is spoken."""
+"""A link (``[[Go north|North]]``, ``[our site](https://example.org)``), of which what is shown is spoken."""
 INSIDE_WORDS = frozenset("a b i u s em strong mark sub sup font span color colour size wave shake".split())
 """Tags of style, which may stand inside a word."""
 _NAME = re.compile(r"([a-z][a-z '-]*?)\s*(?::\s*(\d*\.?\d+))?")
@@ -70,7 +71,7 @@ def parse_tagged_text(text: str, words: Callable[[str], Sequence[str]] = find_wo
     TaggedText(text='  I know.  But  so what', tags=(MoodTag(share=0.0, mood='sad', strength=0.5), \
 MoodTag(share=0.4, mood='happy', strength=0.6), MoodTag(share=0.6, mood='neutral', strength=1.0)))
     """
-    text, unknown = remove_speakers(LINK.sub(r"\1", text), find_speaker_names([text]))
+    text, unknown = remove_speakers(LINK.sub(r"\1\2", text), find_speaker_names([text]))
     spoken, tags, last = "", [], 0
     for tag in TAG.finditer(text):
         meaning = _meaning(tag)

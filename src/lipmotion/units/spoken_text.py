@@ -16,8 +16,9 @@ from lipmotion.units.text_normalisation import tokenise
 from lipmotion.units.written_forms import list_readings
 
 LINE_BREAK = re.compile(r"<(?:br|p|div)\b[^<>]{0,40}>", re.IGNORECASE)
-TAG = re.compile(r"</?[a-zA-Z!|][^<>]{0,200}>|<[\d:.]{1,20}>|\{[^{}]{0,200}\}")
-"""Tags of SubRip (``<i>``), WebVTT (``<v Anna>``, ``<00:01.5>``), SubStation (``{\\an8}``), ``<unk>``, ``<|en|>``."""
+TAG = re.compile(r"<rt>[^<>]{0,80}|</?[a-zA-Z!|][^<>]{0,200}>|<[\d:.]{1,20}>|\{[^{}]{0,200}\}")
+"""Tags of SubRip (``<i>``), WebVTT (``<v Anna>``, ``<00:01.5>``), SubStation (``{\\an8}``), ``<unk>``, ``<|en|>``, and
+how letters are read (``<rt>``)."""
 SOUND = re.compile(r"\[[^\[\]]{0,200}\]|\((?!\d{3}\))[^()]{0,200}\)|（[^（）]{0,200}）")
 """Descriptions of sounds, as subtitles for the deaf and recognisers write them: ``[music]``, ``(laughs)``."""
 DEED = re.compile(
@@ -56,12 +57,9 @@ SYMBOLS = re.compile(
     rf"&=\S+|%hesitation\b|(?<!\S){MARKED}(?!\S)|\b(?:xxx|yyy)\b|&[-+~](?=\w)|(?<!\w)%(?=[^\W\d])", re.IGNORECASE
 )
 """CHAT's sounds (``&=laughs``) and words that nobody understood; of hesitations (``%uh``) the mark alone."""
-SPEAKER_NAME_LINES = 3
-"""A name that begins this many lines is that of a speaker."""
-LONGEST_LINE = 1 << 18
-"""Maximum characters of a line: a label may hold four hours of speech."""
-MAX_WORDS = 500_000
-"""Maximum words of a transcript: twelve hours of the fastest speech on record."""
+SPEAKER_NAME_LINES = 3  # a name that begins this many lines is that of a speaker
+LONGEST_LINE = 1 << 18  # maximum characters of a line: a label may hold four hours of speech
+MAX_WORDS = 500_000  # maximum words of a transcript: twelve hours of the fastest speech on record
 
 
 class SpokenAs(Enum):
@@ -74,8 +72,7 @@ class SpokenAs(Enum):
 
 SILENCES = frozenset(["", *"sil sp pau ssil nsn h# #h # ## _ - silence = vocnoise iver".split()])
 """Labels of silence, pauses and noise that is not speech; so is anything in brackets that is not of speech."""
-LAUGHTER = "LAU"
-"""In capitals, as in lexicons of telephone speech; ``Lau`` is a name."""
+LAUGHTER = "LAU"  # in capitals, as in lexicons of telephone speech; ``Lau`` is a name
 UNKNOWN_WORDS = frozenset("spn unk oov xxx yyy usb".split())
 """Labels of speech of which nobody knows the words, also in brackets: of aligners, of CHAT, of WebMAUS (``<usb>``)."""
 IN_BRACKETS = re.compile(
