@@ -308,7 +308,7 @@ def test_json_of_another_kind_beside_a_recording_is_passed_over(tmp_path: Path) 
 
 
 times = st.integers(0, 3_600_000).map(lambda ms: ms / 1000)
-word = st.text(ascii_lowercase, min_size=1, max_size=12)
+word = st.lists(st.sampled_from(ascii_lowercase), min_size=1, max_size=12).map("".join)
 many_lines = st.lists(st.tuples(times, times, st.lists(word, min_size=1, max_size=6)), min_size=1, max_size=8)
 
 
