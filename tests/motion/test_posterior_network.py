@@ -173,11 +173,13 @@ def test_its_share_depends_on_voice_recogniser_and_noise(network, voice, mean, d
     motion, distortions = replace(alone, posterior_network=beside).predict(spoken)
     assert distortions == pytest.approx(same)
     assert distortions == pytest.approx(np.full(FRAMES, distortion), rel=1e-5)
-    assert motion == pytest.approx(without + share * (beside.predict(spoken)[0] - without), abs=1e-6)
+    np.testing.assert_allclose(
+        motion, without + share * (beside.predict(spoken)[0] - without), rtol=0, atol=1e-6, equal_nan=False
+    )
     plain, both = alone.hidden(spoken), replace(alone, posterior_network=beside).hidden(spoken)
     assert plain is not None
     assert both is not None
-    assert both[0][:, : plain[0].shape[1]] == pytest.approx(plain[0])
+    np.testing.assert_allclose(both[0][:, : plain[0].shape[1]], plain[0], rtol=1e-6, equal_nan=False)
     wanted = beside.hidden_units(posteriors(0), len(plain[0]))
-    assert both[0][:, plain[0].shape[1] :] == pytest.approx(wanted)
-    assert both[1] == pytest.approx(plain[1])
+    np.testing.assert_allclose(both[0][:, plain[0].shape[1] :], wanted, rtol=1e-6, equal_nan=False)
+    np.testing.assert_allclose(both[1], plain[1], rtol=1e-6, equal_nan=False)

@@ -140,19 +140,32 @@ def _picture(x: Values, y: Values, shape: Array, pixel_px: float, noise: float, 
     skin = skin * (1 - CREASE * crease)[..., None]
     picture = _over(picture, skin, _inside(x, y - HEAD_MIDDLE_PX, HEAD_PX[0], below, pixel_px, 4))
     for side in (-30.0, 30.0):
-        picture = _over(picture, EYES, _inside(x - side, y, 15.0, 6.0, pixel_px))
-    picture = _over(picture, LIPS, _inside(x, y - middle, width / 2, outer / 2, pixel_px))
+        _paint(picture, EYES, _part(x - side, y, 15.0, 6.0, pixel_px))
+    _paint(picture, LIPS, _part(x, y - middle, width / 2, outer / 2, pixel_px))
     if opening > MIN_OPENING_PX:
-        inside = _inside(x, y - middle, INNER_WIDTH * width / 2, opening / 2, pixel_px)
-        picture = _over(picture, INSIDE, inside)
-        teeth = np.clip(0.5 + (middle - opening / 2 + TEETH_PX - y) / pixel_px, 0, 1) * (1 - 0.5 * (np.abs(x % 6) < 1))
-        picture = _over(picture, TEETH, inside * teeth)
+        part, inside = _part(x, y - middle, INNER_WIDTH * width / 2, opening / 2, pixel_px)
+        _paint(picture, INSIDE, (part, inside))
+        above = np.clip(0.5 + (middle - opening / 2 + TEETH_PX - y[part]) / pixel_px, 0, 1)
+        teeth = above * (1 - 0.5 * (np.abs(x[part] % 6) < 1))
+        _paint(picture, TEETH, (part, inside * teeth))
     picture = picture + np.float32(noise) * draw.standard_normal(picture.shape, np.float32)
     return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
 
 
 def _over(picture: Values, colour: tuple[float, ...] | Values, share: Values) -> Values:
     return (picture + share[..., None] * (np.asarray(colour, np.float32) - picture)).astype(np.float32)
+
+
+def _paint(picture: Values, colour: tuple[float, ...], shape: tuple[tuple[slice, slice], Values]) -> None:
+    picture[shape[0]] = _over(picture[shape[0]], colour, shape[1])
+
+
+def _part(x: Values, y: Values, across: float, down: float, pixel_px: float) -> tuple[tuple[slice, slice], Values]:
+    """Return the rows and columns that an ellipse reaches, and the share of each of their pixels inside it."""
+    reach = 1 + 0.5 * pixel_px / min(across, down)
+    near = (np.abs(x) < across * reach) & (np.abs(y) < down * reach)
+    part = tuple(slice(at.argmax(), len(at) - at[::-1].argmax()) for at in (near.any(axis=1), near.any(axis=0)))
+    return part, _inside(x[part], y[part], across, down, pixel_px)
 
 
 def _inside(x: Values, y: Values, across: float, down: float | Values, pixel_px: float, power: int = 2) -> Values:
