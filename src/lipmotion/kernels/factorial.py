@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.compiler import compile_to_rounding
+from lipmotion.kernels.compiler import compile_to_rounding, compiled
 from lipmotion.kernels.factorial_loops import (
     FactorialLogLikelihoods,
     FrameDensity,
@@ -45,6 +45,8 @@ MIN_POSTERIOR = 1e-20
 """Smaller posteriors and counts are set to 0, as those of states that cannot be are not quite 0."""
 MIN_PROBABILITY = 1e-100
 """Least probability of a transition, or of beginning or ending in a state: products of smaller ones may underflow."""
+FEW = 0.2
+"""Where fewer joint states can be, logarithms are fastest, as they take no time for others."""
 LARGEST_EXPONENT = 700.0
 """Expected transitions are divided by the probability of the transition: the quotient must stay finite."""
 
@@ -89,12 +91,14 @@ def infer_factorial(
     order = np.lexsort(logs.pairs.T[::-1])
     logs = logs._replace(pair=logs.pair[:, order], pairs=logs.pairs[order])
     ways: list[_Scaled | _InLogs] = []
+    share = np.prod([np.mean(log > -np.inf) for log in (logs.audio, logs.visual)])
     probabilities = (
         part
         for loop in (audio, visual)
         for part in (loop.stay, loop.onward, loop.leave[:, None] * loop.enter, loop.initial, loop.final)
     )
-    if min(float(part.min(where=part > 0, initial=1.0)) for part in probabilities) >= MIN_PROBABILITY:
+    least = min(float(part.min(where=part > 0, initial=1.0)) for part in probabilities)
+    if least >= MIN_PROBABILITY and share > FEW:
         ways += [_Scaled(audio, visual, logs, kind) for kind in OFF if kind in (DOUBLE, logs.audio.dtype)]
     results = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
     result = next((each for each in results if each is not None), None)
@@ -268,40 +272,108 @@ class _InLogs:
 
     def __init__(self, audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -> None:
         self.audio, self.visual, self.logs = LogTransitions.of(audio), LogTransitions.of(visual), logs
+        self.audio_back, self.visual_back = self.audio.reverse(), self.visual.reverse()
         self.initial, self.final = log_ends(audio, visual)
         self.frame_bytes = self.initial.nbytes
 
     def forward(self, start: int, stop: int, before: Array | None, results: list[tuple[Array, Array]]) -> float:
         for t in range(start, stop):
+            density, *possible = self._density(t)
             prior, leaving = self.initial, self.initial
             if before is not None:
-                moved = self.audio.forward(before)
-                prior, leaving = self.visual.forward(moved.T).T, moved[:, -len(self.visual.leaving) :]
-            before = prior + self.logs.joint(t)
+                moved = self.audio.forward(before, possible[0])
+                prior, leaving = self.visual.forward(moved.T, possible[1]).T, moved[:, -len(self.visual.leaving) :]
+            before = prior + density
             results.append((before, leaving))
         return 0.0
 
     def end(self, before: Array) -> _StepBack:
-        return _StepBack(
-            self._frame(before + self.final), self.final + self.logs.joint(len(self.logs.audio) - 1), *_NONE
-        )
+        return _StepBack(*self._met(before, self.final.copy(), self._density(len(self.logs.audio) - 1)[0]), *_NONE)
 
     def back(self, before: Array, backward: Array, leaving: Array, t: int) -> _StepBack:
         units_audio, units_visual = len(self.audio.leaving), len(self.visual.leaving)
-        moved = self.visual.backward(backward.T).T
-        beta = self.audio.backward(moved)
-        frame = self._frame(before + beta)
-        audio_entered = np.logaddexp.reduce(before[-units_audio:, None] + moved[None, :units_audio], axis=2)
-        visual_entered = np.logaddexp.reduce(leaving[:, :, None] + backward[:, None, :units_visual], axis=0)
-        entered = (
-            np.exp(np.minimum(part - frame.log_overlap, LARGEST_EXPONENT)) for part in (audio_entered, visual_entered)
-        )
-        return _StepBack(frame, beta + self.logs.joint(t), *entered)
+        density, possible, _ = self._density(t)
+        moved = self.visual_back.forward(backward.T[::-1], np.ones(backward.shape[1], bool))[::-1].T
+        frame, beta = self._met(before, self.audio_back.forward(moved[::-1], possible[::-1])[::-1], density)
+        entered = [np.zeros((units, units)) for units in (units_audio, units_visual)]
+        _count_entered(before[-units_audio:], moved[:units_audio], frame.log_overlap, entered[0])
+        _count_entered(leaving.T, backward[:, :units_visual].T, frame.log_overlap, entered[1])
+        return _StepBack(frame, beta, *entered)
 
-    def _frame(self, joint: Double) -> _Frame:
-        log_overlap = float(np.logaddexp.reduce(joint, axis=None))
-        joint = np.exp(joint - log_overlap) if math.isfinite(log_overlap) else np.zeros_like(joint)
-        return _frame(joint, self.logs.pairs, 1.0)._replace(log_overlap=log_overlap)
+    def _density(self, t: int) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return the log densities of a frame [shape=(Na, Nv)], and which states of each loop can be."""
+        audio, visual, pair, pairs = self.logs
+        density, *possible = (
+            np.empty(self.initial.shape),
+            np.zeros(audio.shape[1], bool),
+            np.zeros(visual.shape[1], bool),
+        )
+        _fill_densities(audio[t], visual[t], pair[t], pairs, density, *possible)
+        return density, possible[0], possible[1]
+
+    def _met(self, before: Array, beta: Array, density: Array) -> tuple[_Frame, Array]:
+        """Return the posteriors of a frame, and its backward probabilities ``beta`` with densities, in their place."""
+        sums = [np.zeros(part.shape[1]) for part in self.logs[:3]]
+        log_overlap = _meet_in_logs(before, beta, density, self.logs.pairs, *sums)
+        return _Frame(*sums, log_overlap), beta
+
+
+@compiled
+def _fill_densities(
+    audio: Array, visual: Array, pair: Array, pairs: Index, density: Array, rows: Array, columns: Array
+) -> None:
+    """Fill in the log densities of joint states [shape=(N, M)], and in which rows and columns any is finite."""
+    for i in range(len(audio)):
+        for j in range(len(visual)):
+            density[i, j] = np.float64(audio[i]) + np.float64(visual[j])
+    for p in range(len(pairs)):
+        density[pairs[p, 0], pairs[p, 1]] = pair[p]
+    for i in range(len(audio)):
+        for j in range(len(visual)):
+            if density[i, j] > -np.inf:
+                rows[i] = columns[j] = True
+
+
+@compiled
+def _meet_in_logs(
+    before: Array, beta: Array, density: Array, pairs: Index, audio: Array, visual: Array, pair: Array
+) -> float:
+    """Fill in the posteriors of a frame, add ``density`` to ``beta``; return the logarithm of the sum of the products.
+
+    before, beta : logarithms of forward and backward probabilities [shapes=(N, M)]
+    """
+    best, total = -np.inf, 0.0
+    for i in range(len(before)):
+        for j in range(before.shape[1]):
+            best = max(best, before[i, j] + beta[i, j])
+    for i in range(len(before) if best > -np.inf else 0):
+        for j in range(before.shape[1]):
+            log = before[i, j] + beta[i, j] - best
+            if log > -np.inf:
+                share = math.exp(log)
+                total += share
+                audio[i] += share
+                visual[j] += share
+    for p in range(len(pairs) if total else 0):
+        pair[p] = math.exp(before[pairs[p, 0], pairs[p, 1]] + beta[pairs[p, 0], pairs[p, 1]] - best) / total
+    for i in range(len(before)):
+        audio[i] /= total if total else 1
+        for j in range(before.shape[1]):
+            beta[i, j] += density[i, j]
+    for j in range(before.shape[1]):
+        visual[j] /= total if total else 1
+    return best + math.log(total) if total else -np.inf
+
+
+@compiled
+def _count_entered(last: Array, first: Array, log_overlap: float, entered: Array) -> None:
+    """Add up the probabilities of leaving units and of entering units [shapes=(U, M)], from their logarithms."""
+    for u in range(len(last)):
+        for j in range(last.shape[1]):
+            if last[u, j] > -np.inf:
+                for v in range(len(first)):
+                    if first[v, j] > -np.inf:
+                        entered[u, v] += math.exp(min(last[u, j] + first[v, j] - log_overlap, LARGEST_EXPONENT))
 
 
 _NONE = np.zeros(()), np.zeros(())

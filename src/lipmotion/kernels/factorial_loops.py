@@ -116,23 +116,16 @@ class LogTransitions(NamedTuple):
             leaving = np.log(loop.leave)[:, None] + np.log(loop.enter)
             return cls(np.log(loop.stay.ravel()), np.log(loop.onward.ravel()), leaving)
 
-    def forward(self, joint: Array) -> Array:
-        """Return log probabilities one frame on, along axis 0 [shape=(N, M)]."""
-        units = len(self.leaving)
-        after = joint + self.stay[:, None]
-        after[units:] = np.logaddexp(after[units:], joint[:-units] + self.onward[:, None])
-        entering = np.logaddexp.reduce(joint[-units:, None] + self.leaving[:, :, None], axis=0)
-        after[:units] = np.logaddexp(after[:units], entering)
+    def forward(self, joint: Array, wanted: NDArray[np.bool_]) -> Array:
+        """Return log probabilities one frame on, along axis 0 [shape=(N, M)]; of states not ``wanted``: -inf."""
+        after = np.empty(joint.shape)
+        _move_logs(np.ascontiguousarray(joint), self.stay, self.onward, self.leaving, wanted, after)
         return after
 
-    def backward(self, joint: Array) -> Array:
-        """Return log backward probabilities one frame back, along axis 0 [shape=(N, M)]."""
-        units = len(self.leaving)
-        before = joint + self.stay[:, None]
-        before[:-units] = np.logaddexp(before[:-units], joint[units:] + self.onward[:, None])
-        left = np.logaddexp.reduce(joint[None, :units] + self.leaving[:, :, None], axis=1)
-        before[-units:] = np.logaddexp(before[-units:], left)
-        return before
+    def reverse(self) -> LogTransitions:
+        """Return the transitions of the loop backward in time, states in the opposite order."""
+        parts = self.stay[::-1], self.onward[::-1], self.leaving.T[::-1, ::-1]
+        return LogTransitions(*map(np.ascontiguousarray, parts))
 
     def best_forward(self, score: Array) -> tuple[Array, NDArray[Any]]:
         """Return the best scores a frame on, along axis 0, and decisions: U for staying, U + 1 for the next, else the
@@ -247,3 +240,31 @@ def _take_best_entering(last: Array, leaving: Array, score: Array, decision: Arr
                 is_better = other > best[j]
                 best[j] = other if is_better else best[j]
                 unit[j] = u if is_better else unit[j]
+
+
+@compiled
+def _move_logs(
+    before: Array, stay: Array, onward: Array, leaving: Array, wanted: NDArray[np.bool_], after: Array
+) -> None:
+    """Fill in log probabilities one frame on, along axis 0; what cannot be takes no time."""
+    units = len(leaving)
+    last = before[len(before) - units :]
+    for i in range(len(before)):
+        row = after[i]
+        row[:] = -np.inf
+        for j in range(len(row) if wanted[i] else 0):
+            row[j] = before[i, j] + stay[i]
+            best = row[j]
+            if i >= units:
+                moved = before[i - units, j] + onward[i - units]
+                best = max(best, moved)
+                if best > -np.inf:
+                    row[j] = best + math.log(math.exp(row[j] - best) + math.exp(moved - best))
+                continue
+            for u in range(units):
+                best = max(best, last[u, j] + leaving[u, i])
+            if best > -np.inf:
+                total = math.exp(row[j] - best)
+                for u in range(units):
+                    total += math.exp(last[u, j] + leaving[u, i] - best)
+                row[j] = best + math.log(total)
