@@ -17,7 +17,7 @@ import numpy as np
 from formats.examples import of_motion
 from lipmotion import CueSheet, errors, formats, read_motion, types
 from lipmotion.cli.verbs import about
-from lipmotion.formats import label_files, textgrid
+from lipmotion.formats import annotations, label_files
 from lipmotion.formats.cues import write_cue_file
 from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
 from lipmotion.pipeline.batch.report import Mark, _field, _show_on_page
@@ -96,7 +96,7 @@ def _labels(suffix: str, read: Callable[[str], str]) -> Callable[[Path, str], No
 
 
 def _of_textgrid(text: str) -> str:
-    return textgrid.parse_interval_tiers(text, "a")[1].labels[0].text
+    return annotations.parse_interval_tiers(text, "a")[1].labels[0].text
 
 
 def _of_webvtt(text: str) -> str:

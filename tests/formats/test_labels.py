@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion.formats import label_files, label_tiers
-from lipmotion.formats.textgrid import parse_interval_tiers, write_textgrid
+from lipmotion.formats.annotations import parse_interval_tiers, write_textgrid
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, group_words
 from lipmotion.units.text_normalisation import LARGEST_TRANSCRIPT_BYTES

@@ -318,7 +318,8 @@ OTHERS: dict[str, Any] = {
         for w, a, b in W for kind in ("Partial", "")
     ],
     "Azure, assessed": {"NBest": [{"Words": [
-        {"Word": w, "Offset": round(1e4 * a), "Duration": round(1e4 * (b - a)), "PronunciationAssessment": {"ErrorType": e}}
+        {"Word": w, "Offset": round(1e4 * a), "Duration": round(1e4 * (b - a)),
+         "PronunciationAssessment": {"ErrorType": e, "AccuracyScore": 0}}
         for w, a, b, e in [*((*row, "None") for row in MS), ("silent", 0, 0, "Omission")]]}]},
     "minutes of ISO": [{"word": w, "offset": f"PT0M{a}S", "duration": f"PT{b - a:.3f}S"} for w, a, b in W],
     "two units": [{"word": w, "start": f"{a}s", "duration": f"{1000 * (b - a):.0f}ms"} for w, a, b in W],

@@ -11,6 +11,7 @@ from itertools import islice
 from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError, shorten
+from lipmotion.formats.annotations import ROOT, TEXTGRID, parse_interval_tiers, read_xml_tiers, write_textgrid
 from lipmotion.formats.label_services import DamagedJsonError, describe_json, is_json, parse_service_tiers
 from lipmotion.formats.label_tiers import (
     LINES,
@@ -31,9 +32,7 @@ from lipmotion.formats.label_tiers import (
     with_words,
 )
 from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, parse_subtitles, write_subtitles
-from lipmotion.formats.textgrid import TEXTGRID, parse_interval_tiers, write_textgrid
 from lipmotion.formats.timed_lines import parse_line_tiers
-from lipmotion.formats.xml_labels import READ_ROOTS, ROOT, read_xml_tiers
 from lipmotion.printable import is_line
 from lipmotion.storage.sources import read_text_file
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
@@ -269,7 +268,7 @@ def _read_tiers(text: str, where: str) -> list[LabelTier] | None:
     try:
         if TEXTGRID.match(text):
             tiers: list[LabelTier] | None = parse_seconds(parse_interval_tiers(text, where), where)
-        elif (root := ROOT.match(text)) and root[1] in READ_ROOTS:
+        elif ROOT.match(text):
             tiers = read_xml_tiers(text, where)
         elif is_subtitles(text):
             tiers = [parse_subtitles(text, where)]
