@@ -12,8 +12,8 @@ from formats.examples import generation, of_motion, written
 from lipmotion.articulation.contact import opening_to_gap
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats import read_motion
-from lipmotion.formats.blender import write_addon
 from lipmotion.formats.fap import FAP, MOUTH_TO_NOSE, PARAMETERS, STEPS, move_faps
+from lipmotion.formats.game_engines import write_addon
 from lipmotion.types import WEIGHT, Channel, Generation, Motion
 from meshes.speech import motion, units
 

@@ -81,7 +81,7 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
     {
 "json": "lipmotion.formats.motion_document:JSON", "csv": "lipmotion.formats.tables:TABLE",
         "npz": "lipmotion.formats.motion_document:NPZ", "livelink.csv": "lipmotion.formats.tables:LIVE_LINK",
-        "blender.py": "lipmotion.formats.blender:MOTION_FORMAT", "c3d": "lipmotion.formats.c3d:MOTION_FORMAT",
+        "blender.py": "lipmotion.formats.game_engines:BLENDER", "c3d": "lipmotion.formats.c3d:MOTION_FORMAT",
         "fap": "lipmotion.formats.fap:MOTION_FORMAT", "anim": "lipmotion.formats.game_engines:UNITY",
         "tres": "lipmotion.formats.game_engines:GODOT", "vmd": "lipmotion.formats.vmd:MOTION_FORMAT",
         "bvh": "lipmotion.formats.c3d:BVH", "a2f.json": "lipmotion.formats.motion_document:AUDIO2FACE",

@@ -37,7 +37,7 @@ from lipmotion.printable import is_line
 from lipmotion.storage.sources import read_text_file
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import UNKNOWN_PHONES, RecognisedPhone, find_phone, restore_confidences
-from lipmotion.units.mood_tags import parse_tagged_text, remove_known_tags
+from lipmotion.units.spoken_text import parse_tagged_text, remove_known_tags
 from lipmotion.units.text_normalisation import LARGEST_TRANSCRIPT_BYTES, require_tokens
 from lipmotion.units.written_forms import list_readings
 
