@@ -175,8 +175,7 @@ def _read_elan(root: Element, where: str) -> list[LabelTier]:
         LOG.warning(f"%s: {what}; cut the recording there if it is another one", where, origin_s, shorten(url))
     slots_s = {each.get("TIME_SLOT_ID"): each.get("TIME_VALUE") for each in root.iter("TIME_SLOT")}
     times_s = {
-        name: origin_s + _parse_seconds(f"{value}ms", {}, where) if value else math.nan
-        for name, value in slots_s.items()
+        name: origin_s + _parse_seconds(f"{ms}ms", {}, where) if ms else math.nan for name, ms in slots_s.items()
     }
     spans_s: dict[str | None, tuple[float, float]] = {}
     owners: dict[str | None, str | None] = {}

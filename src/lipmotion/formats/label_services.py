@@ -143,13 +143,8 @@ COLUMNS = (
 COLUMN_OWNERS = ("normalizedalignment", "alignment", "wordtimestamps", "phonemetimestamps", "wordalignment")
 SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
 """A word of characters, or a direction in brackets (``[whispers]``), which is not said."""
-UNFINISHED = {
-    "isfinal": False,
-    "final": False,
-    "endofturn": False,
-    "ispartial": True,
-    "message": "AddPartialTranscript",
-}
+PARTIAL = "AddPartialTranscript"  # Speechmatics' message
+UNFINISHED = {"isfinal": False, "final": False, "endofturn": False, "ispartial": True, "message": PARTIAL}
 """Members of what a service heard while somebody spoke, and says again when it is sure."""
 TEXT_ALONE = {*"text partial result language duration task usage logprobs alternatives confidence".split()}
 """Members of what a recogniser says without times."""
@@ -563,24 +558,25 @@ def _read_durations(objects: Objects, where: str) -> list[LabelTier] | None:
         raise InputError(f"{where}: holds {len(kokoro)} sentences, whose times each begin at 0; give those of one")
     if not kokoro and (len(piper) < len(objects)):
         return None
-    items: list[tuple[str, Any, Any, float]] = []  # place, text, length, and how many of its units are a second
+    phones, end_s = list[TimedLabel](), 0.0
+
+    def add(place: str, text: Any, length: Any, per_s: float) -> None:
+        nonlocal end_s
+        start_s, end_s = end_s, end_s + _parse_time(length, f"{where}: {place}", per_s)
+        phones.append(TimedLabel(start_s, end_s, require(_TEXT, text, f"{where}: {place}"), place))
+
     for place, item in piper:
         rate = require(values.number(1000, 1e6), item.get("samplerate"), f"{where}: {place}: the sample rate in hertz")
         for number, each in enumerate(item["phonemealignments"], 1):
             fields = each if isinstance(each, dict) else {}
-            items.append((f"{place}, phoneme {number}", fields.get("phoneme"), fields.get("numsamples"), rate))
+            add(f"{place}, phoneme {number}", fields.get("phoneme"), fields.get("numsamples"), rate)
     for item in kokoro:
         letters = f"^{require(_TEXT, item['phonemes'], f'{where}: phonemes')}$"
         if len(item["preddur"]) != len(letters):
             what = f"{len(item['preddur'])} durations of {len(letters) - 2} phonemes"
             raise InputError(f"{where}: {what}, required two more than phonemes")
-        pairs = enumerate(zip(letters, item["preddur"], strict=True))
-        items += [(f"phoneme {n}", KOKORO_LETTERS.get(a, a), frames, KOKORO_FRAMES_PER_S) for n, (a, frames) in pairs]
-    check_count(len(items), where)
-    phones, end_s = list[TimedLabel](), 0.0
-    for place, text, length, per_s in items:
-        start_s, end_s = end_s, end_s + _parse_time(length, f"{where}: {place}", per_s)
-        phones.append(TimedLabel(start_s, end_s, require(_TEXT, text, f"{where}: {place}"), place))
+        for number, (letter, frames) in enumerate(zip(letters, item["preddur"], strict=True)):
+            add(f"phoneme {number}", KOKORO_LETTERS.get(letter, letter), frames, KOKORO_FRAMES_PER_S)
     found: Found = defaultdict(list)
     for item in kokoro:
         _collect_rows({"tokens": item.get("tokens")}, found, where)
