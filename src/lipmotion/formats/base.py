@@ -186,10 +186,8 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     check_kind(path, "motion file")
     named = _name_by_content(path)
     other = find_suffix(named, [f".{name}" for name in MOTION_READERS.names])
-    if find_suffix(named):
-        read = _format_of(named).read
-    else:
-        read = MOTION_READERS.load(other.removeprefix(".")) if other else None
+    added = MOTION_READERS.load(other.removeprefix(".")) if other and not find_suffix(named) else None
+    read = _format_of(named).read if find_suffix(named) else added
     if read is None:
         known = ", ".join(list_read_suffixes())
         raise InputError(f"{path}: cannot read motion from {_suffix(path)}; use one of {known}")

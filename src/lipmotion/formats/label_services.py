@@ -80,7 +80,6 @@ TIMES = (
     Times("startts", "endts", per_s=1),  # Kokoro
     Times("ts", "endts", "duration", 1),  # Rev.ai
     Times("begin", "end", "dur"),  # aeneas
-    Times("begintime", "endtime"),
     Times("tstartms", "", "ddurationms", 1000),  # YouTube, json3
     Times("offsetinticks", "", "durationinticks", TICKS_PER_S),  # Azure, batch transcription
     Times("offsetmilliseconds", "", "durationmilliseconds", 1000),  # Azure, fast transcription
@@ -89,13 +88,10 @@ TIMES = (
     Times("startoffset", "endoffset", usual=0),  # Google, version 2 ("0.1s"); NeMo's are frames
     Times("timestart", "timeend"),  # PlayHT
     Times("timebegin", "timeend", usual=1000),  # MiniMax, Hume; Gladia's first version in seconds
-    Times("startsec", "endsec", per_s=1),
-    Times("startseconds", "endseconds", per_s=1),
-    Times("starttimestamp", "endtimestamp"),
-    Times("from", "to"),
+    *(Times("startsec", "endsec", per_s=1), Times("startseconds", "endseconds", per_s=1)),
+    *(Times("starttimestamp", "endtimestamp"), Times("from", "to"), Times("begintime", "endtime")),
     Times("timeseconds", per_s=1),  # Google, text to speech
-    Times("", "resultendtime", per_s=1),  # Google, a result without words
-    Times("", "resultendoffset", per_s=1),
+    *(Times("", "resultendtime", per_s=1), Times("", "resultendoffset", per_s=1)),  # Google, results without words
 )
 TEXTS = (
     "punctuatedword word alignedword text content value transcript sentence display lexical markname token lines "

@@ -100,8 +100,7 @@ def find_tier(name: str, labels: Sequence[TimedLabel], speaker: str = "") -> Lab
     """Return a tier in order of time whose name says what it holds and perhaps who speaks."""
     owner = next(filter(None, (re.fullmatch(form, name, re.IGNORECASE) for form in SPEAKERS)), None)
     role = next((role for role, form in ROLES if re.search(form, name.lower())), "")
-    if name == RECOGNISED:
-        role = RECOGNISED_PHONES
+    role = RECOGNISED_PHONES if name == RECOGNISED else role
     last_s = -math.inf
     known_s = [last_s := label.start_s if label.start_s > EARLIEST_S else last_s for label in labels]
     in_time = [label for _, label in sorted(zip(known_s, labels, strict=True), key=lambda pair: pair[0])]
