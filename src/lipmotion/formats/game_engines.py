@@ -38,8 +38,7 @@ from lipmotion.types import WEIGHT, Generation, Motion
 
 Array = NDArray[np.float64]
 FULL = 100.0  # a blendshape's weight in Unity where it has its whole effect
-UNITY_TOLERANCE, GODOT_TOLERANCE = 0.01, 1e-4
-"""Largest error of a curve through the keys that are kept, of 100 and of 1."""
+UNITY_TOLERANCE, GODOT_TOLERANCE = 0.01, 1e-4  # largest error of a curve through the keys that are kept, of 100, of 1
 UNITY_DECIMALS, GODOT_DECIMALS = 4, 5
 RENDERER = 137  # the class of SkinnedMeshRenderer
 LINEAR, CONSTANT = 69, 103

@@ -47,8 +47,7 @@ RECOGNISED = tuple(".srt .vtt .ass .ssa .sbv .lrc .ttml .dfxp .json .jsonl .ctm 
 FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".eaf", ".lab", ".wrd", *RECOGNISED)
 """Suffixes in whose files words are searched, in order: plain text first, as labels in time may not be words, and what
 may be recognised last."""
-FOR_PHONES = (".TextGrid", ".textgrid", ".eaf", ".lab", ".phn", ".txt")
-"""Suffixes in whose files phones are searched, in order."""
+FOR_PHONES = (".TextGrid", ".textgrid", ".eaf", ".lab", ".phn", ".txt")  # the same for phones
 LARGEST_LABELS = 1 << 24  # most bytes of a label file: labels of a day
 MOTION = re.compile(r'"lipmotion\.motion"|time_s,')  # how our own motion files begin: a quick answer for large ones
 MASTER = re.compile(r'^(?:#!MLF!#|\.)[ \t\r]*\n"(.*)"[ \t\r]*$', re.MULTILINE)

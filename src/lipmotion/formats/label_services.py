@@ -68,8 +68,7 @@ class Times(NamedTuple):
 
 
 POLLY = Times("time", usual=1000)
-SPEECHIFY = Times("starttime", "endtime", "duration", 1000)
-"""Times of marks, whose start and end are places in the text."""
+SPEECHIFY = Times("starttime", "endtime", "duration", 1000)  # of marks, whose start and end are places in the text
 TIMES = (
     Times("offsetsfrom", "offsetsto", per_s=1000),  # whisper.cpp
     Times("timestampstart", "timestampend", per_s=1),  # transformers

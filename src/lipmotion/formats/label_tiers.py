@@ -52,8 +52,7 @@ IN_CONTEXT = re.compile(r"\A[^-+]*-([^-+]+)\+.*\Z")
 """Triphones and full-context labels of HTK and HTS: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
 GLOTTAL_STOP = "q"  # TIMIT's: a sound of the throat, with any lips
 STATE_NUMBER = re.compile(r"\[(\d{1,9})\]$")
-RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")
-"""A phone or unit, and its confidence from 0 to 1."""
+RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")  # a phone or unit, and its confidence
 MAX_LABELS = 250_000  # most labels of a file: phones of five hours of speech
 TYPICAL_PHONE_S, TYPICAL_WORD_S = 0.08, 0.3  # how long a phone, and a word, alone or of a line, last
 LONGEST_WORD_S = 100.0  # a single word that lasts longer than this is in another unit

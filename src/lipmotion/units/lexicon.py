@@ -281,7 +281,7 @@ _ALIKE = {"ax": "ah", "axr": "er", "ix": "ih", "ao": "aa", "uh": "uw"}
 def detect_language(words: Sequence[str]) -> str:
     """Return the code of the language of a text; empty: not known.
 
-    >>> detect_language("der hund und die katze und das".split()), detect_language(["밥을"]), detect_language(["ok"])
+    >>> detect_language("der hund und die katze und das".split()), detect_language(["밥을"]), detect_language(["zxqv"])
     ('de', 'ko', '')
     """
     scripts = Counter(find_script(letter) for word in words for letter in word) - Counter([""])
