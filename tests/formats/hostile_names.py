@@ -202,17 +202,12 @@ def _bibtex(_: Path, name: str) -> None:
 
 
 WRITERS: dict[str, Callable[[Path, str], None]] = {
-    **{suffix: _motion_file(suffix) for suffix in ("json", "csv", "npz", "c3d")},
-    "fap": _fap,
-    "blender.py": _script,
-    ".TextGrid": _labels(".TextGrid", _of_textgrid),
-    ".vtt": _labels(".vtt", _of_webvtt),
-    **{form: _cues(form, _of_rows) for form in ("tsv", "dat")},
-    "rhubarb xml": _cues("xml", _of_xml),
-    "rhubarb json": _cues("json", _of_json),
-    "pgo": _cues("pgo", _of_pgo),
+    **{suffix: _motion_file(suffix) for suffix in ("json", "csv", "npz", "c3d")}, "fap": _fap,
+    "blender.py": _script, ".TextGrid": _labels(".TextGrid", _of_textgrid), ".vtt": _labels(".vtt", _of_webvtt),
+    **{form: _cues(form, _of_rows) for form in ("tsv", "dat")}, "rhubarb xml": _cues("xml", _of_xml),
+    "rhubarb json": _cues("json", _of_json), "pgo": _cues("pgo", _of_pgo),
     **{"usda": _usda, "glb": _glb, "reports": _report, "xmp": _xmp, "bibtex": _bibtex},
-}
+}  # fmt: skip
 """By format: writes a name into a file of a folder, and reads it back; asserts that it is the same."""
 
 

@@ -46,11 +46,9 @@ def test_a_zip_may_not_grow_without_end(tmp_path: Path) -> None:
 
 ARRAYS: dict[str, NDArray[Any]] = {
     "single": np.array([[1 / 3, np.nan], [-0.0, np.inf]], np.float32),
-    "double": np.array([np.pi, np.nextafter(1, 2)]),
-    "names": np.array(["b.0<ih", "ä"]),
-    "count": np.array(7),
+    "double": np.array([np.pi, np.nextafter(1, 2)]), "names": np.array(["b.0<ih", "ä"]), "count": np.array(7),
     "empty": np.zeros((0, 3)),
-}
+}  # fmt: skip
 
 
 def test_every_bit_comes_back(tmp_path: Path) -> None:
