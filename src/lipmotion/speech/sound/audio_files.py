@@ -374,7 +374,7 @@ def _iterate_wave_chunks(content: _Wave) -> Iterator[tuple[bytes, int, int, bool
         body, name = place + head, content[place : place + 4]
         (size,) = struct.unpack_from("<16xQ" if long else "<4xI", content, place)
         size = 4 if name == b"RIFF" else size - (24 if long else 0)  # another file at the end
-        if not name.strip().isalnum():
+        if not all(31 < letter < 127 for letter in name):
             return
         yield name, body, size, unpadded
         if name == b"data" and not size:
