@@ -75,13 +75,10 @@ def test_audacity_counts_in_seconds_and_words_in_time_are_a_transcript(read):
 
 def test_plain_text(read):
     for text, words in (
-        ("this is it\n", ("this", "is", "it")),
-        ("this\nis\nit\n", ("this", "is", "it")),
+        ("this is it\n", ("this", "is", "it")), ("this\nis\nit\n", ("this", "is", "it")),
         ("20 30 people\n", ("twenty", "thirty", "people")),
-        ("5 o'clock\n9 lives\n", ("five", "o'clock", "nine", "lives")),
-        ("  \n\n", None),
-        ("\x0c" * 100_000, None),
-    ):
+        ("5 o'clock\n9 lives\n", ("five", "o'clock", "nine", "lives")), ("  \n\n", None), ("\x0c" * 100_000, None),
+    ):  # fmt: skip
         assert (read(text).words, read(text).phones) == (words, None)
 
 

@@ -140,14 +140,10 @@ TABLE = {
 
 def good() -> dict[str, np.ndarray]:
     return {
-        "means": np.linspace(-2, 2, 24).reshape(4, 3, 2).astype(np.float16),
-        "variances": np.ones((4, 3, 2)),
-        "log_weights": np.array([0, -np.inf, -1, -2]),
-        "share": np.full(4, 0.5, np.float32),
-        "log_stay": np.full(4, -0.1),
-        "rows": np.array([], np.int64),
-        "names": np.array(["a", "b"]),
-    }
+        "means": np.linspace(-2, 2, 24).reshape(4, 3, 2).astype(np.float16), "variances": np.ones((4, 3, 2)),
+        "log_weights": np.array([0, -np.inf, -1, -2]), "share": np.full(4, 0.5, np.float32),
+        "log_stay": np.full(4, -0.1), "rows": np.array([], np.int64), "names": np.array(["a", "b"]),
+    }  # fmt: skip
 
 
 def test_arrays_become_what_the_table_says() -> None:

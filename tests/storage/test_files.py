@@ -356,12 +356,9 @@ def test_what_is_no_mistake_elsewhere(wanted: str, tmp_path: Path) -> None:
 
 def test_what_is_wanted_passes(tmp_path: Path) -> None:
     for wanted, content in (
-        ("recording", b"RIFF\0\0\0\0WAVEfmt "),
-        ("text", b"BLENDERS are loud. The blender of Maya is a PDF."),
-        ("motion file", packed("values.npy")),
-        ("character", b"glTF\2\0\0\0"),
-        ("recording", b""),
-    ):
+        ("recording", b"RIFF\0\0\0\0WAVEfmt "), ("text", b"BLENDERS are loud. The blender of Maya is a PDF."),
+        ("motion file", packed("values.npy")), ("character", b"glTF\2\0\0\0"), ("recording", b""),
+    ):  # fmt: skip
         (tmp_path / "take").write_bytes(content)
         check_kind(tmp_path / "take", wanted)
     check_kind(tmp_path, "recording")
