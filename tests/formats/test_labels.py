@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion.formats import label_files, label_tiers
-from lipmotion.formats.textgrid import parse_interval_tiers, write_textgrid
+from lipmotion.formats.annotations import parse_interval_tiers, write_textgrid
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, group_words
 from lipmotion.units.text_normalisation import LARGEST_TRANSCRIPT_BYTES
@@ -75,13 +75,10 @@ def test_audacity_counts_in_seconds_and_words_in_time_are_a_transcript(read):
 
 def test_plain_text(read):
     for text, words in (
-        ("this is it\n", ("this", "is", "it")),
-        ("this\nis\nit\n", ("this", "is", "it")),
+        ("this is it\n", ("this", "is", "it")), ("this\nis\nit\n", ("this", "is", "it")),
         ("20 30 people\n", ("twenty", "thirty", "people")),
-        ("5 o'clock\n9 lives\n", ("five", "o'clock", "nine", "lives")),
-        ("  \n\n", None),
-        ("\x0c" * 100_000, None),
-    ):
+        ("5 o'clock\n9 lives\n", ("five", "o'clock", "nine", "lives")), ("  \n\n", None), ("\x0c" * 100_000, None),
+    ):  # fmt: skip
         assert (read(text).words, read(text).phones) == (words, None)
 
 

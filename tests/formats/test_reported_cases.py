@@ -43,25 +43,20 @@ def grid(end: float = 2, /, **tiers: Sequence[tuple[float, float, str]]) -> str:
 @pytest.mark.parametrize(
     ("name", "said", "sounds"),
     [
-        ("two-tiers-mau.TextGrid", MOTHER, ""),
-        ("three-tiers-mau.TextGrid", MOTHER, ""),
+        ("two-tiers-mau.TextGrid", MOTHER, ""), ("three-tiers-mau.TextGrid", MOTHER, ""),
         ("sampa-three-tiers.TextGrid", "she thought", "sil sh iy th ao t sil"),
         ("spoken-noise-phone.TextGrid", MOTHER, ""),
         ("unknown-word-label.TextGrid", "my mother moved the baby", ""),
-        ("elan-utterances.TextGrid", "mama went home", ""),
-        ("noise-words.txt", "mama", ""),
+        ("elan-utterances.TextGrid", "mama went home", ""), ("noise-words.txt", "mama", ""),
         ("said-not-in-transcript.json", "hi mama moon", "hh ay m aa m ah m uw n"),
-        ("word-time-nan.json", "hello big moon", ""),
-        ("words-in-ms.json", MOTHER, ""),
+        ("word-time-nan.json", "hello big moon", ""), ("words-in-ms.json", MOTHER, ""),
         ("two-speakers.TextGrid", "mama papa", "m aa m ax p aa p ax"),
-        ("u16le-nobom.TextGrid", "mama", "sil m aa m ax sil"),
-        ("fragments.json", "hello big moon", ""),
-        ("stt-utterances.json", "hello big moon", ""),
-        ("stt-nested-alternatives.json", "hello big moon", ""),
+        ("u16le-nobom.TextGrid", "mama", "sil m aa m ax sil"), ("fragments.json", "hello big moon", ""),
+        ("stt-utterances.json", "hello big moon", ""), ("stt-nested-alternatives.json", "hello big moon", ""),
         ("list-text-start_time.json", "hello big moon", ""),
         ("city-flap-ipa.TextGrid", "", "sil s ih d iy s ih d iy s ih d iy sil"),
     ],
-)
+)  # fmt: skip
 def test_the_words_and_phones_that_are_said(name: str, said: str, sounds: str) -> None:
     assert not said or words(CASES / name) == said
     assert not sounds or phones(CASES / name) == sounds.split()
@@ -318,7 +313,8 @@ OTHERS: dict[str, Any] = {
         for w, a, b in W for kind in ("Partial", "")
     ],
     "Azure, assessed": {"NBest": [{"Words": [
-        {"Word": w, "Offset": round(1e4 * a), "Duration": round(1e4 * (b - a)), "PronunciationAssessment": {"ErrorType": e}}
+        {"Word": w, "Offset": round(1e4 * a), "Duration": round(1e4 * (b - a)),
+         "PronunciationAssessment": {"ErrorType": e, "AccuracyScore": 0}}
         for w, a, b, e in [*((*row, "None") for row in MS), ("silent", 0, 0, "Omission")]]}]},
     "minutes of ISO": [{"word": w, "offset": f"PT0M{a}S", "duration": f"PT{b - a:.3f}S"} for w, a, b in W],
     "two units": [{"word": w, "start": f"{a}s", "duration": f"{1000 * (b - a):.0f}ms"} for w, a, b in W],

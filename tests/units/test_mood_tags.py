@@ -3,7 +3,7 @@ import pytest
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.types.delivery import NEUTRAL, MoodKey, MoodTag
 from lipmotion.units import split_words
-from lipmotion.units.mood_tags import SYNONYMS, parse_tagged_text, remove_known_tags, time_moods
+from lipmotion.units.spoken_text import SYNONYMS, parse_tagged_text, remove_known_tags, time_moods
 
 
 def test_tags_hold_until_the_next_and_end_tags_are_neutral():

@@ -10,7 +10,7 @@ from lipmotion.units import (
     check_text,
     check_words,
     find_words,
-    language_detection,
+    lexicon,
     spelling,
     split_words,
     text_normalisation,
@@ -211,25 +211,22 @@ SPANISH = ["l eh s ao f", "k ow s t ow", "k ax s ih t iy", "p er ao t ax", "ih s
 
 def test_of_a_text() -> None:
     for language, text in TEXTS.items():
-        assert language_detection.detect_language(text_normalisation.split_written_words(text)) == language
-    assert language_detection.detect_language(("mandrusa", "kolpeti", "vastrini")) == ""
+        assert lexicon.detect_language(text_normalisation.split_written_words(text)) == language
+    assert lexicon.detect_language(("mandrusa", "kolpeti", "vastrini")) == ""
 
 
 @pytest.mark.long
 def test_of_speech() -> None:
     english, spanish = ([tuple(word.split()) for word in words] for words in (ENGLISH, SPANISH))
-    assert language_detection.is_english(2 * english) is True
-    assert language_detection.is_english(2 * spanish) is False
-    assert language_detection.is_english(2 * english + 3 * spanish) is None
-    assert language_detection.is_english(english) is None  # too few
+    assert lexicon.is_english(2 * english) is True
+    assert lexicon.is_english(2 * spanish) is False
+    assert lexicon.is_english(2 * english + 3 * spanish) is None
+    assert lexicon.is_english(english) is None  # too few
 
 
 def test_words_are_as_they_are_written_in_every_script() -> None:
     for text, words in (
-        ("L’homme, peut-être!", "l'homme peut être"),
-        ("El 3 de mayo de 1984", "el 3 de mayo de 1984"),
-        ("你好吗？12个", "你 好 吗 12 个"),
-        ("こんにちは、ラーメン", "こんにちは ラーメン"),
-        ("हिन्दी 'ok'", "हिन्दी ok"),
-    ):
+        ("L’homme, peut-être!", "l'homme peut être"), ("El 3 de mayo de 1984", "el 3 de mayo de 1984"),
+        ("你好吗？12个", "你 好 吗 12 个"), ("こんにちは、ラーメン", "こんにちは ラーメン"), ("हिन्दी 'ok'", "हिन्दी ok"),
+    ):  # fmt: skip
         assert " ".join(text_normalisation.split_written_words(text)) == words

@@ -81,7 +81,7 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
     {
 "json": "lipmotion.formats.motion_document:JSON", "csv": "lipmotion.formats.tables:TABLE",
         "npz": "lipmotion.formats.motion_document:NPZ", "livelink.csv": "lipmotion.formats.tables:LIVE_LINK",
-        "blender.py": "lipmotion.formats.blender:MOTION_FORMAT", "c3d": "lipmotion.formats.c3d:MOTION_FORMAT",
+        "blender.py": "lipmotion.formats.game_engines:BLENDER", "c3d": "lipmotion.formats.c3d:MOTION_FORMAT",
         "fap": "lipmotion.formats.fap:MOTION_FORMAT", "anim": "lipmotion.formats.game_engines:UNITY",
         "tres": "lipmotion.formats.game_engines:GODOT", "vmd": "lipmotion.formats.vmd:MOTION_FORMAT",
         "bvh": "lipmotion.formats.c3d:BVH", "a2f.json": "lipmotion.formats.motion_document:AUDIO2FACE",
@@ -186,10 +186,8 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     check_kind(path, "motion file")
     named = _name_by_content(path)
     other = find_suffix(named, [f".{name}" for name in MOTION_READERS.names])
-    if find_suffix(named):
-        read = _format_of(named).read
-    else:
-        read = MOTION_READERS.load(other.removeprefix(".")) if other else None
+    added = MOTION_READERS.load(other.removeprefix(".")) if other and not find_suffix(named) else None
+    read = _format_of(named).read if find_suffix(named) else added
     if read is None:
         known = ", ".join(list_read_suffixes())
         raise InputError(f"{path}: cannot read motion from {_suffix(path)}; use one of {known}")

@@ -11,6 +11,7 @@ from itertools import islice
 from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError, shorten
+from lipmotion.formats.annotations import ROOT, TEXTGRID, parse_interval_tiers, read_xml_tiers, write_textgrid
 from lipmotion.formats.label_services import DamagedJsonError, describe_json, is_json, parse_service_tiers
 from lipmotion.formats.label_tiers import (
     LINES,
@@ -31,14 +32,12 @@ from lipmotion.formats.label_tiers import (
     with_words,
 )
 from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, parse_subtitles, write_subtitles
-from lipmotion.formats.textgrid import TEXTGRID, parse_interval_tiers, write_textgrid
 from lipmotion.formats.timed_lines import parse_line_tiers
-from lipmotion.formats.xml_labels import READ_ROOTS, ROOT, read_xml_tiers
 from lipmotion.printable import is_line
 from lipmotion.storage.sources import read_text_file
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import UNKNOWN_PHONES, RecognisedPhone, find_phone, restore_confidences
-from lipmotion.units.mood_tags import parse_tagged_text, remove_known_tags
+from lipmotion.units.spoken_text import parse_tagged_text, remove_known_tags
 from lipmotion.units.text_normalisation import LARGEST_TRANSCRIPT_BYTES, require_tokens
 from lipmotion.units.written_forms import list_readings
 
@@ -48,8 +47,7 @@ RECOGNISED = tuple(".srt .vtt .ass .ssa .sbv .lrc .ttml .dfxp .json .jsonl .ctm 
 FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".eaf", ".lab", ".wrd", *RECOGNISED)
 """Suffixes in whose files words are searched, in order: plain text first, as labels in time may not be words, and what
 may be recognised last."""
-FOR_PHONES = (".TextGrid", ".textgrid", ".eaf", ".lab", ".phn", ".txt")
-"""Suffixes in whose files phones are searched, in order."""
+FOR_PHONES = (".TextGrid", ".textgrid", ".eaf", ".lab", ".phn", ".txt")  # the same for phones
 LARGEST_LABELS = 1 << 24  # most bytes of a label file: labels of a day
 MOTION = re.compile(r'"lipmotion\.motion"|time_s,')  # how our own motion files begin: a quick answer for large ones
 MASTER = re.compile(r'^(?:#!MLF!#|\.)[ \t\r]*\n"(.*)"[ \t\r]*$', re.MULTILINE)
@@ -269,7 +267,7 @@ def _read_tiers(text: str, where: str) -> list[LabelTier] | None:
     try:
         if TEXTGRID.match(text):
             tiers: list[LabelTier] | None = parse_seconds(parse_interval_tiers(text, where), where)
-        elif (root := ROOT.match(text)) and root[1] in READ_ROOTS:
+        elif ROOT.match(text):
             tiers = read_xml_tiers(text, where)
         elif is_subtitles(text):
             tiers = [parse_subtitles(text, where)]

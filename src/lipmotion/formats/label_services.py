@@ -68,8 +68,7 @@ class Times(NamedTuple):
 
 
 POLLY = Times("time", usual=1000)
-SPEECHIFY = Times("starttime", "endtime", "duration", 1000)
-"""Times of marks, whose start and end are places in the text."""
+SPEECHIFY = Times("starttime", "endtime", "duration", 1000)  # of marks, whose start and end are places in the text
 TIMES = (
     Times("offsetsfrom", "offsetsto", per_s=1000),  # whisper.cpp
     Times("timestampstart", "timestampend", per_s=1),  # transformers
@@ -80,7 +79,6 @@ TIMES = (
     Times("startts", "endts", per_s=1),  # Kokoro
     Times("ts", "endts", "duration", 1),  # Rev.ai
     Times("begin", "end", "dur"),  # aeneas
-    Times("begintime", "endtime"),
     Times("tstartms", "", "ddurationms", 1000),  # YouTube, json3
     Times("offsetinticks", "", "durationinticks", TICKS_PER_S),  # Azure, batch transcription
     Times("offsetmilliseconds", "", "durationmilliseconds", 1000),  # Azure, fast transcription
@@ -89,13 +87,10 @@ TIMES = (
     Times("startoffset", "endoffset", usual=0),  # Google, version 2 ("0.1s"); NeMo's are frames
     Times("timestart", "timeend"),  # PlayHT
     Times("timebegin", "timeend", usual=1000),  # MiniMax, Hume; Gladia's first version in seconds
-    Times("startsec", "endsec", per_s=1),
-    Times("startseconds", "endseconds", per_s=1),
-    Times("starttimestamp", "endtimestamp"),
-    Times("from", "to"),
+    *(Times("startsec", "endsec", per_s=1), Times("startseconds", "endseconds", per_s=1)),
+    *(Times("starttimestamp", "endtimestamp"), Times("from", "to"), Times("begintime", "endtime")),
     Times("timeseconds", per_s=1),  # Google, text to speech
-    Times("", "resultendtime", per_s=1),  # Google, a result without words
-    Times("", "resultendoffset", per_s=1),
+    *(Times("", "resultendtime", per_s=1), Times("", "resultendoffset", per_s=1)),  # Google, results without words
 )
 TEXTS = (
     "punctuatedword word alignedword text content value transcript sentence display lexical markname token lines "
@@ -143,13 +138,8 @@ COLUMNS = (
 COLUMN_OWNERS = ("normalizedalignment", "alignment", "wordtimestamps", "phonemetimestamps", "wordalignment")
 SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
 """A word of characters, or a direction in brackets (``[whispers]``), which is not said."""
-UNFINISHED = {
-    "isfinal": False,
-    "final": False,
-    "endofturn": False,
-    "ispartial": True,
-    "message": "AddPartialTranscript",
-}
+PARTIAL = "AddPartialTranscript"  # Speechmatics' message
+UNFINISHED = {"isfinal": False, "final": False, "endofturn": False, "ispartial": True, "message": PARTIAL}
 """Members of what a service heard while somebody spoke, and says again when it is sure."""
 TEXT_ALONE = {*"text partial result language duration task usage logprobs alternatives confidence".split()}
 """Members of what a recogniser says without times."""
@@ -563,24 +553,25 @@ def _read_durations(objects: Objects, where: str) -> list[LabelTier] | None:
         raise InputError(f"{where}: holds {len(kokoro)} sentences, whose times each begin at 0; give those of one")
     if not kokoro and (len(piper) < len(objects)):
         return None
-    items: list[tuple[str, Any, Any, float]] = []  # place, text, length, and how many of its units are a second
+    phones, end_s = list[TimedLabel](), 0.0
+
+    def add(place: str, text: Any, length: Any, per_s: float) -> None:
+        nonlocal end_s
+        start_s, end_s = end_s, end_s + _parse_time(length, f"{where}: {place}", per_s)
+        phones.append(TimedLabel(start_s, end_s, require(_TEXT, text, f"{where}: {place}"), place))
+
     for place, item in piper:
         rate = require(values.number(1000, 1e6), item.get("samplerate"), f"{where}: {place}: the sample rate in hertz")
         for number, each in enumerate(item["phonemealignments"], 1):
             fields = each if isinstance(each, dict) else {}
-            items.append((f"{place}, phoneme {number}", fields.get("phoneme"), fields.get("numsamples"), rate))
+            add(f"{place}, phoneme {number}", fields.get("phoneme"), fields.get("numsamples"), rate)
     for item in kokoro:
         letters = f"^{require(_TEXT, item['phonemes'], f'{where}: phonemes')}$"
         if len(item["preddur"]) != len(letters):
             what = f"{len(item['preddur'])} durations of {len(letters) - 2} phonemes"
             raise InputError(f"{where}: {what}, required two more than phonemes")
-        pairs = enumerate(zip(letters, item["preddur"], strict=True))
-        items += [(f"phoneme {n}", KOKORO_LETTERS.get(a, a), frames, KOKORO_FRAMES_PER_S) for n, (a, frames) in pairs]
-    check_count(len(items), where)
-    phones, end_s = list[TimedLabel](), 0.0
-    for place, text, length, per_s in items:
-        start_s, end_s = end_s, end_s + _parse_time(length, f"{where}: {place}", per_s)
-        phones.append(TimedLabel(start_s, end_s, require(_TEXT, text, f"{where}: {place}"), place))
+        for number, (letter, frames) in enumerate(zip(letters, item["preddur"], strict=True)):
+            add(f"phoneme {number}", KOKORO_LETTERS.get(letter, letter), frames, KOKORO_FRAMES_PER_S)
     found: Found = defaultdict(list)
     for item in kokoro:
         _collect_rows({"tokens": item.get("tokens")}, found, where)

@@ -138,11 +138,10 @@ MAX_CHARACTERS = 50_000  # most characters of a text: about an hour of speech
 LONGEST_SENTENCE = 400  # a longer sentence is divided at a comma, else between words; in characters
 LONGEST_WORD = 200
 """Most characters without a blank in scripts that have blanks; a longer one is no word, but would take minutes."""
-ABBREVIATIONS = (
-    "mr mrs ms dr prof st jr sr vs etc no vol fig inc ltd co gen col capt lt sgt rev hon e.g i.e a.m p.m approx"
+_ABBREVIATED = frozenset(
+    "mr mrs ms dr prof st jr sr vs etc no vol fig inc ltd co gen col capt lt sgt rev hon e.g i.e a.m p.m approx".split()
 )
 """What ends in a full stop that does not end a sentence, without its last stop."""
-_ABBREVIATED = frozenset(ABBREVIATIONS.split())
 _END = re.compile(r"""(?:[.!?…]+["')\]”’»]*(?=\s)|[。！？]+["')\]”’»」』]*)\s*""")
 _BREAK = re.compile(r"[,;:–—、，；：]\s*|\s-+\s")
 

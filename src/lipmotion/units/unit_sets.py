@@ -158,10 +158,8 @@ def _mix(of: Mapping[str, str]) -> list[str]:
     return sorted((silent & spoken) - {CLOSED_UNIT})
 
 
-_ADVICE = (
-    "unit {!r} holds silence and speech; give sil and sp a unit without other phones, or call this one "
-    f"{CLOSED_UNIT!r}: silence is then a closed mouth"
-)
+_ADVICE = f"""unit {{!r}} holds silence and speech; give sil and sp a unit without other phones, or call this one \
+{CLOSED_UNIT!r}: silence is then a closed mouth"""
 
 
 class UnitGroup(NamedTuple):

@@ -80,7 +80,7 @@ def add_addon(verbs: Verbs) -> None:
 
 
 def _run_addon(options: argparse.Namespace) -> None:
-    from lipmotion.formats.blender import write_addon
+    from lipmotion.formats.game_engines import write_addon
 
     write_addon(options.program, options.output)
     print_line(options.output)

@@ -23,8 +23,8 @@ from lipmotion.storage.json_text import as_json
 from lipmotion.types import Audio, Span, TimedTranscript, TimedWord, Timeline, TranscriptLine
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
 from lipmotion.units.ipa_phones import read_tokens
-from lipmotion.units.language_detection import detect_language, is_english
-from lipmotion.units.mood_tags import parse_tagged_text
+from lipmotion.units.lexicon import detect_language, is_english
+from lipmotion.units.spoken_text import parse_tagged_text
 from lipmotion.units.text_normalisation import split_written_words
 
 LOG = logging.getLogger("lipmotion")

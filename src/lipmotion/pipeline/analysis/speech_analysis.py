@@ -62,7 +62,7 @@ from lipmotion.types.audio import LAUGHTER
 from lipmotion.types.delivery import MoodTag
 from lipmotion.types.languages import ENGLISH
 from lipmotion.units import SILENCE, UNKNOWN_PHONES, check_phones, check_text, close_gaps, is_silent
-from lipmotion.units.mood_tags import parse_tagged_text
+from lipmotion.units.spoken_text import parse_tagged_text
 from lipmotion.units.text_normalisation import require_tokens
 
 if TYPE_CHECKING:

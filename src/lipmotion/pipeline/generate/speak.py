@@ -27,8 +27,8 @@ from lipmotion.speech.voices.installed import choose_voice, find_voice, speak_se
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.types import SPEECH_RATE_HZ, Audio, Constraints, Span, SpokenText, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, split_words
-from lipmotion.units.mood_tags import parse_tagged_text, time_moods
 from lipmotion.units.phones import SHORT_PAUSE_S
+from lipmotion.units.spoken_text import parse_tagged_text, time_moods
 from lipmotion.units.text_normalisation import MAX_CHARACTERS, split_sentences
 
 BETWEEN_S = 0.35

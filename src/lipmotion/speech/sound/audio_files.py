@@ -112,9 +112,10 @@ class _TrackDecoder:
             stated_s, rounded_s = self._stream.frames / self._stream.rate, 0.0  # its duration is that of the file
         missing_s = stated_s - len(samples) / self.rate_hz
         self.samples = samples[self._cut :]
-        constant = np.square(self._sums) / max(self._count, 1)
-        self.energies = np.atleast_1d(np.maximum(self._energies - constant, 0)).tolist()
-        self.mean_energy -= float(np.mean(self._sums)) ** 2 / max(self._count, 1)
+        with np.errstate(all="ignore"):  # samples that are not finite are refused later
+            constant = np.square(self._sums) / max(self._count, 1)
+            self.energies = np.atleast_1d(np.maximum(self._energies - constant, 0)).tolist()
+            self.mean_energy -= float(np.mean(self._sums)) ** 2 / max(self._count, 1)
         self.missing_s = missing_s if missing_s > rounded_s else 0.0
         self.centre = names.index("FC") if "FC" in names[1:] else third
 
@@ -373,7 +374,7 @@ def _iterate_wave_chunks(content: _Wave) -> Iterator[tuple[bytes, int, int, bool
         body, name = place + head, content[place : place + 4]
         (size,) = struct.unpack_from("<16xQ" if long else "<4xI", content, place)
         size = 4 if name == b"RIFF" else size - (24 if long else 0)  # another file at the end
-        if not name.strip().isalnum():
+        if not all(31 < letter < 127 for letter in name):
             return
         yield name, body, size, unpadded
         if name == b"data" and not size:

@@ -37,8 +37,7 @@ def resample_speech(sound: Audio) -> Audio:
 Samples = NDArray[np.float32]
 
 REACH = 10  # the filter reaches this many samples of the lower rate to either side
-DECIMATED_BLOCK = 1 << 18
-"""Samples of the lower rate that are computed at a time: memory stays bounded for any length."""
+DECIMATED_BLOCK = 1 << 18  # samples of the lower rate that are computed at a time: memory stays bounded for any length
 KAISER_BETA = 5.0
 
 
