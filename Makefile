@@ -49,7 +49,7 @@ test-drawing: TESTS := $(DRAWING)
 test-speech: TESTS := $(addprefix --ignore=,tests/kernels $(DRAWING))
 test-drawing test-speech: test-kernels
 test-kernels test-drawing test-speech: $(VENV)/dev
-	$(BIN)/python -m pytest -m "not long" --slowest 10 $(TESTS)
+	$(BIN)/python -m pytest -m "not long" --slowest 20 $(TESTS)
 
 test-all: BROWSERS := --both-browsers
 test-all: test-long test-portable test-explore
