@@ -42,7 +42,7 @@ demo: $(VENV)/core
 # One process compiles the kernels; then two beside each other, each with tests of its own: what these load and train, they do
 # once. One that draws and one that recognises words need 700 MB each, one that does both, or compiles, needs more.
 test: $(VENV)/dev
-	$(TIMED) --limit 500 $(MAKE) --no-print-directory --jobs=2 test-drawing test-speech
+	$(TIMED) --limit 500 make --no-print-directory --jobs=2 test-drawing test-speech
 
 test-kernels: TESTS := tests/kernels
 test-drawing: TESTS := $(DRAWING)
