@@ -157,7 +157,7 @@ def released(request: pytest.FixtureRequest) -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def heard_once() -> Iterator[None]:
-    """Networks and general models hear the same toy sentences hundreds of times: what they said is known by the sound."""
+    """Networks and general models hear the same toy sentences all the time: what they said is known by the sound."""
 
     def remember(hear: Callable[..., NDArray[np.float32]]) -> Callable[..., NDArray[np.float32]]:
         said: dict[bytes, NDArray[np.float32]] = {}

@@ -163,8 +163,9 @@ def _paint(picture: Values, colour: tuple[float, ...], shape: tuple[tuple[slice,
 def _part(x: Values, y: Values, across: float, down: float, pixel_px: float) -> tuple[tuple[slice, slice], Values]:
     """Return the rows and columns that an ellipse reaches, and the share of each of their pixels inside it."""
     reach = 1 + 0.5 * pixel_px / min(across, down)
-    near = (np.abs(x) < across * reach) & (np.abs(y) < down * reach)
-    part = tuple(slice(at.argmax(), len(at) - at[::-1].argmax()) for at in (near.any(axis=1), near.any(axis=0)))
+    at = np.nonzero((np.abs(x) < across * reach) & (np.abs(y) < down * reach))
+    rows, columns = (slice(int(each.min(initial=each.size)), int(each.max(initial=-1)) + 1) for each in at)
+    part = rows, columns
     return part, _inside(x[part], y[part], across, down, pixel_px)
 
 
