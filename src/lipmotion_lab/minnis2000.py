@@ -121,7 +121,6 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "Table 1 symmetric: 73/27 for 77/23": {"overlap": "symmetric"},
     "Table 1, forward is the phone after": {"overlap": "anticipatory"},
     "overlaps half and half": {"overlap": "middle"},
-    "overlaps learned": {"overlap": "learned"},
     "window N = 3": {"window": 3},
     "window N = 7": {"window": 7},
 }

@@ -239,20 +239,10 @@ def find_reachable(structure: Structure, grammar: Grammar) -> Product:
         for source, targets in reached.items()
         for target, moves, probability in targets
     ]
-    initial = np.zeros(len(joint_states))
-    for joint, probability in initial_states.items():
-        initial[number[joint]] = probability
+    initial = np.array([initial_states.get(joint, 0.0) for joint in joint_states])
     targets, sources, moved, unit_probability = zip(*sorted(arcs, key=lambda arc: arc[:2]), strict=True)
-    return Product(
-        structure,
-        grammar,
-        joint_states,
-        arc_from=np.array(sources, np.intp),
-        arc_to=np.array(targets, np.intp),
-        moves=np.array(moved, bool).T,
-        unit_probability=np.array(unit_probability, float),
-        initial=initial / initial.sum(),
-    )
+    arrays = np.array(sources, np.intp), np.array(targets, np.intp), np.array(moved, bool).T, np.array(unit_probability)
+    return Product(structure, grammar, joint_states, *arrays, initial / initial.sum())
 
 
 _Flags = tuple[bool, ...]
