@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from numpy.typing import NDArray
 
 from lipmotion.corpora import Corpus, Selection
@@ -26,6 +25,7 @@ from lipmotion.pipeline.training.channels import with_visual_channels
 from lipmotion.pipeline.training.train import label_phones
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.types import GREY, Monitor, Speech, Timeline, Unit, Utterance, silent_monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon, is_silent
 
