@@ -22,7 +22,7 @@ from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.extensions import Registry
 from lipmotion.types.values import parse_number, parse_whole
 
-_VERBS = "animate batch live speak render edit explain cues train"
+_VERBS = "animate batch live speak render edit explain cues words train"
 _PLACES = {name: f"lipmotion.cli.verbs.{name}:add" for name in _VERBS.split()}
 _PLACES |= {name: f"lipmotion.cli.verbs.about:add_{name}" for name in "addon info cite doctor completion".split()}
 _PLACES["words"] = "lipmotion.cli.verbs.explain:add_words"
