@@ -102,7 +102,7 @@ def find_labels(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> R
             read += [(path, labels)] if labels is not None else []
             seen.append(path)
     for path in [] if seen else find_tables(recording):
-        words = _read_table(path, path.stat().st_size, path.stat().st_mtime_ns).get(recording.stem)
+        words = _parse_table(_read_text(path), is_bars=path.name == METADATA).get(recording.stem)
         if words is not None and not read:
             read.append((path, _read_plain(words, path)))
         elif path.name != METADATA:
@@ -129,14 +129,14 @@ def find_tables(recording: Path) -> list[Path]:
     return [path for path in (chapter, *tables) if path.is_file()]
 
 
-@lru_cache(maxsize=2)
-def _read_table(path: Path, _size: int, _changed_ns: int) -> dict[str, str]:
-    """Return the words of recordings by their names, of a file as ``find_tables`` has it; cached until it changes."""
+@lru_cache(maxsize=2)  # many recordings have one table
+def _parse_table(text: str, *, is_bars: bool) -> dict[str, str]:
+    """Return the words of recordings by their names; ``is_bars``: fields are divided as in ``METADATA``."""
     words: dict[str, str] = {}
-    for line in StringIO(_read_text(path)):
-        name, *rest = re.split(r"\|" if path.name == METADATA else " +", line.strip(), maxsplit=1)
-        if rest or path.name != METADATA:
-            for key in {Path(name).name, Path(name).stem if path.name == METADATA else name}:
+    for line in StringIO(text):
+        name, *rest = re.split(r"\|" if is_bars else " +", line.strip(), maxsplit=1)
+        if rest or not is_bars:
+            for key in {Path(name).name, Path(name).stem if is_bars else name}:
                 words.setdefault(key, rest[0].rpartition("|")[2] if rest else "")
     return words
 

@@ -15,7 +15,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
@@ -131,12 +130,7 @@ def list_input_files(line: BatchLine) -> list[InputFile]:
     Raises InputError: the recording is missing, empty, a folder, a pipe or a device. OSError: one cannot be read.
     """
     check_source(Path(line.recording), "recording")
-    return [_read_input(path, *_read_status(path)) for path in list_input_paths(line)]
-
-
-@lru_cache(maxsize=4)  # many recordings may have one table of words
-def _read_input(path: Path, size: int, changed_ns: int) -> InputFile:
-    return InputFile(str(path), size, changed_ns, hash_file(path))
+    return [InputFile(str(path), *_read_status(path), hash_file(path)) for path in list_input_paths(line)]
 
 
 Record = dict[str, Any]
