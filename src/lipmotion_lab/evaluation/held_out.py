@@ -23,9 +23,9 @@ from lipmotion.pipeline.generation import generate_for
 from lipmotion.pipeline.model import GEOMETRY, Model, with_prior
 from lipmotion.pipeline.training.channels import with_visual_channels
 from lipmotion.pipeline.training.train import label_phones
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.types import GREY, Monitor, Speech, Timeline, Unit, Utterance, silent_monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon, is_silent
 

@@ -33,7 +33,6 @@ from lipmotion.types import GREY, Example, Monitor, Speech, Timeline, sub_monito
 from lipmotion_lab import runner
 from lipmotion_lab.evaluation import evaluate
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, OPENING, ComparedClip, HeldOutRecordings, generate_clips
-from lipmotion_lab.learning_curve import check_training_names, choose_sizes
 from lipmotion_lab.xie_liu2007 import systems
 
 CONVERGENCE_RECORDINGS, PREDICTED_RECORDINGS = 8, 6
@@ -172,8 +171,8 @@ def run_xieliu2007(  # noqa: PLR0913
     listed = tuple(order) if order is not None else runner.shuffle(corpus.required("train"), seed)
     chosen_on_val = any(systems.COMPARED_SYSTEMS[name].splits for name in names)
     held_out, validation = corpus.required(split), corpus.required("val") if chosen_on_val else ()
-    check_training_names(corpus, listed, (*held_out, *validation))
-    steps = choose_sizes(sizes if sizes is not None else [len(listed)], len(listed))
+    runner.check_training_names(corpus, listed, (*held_out, *validation))
+    steps = runner.choose_sizes(sizes if sizes is not None else [len(listed)], len(listed))
     setup = _TrainingSetup(corpus, held_out, validation, options, settings, work)
     if options.visual != EIGENLIPS:
         runner.check_opening(corpus, held_out)  # before the long work
