@@ -25,11 +25,12 @@ READER ?=
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SOURCES := $(shell find src -type f -not -name '*.pyc') pyproject.toml README.md
-DRAWING := $(addprefix tests/,addons appearance architecture articulation engines export faces formats fuzz hmm kernels \
-  measures meshes motion oracles pipeline/film portable programs stats storage studio study types units vision web)
+DRAWING := $(addprefix tests/,addons appearance architecture articulation cli/test_face.py cli/test_render.py engines export faces \
+  formats fuzz hmm measures meshes motion oracles pipeline/film pipeline/test_scenes.py portable programs stats storage \
+  studio study types units vision web)
 TIMED := $(BIN)/python scripts/processor_time.py
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal --slowest 20
-.PHONY: demo test test-all test-long test-portable test-explore test-agents check coverage fuzz bench model site requirements clean
+.PHONY: demo test test-kernels test-drawing test-speech test-all test-long test-portable test-explore test-agents check coverage fuzz bench model site requirements clean
 .DELETE_ON_ERROR:
 # each run of pytest would read and rewrite all tests again
 unexport PYTHONDONTWRITEBYTECODE
@@ -38,9 +39,17 @@ demo: $(VENV)/core
 	mkdir -p $(BUILD)
 	$(BIN)/lipmotion animate examples/welcome.flac --transcript examples/welcome.txt --face head -o $(BUILD)/welcome.mp4 $(BUILD)/welcome.json
 
-# Two runs: a process that draws and one that recognises words need 700 MB each, one that does both needs more.
+# One process compiles the kernels; then two beside each other, each with tests of its own: what these load and train, they do
+# once. One that draws and one that recognises words need 700 MB each, one that does both, or compiles, needs more.
 test: $(VENV)/dev
-	$(TIMED) --limit 600 sh -c '$(PYTEST) -m "not long" $(DRAWING) && $(PYTEST) -m "not long" $(DRAWING:%=--ignore=%)'
+	$(TIMED) --limit 500 make --no-print-directory --jobs=2 test-drawing test-speech
+
+test-kernels: TESTS := tests/kernels
+test-drawing: TESTS := $(DRAWING)
+test-speech: TESTS := $(addprefix --ignore=,tests/kernels $(DRAWING))
+test-drawing test-speech: test-kernels
+test-kernels test-drawing test-speech: $(VENV)/dev
+	$(BIN)/python -m pytest -m "not long" --slowest 20 $(TESTS)
 
 test-all: BROWSERS := --both-browsers
 test-all: test-long test-portable test-explore

@@ -22,7 +22,7 @@ import numpy as np
 sys.path.extend(str(Path(__file__).parents[1] / folder) for folder in ("tests", "extras"))
 
 import lipmotion
-from lipmotion.formats.blender import write_addon
+from lipmotion.formats.game_engines import write_addon
 from lipmotion.pipeline.outputs.curve_sets import with_curves
 from lipmotion.pipeline.outputs.output import measure_prosody
 from lipmotion.types import Generation

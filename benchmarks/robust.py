@@ -35,9 +35,9 @@ import numpy as np
 from lipmotion import animate, load_model
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, open_recogniser
 from lipmotion.speech.sound.acoustic_conditions import mix_noise
+from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent, split_words

@@ -47,7 +47,6 @@ from lipmotion.pipeline.analysis.speech_analysis import analyse_speech
 from lipmotion.pipeline.analysis.transcribe import transcribe
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.training.prompts import prompts
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, measure_fit
 from lipmotion.speech.recognition.network.posteriors import (
     POSTERIOR_STEP,
@@ -57,6 +56,7 @@ from lipmotion.speech.recognition.network.posteriors import (
 )
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.recognition.transcript_evidence import find_evidence
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import list_installed, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice

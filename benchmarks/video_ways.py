@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora import Corpus
 from lipmotion.errors import InputError
-from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
-from lipmotion.motion.mouth_region import CORNER, HEIGHT, WIDTH
+from lipmotion.motion.eigenlips import MOUTH_CORNER, MOUTH_HEIGHT, MOUTH_WIDTH, Eigenlips, fit_eigenlips
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.request import Outputs
 from lipmotion.pipeline.training.channels import PICTURES
@@ -39,7 +38,7 @@ AROUND_PX = 12
 """What is seen around the lower face, so that skin beside what replaces it can be measured."""
 LOWER_FACE = (lower_face.HEIGHT + 2 * AROUND_PX, lower_face.WIDTH + 2 * AROUND_PX)
 """Height and width of the aligned part of the face in which seams are measured, px; the eyes are 90 px apart."""
-MOUTH = (slice(28, 28 + HEIGHT), slice(40, 40 + WIDTH))
+MOUTH = (slice(28, 28 + MOUTH_HEIGHT), slice(40, 40 + MOUTH_WIDTH))
 """The mouth region in it."""
 CROSSED = "crossed"
 """What drives a way: the track of another clip."""
@@ -76,7 +75,7 @@ class RecordedClip:
     @cached_property
     def to_frame(self) -> Array:
         """The maps from pixels of the mouth region to their positions in the image [shape=(T, 2, 3)]."""
-        return lower_face.map_region(np.asarray(self.maps), 1, CORNER)
+        return lower_face.map_region(np.asarray(self.maps), 1, MOUTH_CORNER)
 
     @cached_property
     def lower_face_to_frame(self) -> Array:
@@ -129,7 +128,7 @@ def video_of(clips: Path, name: str) -> Path:
 def training_video(path: Path) -> tuple[Pictures, Array]:
     """Return the frames of a video, and the maps from the mouth region to them."""
     footage = track_footage(path)
-    maps = lower_face.map_region(footage.face_to_image, 1, CORNER)
+    maps = lower_face.map_region(footage.face_to_image, 1, MOUTH_CORNER)
     return np.stack(list(decode_footage(footage))), maps
 
 
@@ -201,7 +200,7 @@ def on_frames(motion: Motion, clip: RecordedClip) -> Motion:
 def rectangle() -> Mask:
     """Return the mouth region in ``LOWER_FACE``, without its outermost pixels, which nothing is pasted on."""
     region = np.zeros(LOWER_FACE, bool)
-    region[MOUTH] = np.pad(np.ones((HEIGHT - 2, WIDTH - 2), bool), 1)
+    region[MOUTH] = np.pad(np.ones((MOUTH_HEIGHT - 2, MOUTH_WIDTH - 2), bool), 1)
     return region
 
 
@@ -219,7 +218,7 @@ def mouth_in_frame(frame: Pictures, to_frame: Array) -> NDArray[np.float32]:
     rows, columns = np.mgrid[: frame.shape[0], : frame.shape[1]]
     back = invert_map(to_frame)
     x, y = np.einsum("ij,jhw->ihw", back[:, :2], np.stack([columns, rows])) + back[:, 2, None, None]
-    inside = (x > 0.5) & (x < WIDTH - 1.5) & (y > 0.5) & (y < HEIGHT - 1.5)
+    inside = (x > 0.5) & (x < MOUTH_WIDTH - 1.5) & (y > 0.5) & (y < MOUTH_HEIGHT - 1.5)
     return inside.astype(np.float32)
 
 

@@ -57,10 +57,10 @@ from lipmotion.motion.network_steps import ENCODING_SCALE, GENERAL_SHAPE, cut_ra
 from lipmotion.motion.space import resample_track
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.curve_sets import make_curves
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.encoding import COMPONENTS
 from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.speech.sound.acoustic_conditions import apply_condition, mark_spoken
+from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
 from lipmotion.stats.networks import ConvolutionalNetwork

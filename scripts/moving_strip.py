@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import lipmotion
-from lipmotion.motion.mouth_region import EYE_DISTANCE_PX
+from lipmotion.motion.eigenlips import EYE_DISTANCE_PX
 from lipmotion_faces import Staging
 from lipmotion_faces.tracking.track import Footage, decode_footage, track_footage
 

@@ -24,12 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion import Corpus
-from lipmotion.speech.features import encoding, speaker_similarity
-from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.features import encoding
 from lipmotion.speech.features.encoding import COMPONENTS, LAYERS, WEIGHTS, find_encoder
-from lipmotion.speech.features.speaker_similarity import embed_speaker
+from lipmotion.speech.sound import speaker_similarity
 from lipmotion.speech.sound.acoustic_conditions import apply_condition
+from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.speaker_similarity import embed_speaker
 from lipmotion.types import Audio
 
 NETWORK = "pipecat/audio/turn/smart_turn/data/smart-turn-v3.2-cpu.onnx"

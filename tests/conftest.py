@@ -31,6 +31,7 @@ from lipmotion.errors import ExportError
 from lipmotion.measures import curves
 from lipmotion.motion import posterior_network
 from lipmotion.speech.features import encoding
+from lipmotion.speech.recognition.general import GeneralModel
 from lipmotion.speech.recognition.network.posteriors import Hama
 from lipmotion.storage.locks import lock_folder
 from lipmotion_faces.filmed.face import FilmedFace, save_face  # also where no entry point is installed
@@ -40,7 +41,8 @@ from testing.toy_face import toy_face
 if sys.platform == "linux":  # arrays of a megabyte go back to the system when they are freed: a worker runs 2,000 tests
     ctypes.CDLL(None).mallopt(-3, 1 << 20)  # M_MMAP_THRESHOLD
 SENTENCES = 12
-MAX_HEARD = 40  # sounds of which is kept what networks said: those of the toy, and some before
+MAX_HEARD, MAX_HEARD_BYTES = 40, 1_000_000
+"""How many sounds are those of which is kept what models said: of the toy, and some before; all of them short."""
 FIXED, EXPLORE = "fixed", "explore"
 """Profiles of Hypothesis: the same examples every time; and ``--hypothesis-profile=explore``: others, and more."""
 MORE_SENTENCES = 10
@@ -155,7 +157,7 @@ def released(request: pytest.FixtureRequest) -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def heard_once() -> Iterator[None]:
-    """The networks hear the same toy sentences in a hundred trainings: what they said is known by the sound."""
+    """Networks and general models hear the same toy sentences all the time: what they said is known by the sound."""
 
     def remember(hear: Callable[..., NDArray[np.float32]]) -> Callable[..., NDArray[np.float32]]:
         said: dict[bytes, NDArray[np.float32]] = {}
@@ -166,12 +168,12 @@ def heard_once() -> Iterator[None]:
                 said[key] = hear(*given)
             for oldest in list(said)[:-MAX_HEARD]:
                 del said[oldest]
-            return said[key].copy()
+            return said[key].copy() if said[key].nbytes < MAX_HEARD_BYTES else said.pop(key)
 
         return answer
 
     with pytest.MonkeyPatch.context() as patched:
-        for owner, name in ((Hama, "log_posteriors"), (encoding, "encode_window")):
+        for owner, name in ((Hama, "log_posteriors"), (encoding, "encode_window"), (GeneralModel, "log_density")):
             patched.setattr(owner, name, remember(getattr(owner, name)))
         yield
 

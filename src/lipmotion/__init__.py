@@ -85,13 +85,10 @@ _ADDED = (
     *("map_onto", "prepare", "save_face"),
 )
 """Names that the packages of faces, studio and lab provide (entry points of the group ``lipmotion.names``)."""
-_RENAMED = {"FilmOptions": "Outputs", "SpeechRequest": "Request"}
-"""Former names, for older scripts."""
 
 
 def __getattr__(name: str) -> Any:
-    present = _RENAMED.get(name, name)
-    if present not in __all__ and present not in _ADDED:
+    if name not in __all__ and name not in _ADDED:
         raise AttributeError(f"module 'lipmotion' has no attribute {name!r}")
     from importlib import import_module
 
@@ -100,7 +97,7 @@ def __getattr__(name: str) -> Any:
 
         value = load_provided(name)
     else:
-        value = getattr(import_module(_HOMES.get(present, "lipmotion.types")), present)
+        value = getattr(import_module(_HOMES.get(name, "lipmotion.types")), name)
     globals()[name] = value
     return value
 

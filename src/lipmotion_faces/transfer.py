@@ -14,7 +14,8 @@ from lipmotion.corpora import Corpus
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.motion.space import resample_track
-from lipmotion.motion.speaker_maps import SpeakerMap, count_speech_s, fit_transfer_map, select_channels
+from lipmotion.motion.speaker_estimation import count_speech_s, fit_transfer_map
+from lipmotion.motion.speaker_maps import SpeakerMap, select_channels
 from lipmotion.pipeline.analysis.read_request import read_recording
 from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.generation import find_speaker_map, generate_for

@@ -22,7 +22,6 @@ from lipmotion.types import sub_monitor, with_progress
 from lipmotion_lab import runner
 from lipmotion_lab.evaluation.evaluate import measure_clips, pair_curves, sum_correlations
 from lipmotion_lab.evaluation.held_out import OPENING, ComparedClip, HeldOutRecordings, generate_compared, make_speech
-from lipmotion_lab.learning_curve import check_training_names
 
 ENGINES_COMPARED = ("trajectory", "coupled", "selection")
 SUFFIX = ".lipmotion"
@@ -116,7 +115,7 @@ def compare_engines(
     Raises InputError, ModelFormatError, ExportError: as ``train_engines``.
     """
     held_out = corpus.required(split)
-    check_training_names(corpus, corpus.required("train"), held_out)
+    runner.check_training_names(corpus, corpus.required("train"), held_out)
     channels = runner.check_opening(corpus, held_out)
     trained = train_engines(corpus, models, settings.narrow(0, 0.6))
     phones = trained[REFERENCE_ENGINE][0].phones

@@ -11,7 +11,6 @@ import numpy as np
 
 from lipmotion.corpora import Corpus, Selection
 from lipmotion.engines import engine_named
-from lipmotion.errors import CorpusError, InputError
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.motion.space import resample_track
 from lipmotion.storage.json_text import replace_nan
@@ -21,8 +20,6 @@ from lipmotion_lab.evaluation.evaluate import measure_clips, pair_curves, sum_co
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, generate_clips, load_held_out
 from lipmotion_lab.xie_liu2007.systems import BLSTM, as_row, find_best_trial, tune_network, with_inputs_of
 
-SIZES = (20, 50, 100, 200)
-"""Default numbers of recordings: those of them that are smaller than the list; and the whole list."""
 OTHERS = ("width", "outer")
 """Channels that are compared beside the opening."""
 _ROW = "row"
@@ -51,8 +48,8 @@ def run_learning_curve(
     """
     listed = tuple(order) if order is not None else runner.shuffle(corpus.required("train"), settings.seed)
     held_out, validation = corpus.required(split), corpus.required("val") if rival else ()
-    steps = choose_sizes(sizes, len(listed))
-    check_training_names(corpus, listed, (*held_out, *validation))
+    steps = runner.choose_sizes(sizes, len(listed))
+    runner.check_training_names(corpus, listed, (*held_out, *validation))
     channels = runner.check_opening(corpus, held_out)
     key = runner.PartKey(engine_named("trajectory"), (*listed, *held_out, *validation), others=BLSTM * rival)
     checkpoint = runner.open_parts(work, corpus, settings, key)
@@ -73,31 +70,6 @@ def run_learning_curve(
     about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed, "workers": settings.workers}
     about |= {"order": "given" if order is not None else "shuffled", "closed_under": closed_under}
     return replace_nan(about | {"rows": rows})
-
-
-def choose_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:
-    """Return the sizes, or the usual ones, rising. Raises InputError: not from 1 to ``listed``, or an empty list."""
-    if not listed:
-        raise InputError("the list of utterances to train on is empty; give one name a line")
-    steps = sorted(set(sizes)) if sizes is not None else [*(n for n in SIZES if n < listed), listed]
-    if not steps or not 1 <= steps[0] <= steps[-1] <= listed:
-        named = ", ".join(map(str, steps)) or "none"
-        raise InputError(f"sizes {named}; required: from 1 to {listed}, which is how many names the list has")
-    return steps
-
-
-def check_training_names(corpus: Corpus, listed: Sequence[str], held_out: Sequence[str]) -> None:
-    """Raise CorpusError if names to train on are not in the corpus, twice in the list, or held out."""
-    known, excluded = set(corpus.names()), set(held_out)
-    wrong = {
-        "are not in the corpus; take them out, or prepare them": [name for name in listed if name not in known],
-        "are in the split that is compared with; take them out": [name for name in listed if name in excluded],
-        "stand in the list more than once; keep one of each": [n for n in set(listed) if listed.count(n) > 1],
-    }
-    for reason, names in wrong.items():
-        if names:
-            some = ", ".join(sorted(names)[:5]) + (", ..." if len(names) > 5 else "")
-            raise CorpusError(f"{corpus.path}: {len(names)} of {len(listed)} names to train on ({some}) {reason}")
 
 
 def _make_row(corpus: Corpus, result: runner.HeldOutResult, seed: int) -> dict[str, Any]:

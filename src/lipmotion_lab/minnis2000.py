@@ -40,7 +40,6 @@ from lipmotion_lab import runner
 from lipmotion_lab.engine_comparison import train_engine, train_engines
 from lipmotion_lab.evaluation.evaluate import measure_clips, pair_curves, sum_correlations, sum_distances
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, OPENING, generate_compared, make_speech
-from lipmotion_lab.learning_curve import check_training_names
 
 Array = NDArray[np.float64]
 REACH = 4
@@ -122,7 +121,6 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "Table 1 symmetric: 73/27 for 77/23": {"overlap": "symmetric"},
     "Table 1, forward is the phone after": {"overlap": "anticipatory"},
     "overlaps half and half": {"overlap": "middle"},
-    "overlaps learned": {"overlap": "learned"},
     "window N = 3": {"window": 3},
     "window N = 7": {"window": 7},
 }
@@ -173,7 +171,7 @@ def run_minnis2000(
     splits = [split for split in ("val", "test") if split == "test" or corpus.names(split)]
     lists = {split: corpus.required(split) for split in splits}
     for held_out in lists.values():
-        check_training_names(corpus, corpus.required("train"), held_out)
+        runner.check_training_names(corpus, corpus.required("train"), held_out)
     training = settings.narrow(0, 0.6)
     if quick or not guided:
         options = ({} if guided else {"guide": 0.0, "joint_recogniser": False}) | ({"epochs": 20} if quick else {})

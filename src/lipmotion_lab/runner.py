@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora import SPLITS, Corpus, Selection
 from lipmotion.engines import ENGINES, Engine
-from lipmotion.errors import CorpusError
+from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.compiler import list_blas_kernels
 from lipmotion.pipeline.model import GEOMETRY, Model
@@ -303,3 +303,32 @@ def commit(root: Path) -> str | None:
 
     head = ask("rev-parse", "HEAD")
     return f"{head}, changed since" if head and ask("status", "--porcelain", "--", "src") else head
+
+
+SIZES = (20, 50, 100, 200)
+"""Default numbers of recordings: those of them that are smaller than the list; and the whole list."""
+
+
+def choose_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:
+    """Return the sizes, or the usual ones, rising. Raises InputError: not from 1 to ``listed``, or an empty list."""
+    if not listed:
+        raise InputError("the list of utterances to train on is empty; give one name a line")
+    steps = sorted(set(sizes)) if sizes is not None else [*(n for n in SIZES if n < listed), listed]
+    if not steps or not 1 <= steps[0] <= steps[-1] <= listed:
+        named = ", ".join(map(str, steps)) or "none"
+        raise InputError(f"sizes {named}; required: from 1 to {listed}, which is how many names the list has")
+    return steps
+
+
+def check_training_names(corpus: Corpus, listed: Sequence[str], held_out: Sequence[str]) -> None:
+    """Raise CorpusError if names to train on are not in the corpus, twice in the list, or held out."""
+    known, excluded = set(corpus.names()), set(held_out)
+    wrong = {
+        "are not in the corpus; take them out, or prepare them": [name for name in listed if name not in known],
+        "are in the split that is compared with; take them out": [name for name in listed if name in excluded],
+        "stand in the list more than once; keep one of each": [n for n in set(listed) if listed.count(n) > 1],
+    }
+    for reason, names in wrong.items():
+        if names:
+            some = ", ".join(sorted(names)[:5]) + (", ..." if len(names) > 5 else "")
+            raise CorpusError(f"{corpus.path}: {len(names)} of {len(listed)} names to train on ({some}) {reason}")

@@ -23,7 +23,7 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.session import Session, read_pronunciations
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Span, Timeline, Unit, silent_monitor
 from lipmotion.units import Pronunciation, group_words, is_silent, split_words

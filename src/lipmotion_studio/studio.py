@@ -24,10 +24,11 @@ from lipmotion.pipeline.job import Job, check_outputs, open_face, run
 from lipmotion.pipeline.model import Model, find_shipped, load_model
 from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
 from lipmotion.pipeline.request import Outputs
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import create_folders
 from lipmotion.storage.locks import open_temporary
 from lipmotion.storage.sources import VIDEO_SUFFIXES, has_video, hash_file, list_video, open_media
+from lipmotion.types import SPEECH_RATE_HZ
 from lipmotion.types.configuration import ANY, kind_of
 from lipmotion.types.delivery import MANNERS, MOODS, Delivery, Staging
 from lipmotion.units import PHONES, is_silent, split_words

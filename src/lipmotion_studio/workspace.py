@@ -20,7 +20,7 @@ from starlette.exceptions import HTTPException
 
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.features.analysed_audio import AnalysedAudio
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio
 from lipmotion.types import Item, Progress
 from lipmotion.types.progress import warnings_to
 from lipmotion_studio.folder import NO_EDITS, ProjectFolder

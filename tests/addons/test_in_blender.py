@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lipmotion import write
-from lipmotion.formats.blender import write_addon
+from lipmotion.formats.game_engines import write_addon
 from lipmotion.pipeline.outputs.curve_sets import with_curves
 from lipmotion.types import Audio, Generation
 from lipmotion_blender.curves import at_frames

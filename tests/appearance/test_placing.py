@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.motion import mouth_region
+from lipmotion.motion.eigenlips import EYE_DISTANCE_PX, MOUTH_CORNER, MOUTH_HEIGHT, MOUTH_WIDTH
 from lipmotion_faces.appearance.lower_face import (
     CHEEK_PX,
     CORNER,
@@ -181,7 +181,7 @@ def test_a_frame_of_the_face_alone_is_cut_out_to_the_bit(scale: int) -> None:
     ("pixels", "scale"), [(20, 1), (90, 1), (150, 1), (160, 2), (180, 2), (270, 3), (360, 4), (2000, LARGEST_SCALE)]
 )
 def test_the_scale_is_that_of_the_footage(pixels: float, scale: int) -> None:
-    turn = pixels / mouth_region.EYE_DISTANCE_PX * np.array([[0.8, -0.6], [0.6, 0.8]])
+    turn = pixels / EYE_DISTANCE_PX * np.array([[0.8, -0.6], [0.6, 0.8]])
     places = np.tile(np.column_stack([turn, [100.0, 50.0]]), (9, 1, 1))
     places[3] *= 3  # one frame in which the tracker was wrong
     assert choose_scale(places) == scale
@@ -201,9 +201,9 @@ def test_the_shape_is_that_of_the_person() -> None:
 @pytest.mark.parametrize("scale", [1, 2])
 def test_the_mouth_is_where_mouth_pictures_have_it_and_replaced_within_its_region(scale: int) -> None:
     mask, (rows, columns) = mark_mouth(scale), find_mouth_part(scale)
-    assert mask[rows, columns].shape == (mouth_region.HEIGHT * scale, mouth_region.WIDTH * scale)
+    assert mask[rows, columns].shape == (MOUTH_HEIGHT * scale, MOUTH_WIDTH * scale)
     corner = (columns.start / scale + CORNER[0], rows.start / scale + CORNER[1])
-    assert corner == pytest.approx(mouth_region.CORNER)
+    assert corner == pytest.approx(MOUTH_CORNER)
     assert mask[rows, columns].sum() == mask.sum()
     corners = mask[rows, columns][: CHEEK_PX[1] * scale // 2, : CHEEK_PX[0] * scale // 2]
     assert not corners.any()  # where the light is measured, the footage stays

@@ -137,7 +137,7 @@ def test_rules_are_kept() -> None:
         text, name = path.read_text(encoding="utf-8"), path.relative_to(SOURCE).as_posix()
         found += [(rule, name, line) for rule in rules for line in rule(text)]
     printing = [(rule, name) for rule, name, _ in found if rule is printed]
-    assert {*printing} == {(printed, "lipmotion/cli/terminal/progress.py")}
+    assert {*printing} == {(printed, "lipmotion/cli/terminal/printing.py")}
     assert len(found) == len(printing), [each for each in found if each[0] is not printed]
 
 
@@ -184,9 +184,8 @@ def test_names_say_something() -> None:
 def test_a_class_name_has_one_meaning() -> None:
     places: dict[str, list[str]] = {}
     for path in sorted(SOURCE.rglob("*.py")):
-        for node in parsed(path.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.ClassDef):
-                places.setdefault(node.name, []).append(str(path.relative_to(SOURCE)))
+        for name in re.findall(r"^class (\w+)", path.read_text(encoding="utf-8"), re.MULTILINE):
+            places.setdefault(name, []).append(str(path.relative_to(SOURCE)))
     assert len(places) > 200
     assert {name: found for name, found in places.items() if len(found) > 1} == {}
 
@@ -200,7 +199,8 @@ ALLOWED = {"children.py"}
 
 def starts(text: str) -> Iterator[int]:
     """Give the lines of a program that could start a process other than by ``children``."""
-    for node in ast.walk(ast.parse(text)):
+    suspect = STARTERS.search(text) or any(re.search(rf"\b{module}\b", text) for module in MODULES)
+    for node in ast.walk(ast.parse(text)) if suspect else ():
         if isinstance(node, ast.Import | ast.ImportFrom):
             named = {alias.name for alias in node.names} | {getattr(node, "module", "")}
             if named & MODULES:

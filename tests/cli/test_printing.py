@@ -23,7 +23,8 @@ from cli.conftest import Done, is_one_error
 from lipmotion import Corpus
 from lipmotion.cli import main
 from lipmotion.cli.terminal.events import Events, JsonLines, Stopper
-from lipmotion.cli.terminal.progress import describe_outcome, print_json, print_line, print_lines, report_progress
+from lipmotion.cli.terminal.printing import print_json, print_line, print_lines
+from lipmotion.cli.terminal.progress import describe_outcome, report_progress
 from lipmotion.errors import InputError
 from lipmotion.pipeline.generate.explain import write_explanation
 from lipmotion.types import ChannelValue, Explanation, Item, Progress, Span, Unit

@@ -21,9 +21,9 @@ import pytest
 
 from experiments.conftest import SETTINGS, copied, few_sets, renamed
 from lipmotion import Corpus, errors, units
-from lipmotion_lab import hofer2008, learning_curve, minnis2000, runner
+from lipmotion_lab import hofer2008, minnis2000, runner
 from lipmotion_lab.report import report
-from lipmotion_lab.report.charts import Dot, draw_curve, draw_dots, draw_rising
+from lipmotion_lab.report.html import Dot, draw_curve, draw_dots, draw_rising
 from lipmotion_lab.report.section import Column, PaperOrder, PaperPair, Section, Table
 from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM
 from study.browser import BROWSER, DRIVER, MISSING, browser, check_screen
@@ -224,7 +224,7 @@ def test_a_browser_plays_it_and_nobody_is_kept_out(written, tmp_path):
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 CONDITIONS = ("audio only", "with transcript")
 LISTS = [f"Unit selection, {part}, {condition}" for part in ("val", "test") for condition in CONDITIONS]
-SIZES = [4, 10, *learning_curve.SIZES, 452]
+SIZES = [4, 10, *runner.SIZES, 452]
 CHAINS = [f"Structures of chains, {CONDITIONS[0]}"]
 TABLES: dict[str, tuple[str, str, Callable[..., list[tuple[str, str]]]]] = {
     "engines.test": ("engines", "engines-test", lambda title, name: [(f"Engines, {title}", name)]),

@@ -17,7 +17,7 @@ import numpy as np
 from formats.examples import of_motion
 from lipmotion import CueSheet, errors, formats, read_motion, types
 from lipmotion.cli.verbs import about
-from lipmotion.formats import label_files, textgrid
+from lipmotion.formats import annotations, label_files
 from lipmotion.formats.cues import write_cue_file
 from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
 from lipmotion.pipeline.batch.report import Mark, _field, _show_on_page
@@ -96,7 +96,7 @@ def _labels(suffix: str, read: Callable[[str], str]) -> Callable[[Path, str], No
 
 
 def _of_textgrid(text: str) -> str:
-    return textgrid.parse_interval_tiers(text, "a")[1].labels[0].text
+    return annotations.parse_interval_tiers(text, "a")[1].labels[0].text
 
 
 def _of_webvtt(text: str) -> str:
@@ -202,17 +202,12 @@ def _bibtex(_: Path, name: str) -> None:
 
 
 WRITERS: dict[str, Callable[[Path, str], None]] = {
-    **{suffix: _motion_file(suffix) for suffix in ("json", "csv", "npz", "c3d")},
-    "fap": _fap,
-    "blender.py": _script,
-    ".TextGrid": _labels(".TextGrid", _of_textgrid),
-    ".vtt": _labels(".vtt", _of_webvtt),
-    **{form: _cues(form, _of_rows) for form in ("tsv", "dat")},
-    "rhubarb xml": _cues("xml", _of_xml),
-    "rhubarb json": _cues("json", _of_json),
-    "pgo": _cues("pgo", _of_pgo),
+    **{suffix: _motion_file(suffix) for suffix in ("json", "csv", "npz", "c3d")}, "fap": _fap,
+    "blender.py": _script, ".TextGrid": _labels(".TextGrid", _of_textgrid), ".vtt": _labels(".vtt", _of_webvtt),
+    **{form: _cues(form, _of_rows) for form in ("tsv", "dat")}, "rhubarb xml": _cues("xml", _of_xml),
+    "rhubarb json": _cues("json", _of_json), "pgo": _cues("pgo", _of_pgo),
     **{"usda": _usda, "glb": _glb, "reports": _report, "xmp": _xmp, "bibtex": _bibtex},
-}
+}  # fmt: skip
 """By format: writes a name into a file of a folder, and reads it back; asserts that it is the same."""
 
 

@@ -161,20 +161,14 @@ def test_the_document_is_as_specified(path, generation):
 WRONG: list[tuple[dict[str, object], str]] = [
     ({"format": "other"}, "not a motion document"),
     ({"version": 2}, "version 2, this lipmotion reads up to 1: upgrade lipmotion"),
-    ({"version": "1"}, "version '1', required 1"),
-    ({"rate_hz": 0}, "rate is 0"),
-    ({"rate_hz": "fast"}, "damaged"),
-    ({"channels": [{"name": "opening"}]}, "unit is missing"),
-    ({"channels": []}, "shape"),
-    ({"values": [[1.0], [1.0, 2.0]]}, "damaged"),
-    ({"values": [1.0, 2.0]}, "shape"),
+    ({"version": "1"}, "version '1', required 1"), ({"rate_hz": 0}, "rate is 0"), ({"rate_hz": "fast"}, "damaged"),
+    ({"channels": [{"name": "opening"}]}, "unit is missing"), ({"channels": []}, "shape"),
+    ({"values": [[1.0], [1.0, 2.0]]}, "damaged"), ({"values": [1.0, 2.0]}, "shape"),
     ({"values": [[float("nan"), 1.0]]}, "not finite"),
     ({"units": [{"start_s": 0.3, "end_s": 0.1, "phone": "m", "unit": "m"}]}, "before its start"),
-    ({"units": 3}, "damaged"),
-    ({"recognised": 3}, "damaged"),
-    ({"recognised": [[0.0, 0.3, "sil"]]}, "damaged"),
+    ({"units": 3}, "damaged"), ({"recognised": 3}, "damaged"), ({"recognised": [[0.0, 0.3, "sil"]]}, "damaged"),
     ({"recognised": [[0.0, 0.3, "sil", 1.5]]}, "1.5, required a number from 0 to 1"),
-]
+]  # fmt: skip
 
 
 def test_what_is_wrong_is_said(path, generation):

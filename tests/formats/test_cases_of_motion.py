@@ -127,6 +127,13 @@ def test_drop_frame_over_minutes_and_midnight(tmp_path: Path, rate: int, mark: s
     assert motion["jawOpen"] == pytest.approx(np.array([n % 7 / 10 for n in kept]))
 
 
+def test_frames_behind_a_point_are_no_hundredths(tmp_path: Path) -> None:
+    rows = [f"10:00:{n // 30:02d}.{n % 30:02d},2,{n / 200},0" for n in range(17, 137)]
+    motion = read(tmp_path / "a.csv", take(rows))
+    assert motion.rate_hz == pytest.approx(30)
+    assert motion["jawOpen"] == pytest.approx(np.arange(17, 137) / 200)
+
+
 def test_timecodes_without_frames_are_counted(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     motion = read(tmp_path / "a.csv", take([f"10:00:{n // 30:02d},2,{n / 200},0" for n in range(17, 137)]))
     assert motion.rate_hz == pytest.approx(30)
@@ -250,7 +257,10 @@ def test_timecodes_that_count_whole_frames_of_television(write, tmp_path, counte
 
 @pytest.mark.parametrize(
     "name",
-    ["jawOpen.001", "blendShape1.jawOpen", "head_jawOpen", "Face_JawOpen", "JAWOPEN", "jaw_open", "Head|jawOpen_12"],
+    [
+        *("jawOpen.001", "blendShape1.jawOpen", "head_jawOpen", "Face_JawOpen", "JAWOPEN", "jaw_open"),
+        *("Head|jawOpen_12", "jawOpen_Head", "jawOpenShape", "Face.jawOpen_MeshShape", "jawOpen copy"),
+    ],
 )
 def test_spellings_in_a_table(tmp_path: Path, name: str) -> None:
     motion = read(tmp_path / "a.csv", take([f"{n / 30:.6f},{jaw}" for n, jaw in enumerate(JAW)], f"time,{name}"))

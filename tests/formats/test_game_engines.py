@@ -12,8 +12,8 @@ from formats.examples import generation, of_motion, written
 from lipmotion.articulation.contact import opening_to_gap
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats import read_motion
-from lipmotion.formats.blender import write_addon
 from lipmotion.formats.fap import FAP, MOUTH_TO_NOSE, PARAMETERS, STEPS, move_faps
+from lipmotion.formats.game_engines import write_addon
 from lipmotion.types import WEIGHT, Channel, Generation, Motion
 from meshes.speech import motion, units
 
@@ -166,18 +166,16 @@ def test_files_of_others(tmp_path):
 
 
 WRONG = [
-    ([], "begins with ''"),
-    (["1.0 a 25 1"], "begins with '1.0 a 25 1', required 2.1 NAME FPS FRAMES"),
+    ([], "begins with ''"), (["1.0 a 25 1"], "begins with '1.0 a 25 1', required 2.1 NAME FPS FRAMES"),
     (["2.1 a 25"], "begins with '2.1 a 25', required 2.1 NAME FPS FRAMES"),
-    (["2.1 a 25 0"], "0 frames, required 1 to"),
-    (["2.1 a 25 999999999999"], "999999999999 frames, required"),
+    (["2.1 a 25 0"], "0 frames, required 1 to"), (["2.1 a 25 999999999999"], "999999999999 frames, required"),
     (["2.1 a 25 2", marks(3), "0 5"], "frame 1 of 2 has 0 marks, required 68"),
     (["2.1 a 25 1", marks(3) + " 1", "0 5"], "has 69 marks"),
     (["2.1 a 25 1", marks(3), "0 5 6"], "frame 0 of 1 has 2 values, required 1"),
     (["2.1 a 25 1", marks(3), "0 wide"], "invalid literal"),
     (["2.1 a 25 1", marks(3), "0 99999999999999999999"], "has a value over 1000000"),
     (["2.1 a nan 1", marks(3), "0 5"], "rate is nan Hz"),
-]
+]  # fmt: skip
 
 
 def test_what_is_wrong_is_said(tmp_path):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion.formats import label_files, label_tiers
-from lipmotion.formats.textgrid import parse_interval_tiers, write_textgrid
+from lipmotion.formats.annotations import parse_interval_tiers, write_textgrid
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, group_words
 from lipmotion.units.text_normalisation import LARGEST_TRANSCRIPT_BYTES
@@ -75,13 +75,10 @@ def test_audacity_counts_in_seconds_and_words_in_time_are_a_transcript(read):
 
 def test_plain_text(read):
     for text, words in (
-        ("this is it\n", ("this", "is", "it")),
-        ("this\nis\nit\n", ("this", "is", "it")),
+        ("this is it\n", ("this", "is", "it")), ("this\nis\nit\n", ("this", "is", "it")),
         ("20 30 people\n", ("twenty", "thirty", "people")),
-        ("5 o'clock\n9 lives\n", ("five", "o'clock", "nine", "lives")),
-        ("  \n\n", None),
-        ("\x0c" * 100_000, None),
-    ):
+        ("5 o'clock\n9 lives\n", ("five", "o'clock", "nine", "lives")), ("  \n\n", None), ("\x0c" * 100_000, None),
+    ):  # fmt: skip
         assert (read(text).words, read(text).phones) == (words, None)
 
 
@@ -170,6 +167,8 @@ def test_the_words_of_ljspeech_stand_in_one_table(tmp_path, place, first) -> Non
     recording.parent.mkdir()
     table.write_text(f"LJ0010|no|no\n{first}|In 2 parts|in two parts\nLJ002|other\n")
     assert label_files.find_labels(recording).words == ("in", "two", "parts")
+    table.write_text(f"{first}|again\n")
+    assert label_files.find_labels(recording).words == ("again",)
     assert label_files.find_labels(recording.with_name("LJ003.wav")).words is None
     recording.with_suffix(".txt").write_text("its own")
     assert label_files.find_labels(recording).words == ("its", "own")

@@ -43,25 +43,20 @@ def grid(end: float = 2, /, **tiers: Sequence[tuple[float, float, str]]) -> str:
 @pytest.mark.parametrize(
     ("name", "said", "sounds"),
     [
-        ("two-tiers-mau.TextGrid", MOTHER, ""),
-        ("three-tiers-mau.TextGrid", MOTHER, ""),
+        ("two-tiers-mau.TextGrid", MOTHER, ""), ("three-tiers-mau.TextGrid", MOTHER, ""),
         ("sampa-three-tiers.TextGrid", "she thought", "sil sh iy th ao t sil"),
         ("spoken-noise-phone.TextGrid", MOTHER, ""),
         ("unknown-word-label.TextGrid", "my mother moved the baby", ""),
-        ("elan-utterances.TextGrid", "mama went home", ""),
-        ("noise-words.txt", "mama", ""),
+        ("elan-utterances.TextGrid", "mama went home", ""), ("noise-words.txt", "mama", ""),
         ("said-not-in-transcript.json", "hi mama moon", "hh ay m aa m ah m uw n"),
-        ("word-time-nan.json", "hello big moon", ""),
-        ("words-in-ms.json", MOTHER, ""),
+        ("word-time-nan.json", "hello big moon", ""), ("words-in-ms.json", MOTHER, ""),
         ("two-speakers.TextGrid", "mama papa", "m aa m ax p aa p ax"),
-        ("u16le-nobom.TextGrid", "mama", "sil m aa m ax sil"),
-        ("fragments.json", "hello big moon", ""),
-        ("stt-utterances.json", "hello big moon", ""),
-        ("stt-nested-alternatives.json", "hello big moon", ""),
+        ("u16le-nobom.TextGrid", "mama", "sil m aa m ax sil"), ("fragments.json", "hello big moon", ""),
+        ("stt-utterances.json", "hello big moon", ""), ("stt-nested-alternatives.json", "hello big moon", ""),
         ("list-text-start_time.json", "hello big moon", ""),
         ("city-flap-ipa.TextGrid", "", "sil s ih d iy s ih d iy s ih d iy sil"),
     ],
-)
+)  # fmt: skip
 def test_the_words_and_phones_that_are_said(name: str, said: str, sounds: str) -> None:
     assert not said or words(CASES / name) == said
     assert not sounds or phones(CASES / name) == sounds.split()
@@ -112,6 +107,15 @@ def test_units_of_time_follow_from_how_long_words_last(write: Any, per_s: int) -
         assert times(path)[2] == pytest.approx((1.2, 1.6))
 
 
+def test_the_first_word_of_protocol_buffers_begins_at_0(write: Any) -> None:
+    word = {"word": "hi", "startTime": {}, "endTime": {"nanos": 500_000_000}}
+    assert times(write({"results": [{"alternatives": [{"words": [word]}]}]})) == [(0, 0.5)]
+
+
+def test_a_word_of_minutes_is_one_in_milliseconds(write: Any) -> None:
+    assert times(write({"words": [{"text": "hi", "start": 400, "end": 800}]})) == [(0.4, 0.8)]
+
+
 def test_samples_are_read_where_their_rate_is_known(write: Any) -> None:
     rows = "0 3050 h#\n3050 4559 sh\n4559 5723 ix\n5723 6642 hv\n6642 8772 eh\n8772 9190 dcl\n9190 10337 jh\n"
     rows += "10337 11517 dx\n11517 12500 ax-h\n12500 13000 q\n13000 14000 pcl\n14000 15000 p\n15000 16000 nx\n"
@@ -137,6 +141,30 @@ ELAN = """<?xml version="1.0" encoding="UTF-8"?>
 <ALIGNABLE_ANNOTATION ANNOTATION_ID="a3" TIME_SLOT_REF1="s3" TIME_SLOT_REF2="s4">
 <ANNOTATION_VALUE>papa</ANNOTATION_VALUE></ALIGNABLE_ANNOTATION></ANNOTATION></TIER></ANNOTATION_DOCUMENT>
 """
+
+
+def test_textgrids_as_people_spell_them(write: Any) -> None:
+    plain = grid(words=[(0.5, 1.5, "mama"), (1.5, 2, "")])
+    for text in (f'! of "Anna", 5\n\n{plain}', plain.replace(".5", ",5"), plain.replace("\n", " ! 1\n")):
+        assert times(write(text, "a.TextGrid")) == [(0.5, 1.5)]
+    with pytest.raises(InputError, match="in order of time"):
+        read_transcript(write('"Praat chronological TextGrid text file"\n0 2\n', "a.TextGrid"))
+
+
+def test_times_of_elan_are_those_of_its_recording(write: Any, caplog: pytest.LogCaptureFixture) -> None:
+    for unit in ("milliseconds", "PAL-frames"):
+        media = (
+            f'<HEADER TIME_UNITS="{unit}"><MEDIA_DESCRIPTOR MEDIA_URL="a.wav" TIME_ORIGIN="1000"/></HEADER><TIME_ORDER>'
+        )
+        path = write(ELAN.replace("<TIME_ORDER>", media).encode("utf-16"), "a.eaf")
+        if unit == "milliseconds":
+            assert timed(path, speaker="bob").lines[0].start_s == pytest.approx(2)
+            assert "1.00 s after the start of a.wav" in caplog.text
+        else:
+            with pytest.raises(InputError, match="PAL-frames, required milliseconds"):
+                read_transcript(path)
+
+
 MFA = {name.replace("__", " - "): {"entries": [list(row) for row in rows]} for name, rows in TWO.items()}
 SPEAKERS = {
     "a.TextGrid": grid(**TWO),
@@ -279,6 +307,17 @@ OTHERS: dict[str, Any] = {
         for w, a, b in W for k, letter in enumerate(w + " ")]},
     "ELAN's table": "Begin Time - ss.msec\tEnd Time - ss.msec\tAnnotation\n"
     + "".join(f"{a}\t{b}\t{w}\n" for w, a, b in W),
+    "Speechmatics, live": [
+        {"message": f"Add{kind}Transcript", "results": [
+            {"type": "word", "start_time": a, "end_time": b, "alternatives": [{"content": w}]}]}
+        for w, a, b in W for kind in ("Partial", "")
+    ],
+    "Azure, assessed": {"NBest": [{"Words": [
+        {"Word": w, "Offset": round(1e4 * a), "Duration": round(1e4 * (b - a)),
+         "PronunciationAssessment": {"ErrorType": e, "AccuracyScore": 0}}
+        for w, a, b, e in [*((*row, "None") for row in MS), ("silent", 0, 0, "Omission")]]}]},
+    "minutes of ISO": [{"word": w, "offset": f"PT0M{a}S", "duration": f"PT{b - a:.3f}S"} for w, a, b in W],
+    "two units": [{"word": w, "start": f"{a}s", "duration": f"{1000 * (b - a):.0f}ms"} for w, a, b in W],
     "hundredths": [{"word": w, "start": round(a / 10), "end": round(b / 10)} for w, a, b in MS],
 }  # fmt: skip
 
@@ -302,6 +341,7 @@ LINES = {
     "ELAN's text": "default\t\t00:00:00.400\t0.4\t00:00:01.600\t1.6\t00:00:01.200\t1.2\thello big moon\n",
     "HTML's breaks": "1\n00:00:00,400 --> 00:00:01,600\nhello<br/>big&lt;br&gt;moon\n",
     "SubViewer": "[INFORMATION]\n[TITLE]no\n[SUBTITLE]\n00:00:00.40,00:00:01.60\nhello big[br]moon\n",
+    "ruby": "WEBVTT\n\n00:00.400 --> 00:01.600\n<ruby>hello<rt>no</rt></ruby> big moon\n",
     "MPL2": "[4][16]hello big|/moon\n[16][17]\n",
     "SBV": "0:00:00.400,0:00:01.600\nhello big\nmoon\n",
     "TTML": TTML.format("", BODY.format("00:00:00.4", "end", "1600ms")),

@@ -33,10 +33,8 @@ WRONG = [
     ("time_s,opening\n0,a\n0.1,b\n", "not a table of numbers"),
     ("time_s,opening\n0,1\n0.1\n", "not a table of numbers"),
     ("time_s,opening\n0,1,2\n0.1,1,2\n", "required 2 numbers in each"),
-    ("time_s,opening\n0,1\n", "fewer than two rows"),
-    ("time_s,opening\n0.1,1\n0.2,1\n", "begin at 0"),
-    ("time_s,opening\n0,1\n0.1,1\n0.3,1\n", "even steps"),
-    ("time_s,opening\n0,1\n0,1\n", "even steps"),
+    ("time_s,opening\n0,1\n", "fewer than two rows"), ("time_s,opening\n0.1,1\n0.2,1\n", "begin at 0"),
+    ("time_s,opening\n0,1\n0.1,1\n0.3,1\n", "even steps"), ("time_s,opening\n0,1\n0,1\n", "even steps"),
     ("time_s,opening\n0,1\ninf,1\n", "values that are no times, required seconds up to"),
     ("time_s,opening\n0,1\n1,nan\n", "1 values that are not finite, the first is 'opening' in frame 1"),
     ("time_s,opening,opening\n0,1,1\n0.1,1,1\n", "names repeat"),
@@ -52,7 +50,7 @@ WRONG = [
     ("frame,jaw\n0,1\n1,1\n", "first line is 'frame,jaw', required .* a column of times"),
     ("time,jaw\nsoon,1\n1,1\n", "line 2: could not convert"),
     ("time,jaw\n0,1\n0.01,1\n0.02,1\n0.03,1\n99,1\n", "most of the time there are none; cut the take"),
-]
+]  # fmt: skip
 
 
 def test_what_is_wrong_is_said(write):

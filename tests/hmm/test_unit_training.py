@@ -3,19 +3,7 @@ from itertools import groupby, pairwise
 import numpy as np
 import pytest
 
-from hmm.synthetic import (
-    INVENTORY,
-    PAUSE,
-    SILENCE,
-    UNITS,
-    align,
-    chosen_units,
-    decode,
-    recordings,
-    sentences,
-    speaker,
-    within_silence,
-)
+from hmm import synthetic
 from lipmotion.errors import CorpusError
 from lipmotion.hmm import model, unit_training
 from lipmotion.stats.bigram import estimate_bigram
@@ -28,9 +16,9 @@ CONFIG = model.HmmConfig(mixtures=2, context_frames=20)
 def trained():
     """Models, the speaker, the utterances, their units, the first frames of these, and the log."""
     log: list[tuple[str, float]] = []
-    who = speaker(0)
-    corpus = recordings(0, 30, who, pauses=True)
-    hmm = unit_training.train_hmm(corpus[0], INVENTORY, CONFIG, lambda e: log.append((e.stage, e.figure)))
+    who = synthetic.speaker(0)
+    corpus = synthetic.recordings(0, 30, who, pauses=True)
+    hmm = unit_training.train_hmm(corpus[0], synthetic.INVENTORY, CONFIG, lambda e: log.append((e.stage, e.figure)))
     return hmm, who, *corpus, log
 
 
@@ -47,83 +35,85 @@ def test_no_iteration_of_any_stage_lowers_the_likelihood(trained):
 def test_boundaries_are_found_within_two_frames(trained):
     hmm, _, transcribed, said, edges, _ = trained
     parts = zip(transcribed, said, edges, strict=True)
-    errors = np.concatenate([align(hmm, utterance.features, units) - where for utterance, units, where in parts])
+    errors = np.concatenate(
+        [synthetic.align(hmm, utterance.features, units) - where for utterance, units, where in parts]
+    )
     assert np.abs(errors).max() <= 2
     assert np.abs(errors).mean() < 0.15
 
 
 def test_pauses_are_found_where_they_were_made(trained):
     hmm, _, transcribed, said, _, _ = trained
-    assert [chosen_units(hmm, utterance.features, utterance.words) for utterance in transcribed] == said
+    assert [synthetic.chosen_units(hmm, utterance.features, utterance.words) for utterance in transcribed] == said
 
 
 def test_pauses_are_found_in_noise():
     """A pause has the density of silence before any is chosen; otherwise a unit beside it learns both sounds."""
-    transcribed, said, _ = recordings(0, 20, speaker(0, spread=0.8), pauses=True)
-    hmm = unit_training.train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
-    assert [chosen_units(hmm, utterance.features, utterance.words) for utterance in transcribed] == said
+    transcribed, said, _ = synthetic.recordings(0, 20, synthetic.speaker(0, spread=0.8), pauses=True)
+    hmm = unit_training.train_hmm(transcribed, synthetic.INVENTORY, CONFIG, silent_monitor)
+    assert [synthetic.chosen_units(hmm, utterance.features, utterance.words) for utterance in transcribed] == said
 
 
 def test_new_sentences_are_recognised(trained):
     hmm, who, _, said, *_ = trained
     seen = {pair for units in said for pair in pairwise(units)}
-    for number, words in enumerate(sentences(99, 15)):
-        units = within_silence(words)
+    for number, words in enumerate(synthetic.sentences(99, 15)):
+        units = synthetic.within_silence(words)
         features, edges = who.say(np.random.default_rng([99, number]), units)
-        found, bounds = decode(hmm, features, (SILENCE, *UNITS))
+        found, bounds = synthetic.decode(hmm, features, (synthetic.SILENCE, *synthetic.UNITS))
         assert found == units, f"{set(pairwise(units)) - seen} were never seen in training"
         assert bounds == pytest.approx(edges, abs=2)
 
 
 def test_the_pronunciation_said_is_learned():
     """Half of the time a word is not pronounced as the first variant of the lexicon."""
-    who, draw = speaker(5), np.random.default_rng(5)
+    who, draw = synthetic.speaker(5), np.random.default_rng(5)
     variants = (("a", "b"), ("c", "b"))
     transcribed, said = [], []
-    for number, words in enumerate(sentences(5, 30)):
-        said.append(within_silence([variants[number % 2], *words]))
+    for number, words in enumerate(synthetic.sentences(5, 30)):
+        said.append(synthetic.within_silence([variants[number % 2], *words]))
         features, _ = who.say(draw, said[-1])
         transcribed.append(unit_training.TranscribedUtterance(features, (variants, *((word,) for word in words))))
-    hmm = unit_training.train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
-    assert [chosen_units(hmm, utterance.features, utterance.words) for utterance in transcribed] == said
+    hmm = unit_training.train_hmm(transcribed, synthetic.INVENTORY, CONFIG, silent_monitor)
+    assert [synthetic.chosen_units(hmm, utterance.features, utterance.words) for utterance in transcribed] == said
 
 
 def test_clicks_in_the_silence_behind_the_last_word_do_not_become_part_of_it():
     """One word always comes last: only its sound distinguishes it from the silence that always follows it."""
-    who, draw = speaker(6), np.random.default_rng(6)
+    who, draw = synthetic.speaker(6), np.random.default_rng(6)
     transcribed, said, edges = [], [], []
-    for number, sentence in enumerate(sentences(6, 30, words=3)):
+    for number, sentence in enumerate(synthetic.sentences(6, 30, words=3)):
         words = [tuple("a" if unit == "e" else unit for unit in word) for word in sentence]
         words.append(("b", "c") if number % 2 else ("e",))
-        said.append(within_silence(words))
+        said.append(synthetic.within_silence(words))
         features, where = who.say(draw, said[-1])
-        room = np.repeat(who.means[SILENCE][:1], 60, axis=0) + draw.normal(0, who.spread, (60, 4))
+        room = np.repeat(who.means[synthetic.SILENCE][:1], 60, axis=0) + draw.normal(0, who.spread, (60, 4))
         for click in draw.integers(5, 55, size=3):
             room[click : click + 2] = draw.normal([3.0, 0, 0, 0], 2, (2, 4))
         sound = np.r_[features, room].astype(np.float32)
         transcribed.append(unit_training.TranscribedUtterance(sound, tuple((word,) for word in words)))
         edges.append([*where[:-1], where[-1] + 60])
-    hmm = unit_training.train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
+    hmm = unit_training.train_hmm(transcribed, synthetic.INVENTORY, CONFIG, silent_monitor)
     for utterance, units, where in zip(transcribed, said, edges, strict=True):
-        assert np.abs(align(hmm, utterance.features, units) - where).max() <= 3
+        assert np.abs(synthetic.align(hmm, utterance.features, units) - where).max() <= 3
 
 
 def test_the_bigram_is_that_of_what_was_said_pauses_being_silence(trained):
     hmm, _, _, said, _, _ = trained
-    silent = [tuple(SILENCE if unit == PAUSE else unit for unit in units) for units in said]
-    assert hmm.bigram.units == (SILENCE, PAUSE, *UNITS)
+    silent = [tuple(synthetic.SILENCE if unit == synthetic.PAUSE else unit for unit in units) for units in said]
+    assert hmm.bigram.units == (synthetic.SILENCE, synthetic.PAUSE, *synthetic.UNITS)
     wanted = estimate_bigram(hmm.bigram.units, silent)
     assert np.array_equal(hmm.bigram.log_probability, wanted.log_probability)
 
 
 def test_an_utterance_too_short_for_its_words_is_left_out():
-    transcribed, _, _ = recordings(2, 10, speaker(2))
+    transcribed, _, _ = synthetic.recordings(2, 10, synthetic.speaker(2))
     short = unit_training.TranscribedUtterance(transcribed[0].features[:15], transcribed[0].words)
     for nothing in ([], [short]):
         with pytest.raises(CorpusError, match=f"none of {len(nothing)}"):
-            unit_training.train_hmm(nothing, INVENTORY, CONFIG, silent_monitor)
+            unit_training.train_hmm(nothing, synthetic.INVENTORY, CONFIG, silent_monitor)
     with_it, without = (
-        unit_training.train_hmm(given, INVENTORY, CONFIG, silent_monitor)
+        unit_training.train_hmm(given, synthetic.INVENTORY, CONFIG, silent_monitor)
         for given in ([short, *transcribed], transcribed)
     )
     assert np.array_equal(with_it.mixtures.means, without.mixtures.means)

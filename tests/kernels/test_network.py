@@ -36,7 +36,7 @@ def test_single_precision_is_close_however_loud(seed, spread):
     log_emission = random_emission(seed, 40, len(arrays["emission"]), spread).astype(np.float32)
     posterior, _, log_likelihood = network_posteriors(log_emission, **arrays)
     exact, _, wanted = network_posteriors(log_emission.astype(float), **arrays)
-    assert posterior == pytest.approx(exact, abs=1e-4)
+    np.testing.assert_allclose(posterior, exact, rtol=0, atol=1e-4, equal_nan=False)
     assert log_likelihood == pytest.approx(wanted, rel=1e-6)
 
 

@@ -67,7 +67,7 @@ def test_every_bit_is_that_of_the_definition(seed):
         form.stack(*layers, stacked)
         results.append((layer, floats, few, stacked))
     for found, wanted, levels in zip(*results, (0, 0, 3, 0), strict=True):
-        assert found == pytest.approx(wanted.astype(float), rel=0, abs=levels)
+        np.testing.assert_allclose(found, wanted.astype(float), rtol=0, atol=levels, equal_nan=False)
 
 
 TURNED = np.array([[0.7, -0.1, 2.3], [0.12, 0.68, -3.6]])

@@ -120,15 +120,12 @@ def test_written_weights_paint_the_same_binding_and_points_are_read(binding, mes
 
 
 WRONG = [
-    ("vertex,weight\n1,2\n", "required vertex,point,weight"),
-    ("vertex,point,weight\n1,17\n", "2 columns"),
-    ("vertex,point,weight\none,17,1\n", "line 2"),
-    ("vertex,point,weight\n1,17,0.5\n1,17,0.5\n", "occur twice"),
+    ("vertex,weight\n1,2\n", "required vertex,point,weight"), ("vertex,point,weight\n1,17\n", "2 columns"),
+    ("vertex,point,weight\none,17,1\n", "line 2"), ("vertex,point,weight\n1,17,0.5\n1,17,0.5\n", "occur twice"),
     ("vertex,point,weight\n1,17,1.5\n", "is 1.5, required 0 to 1"),
     ("vertex,point,weight\n1,17,nan\n", "is nan, required 0 to 1"),
-    ("vertex,point,weight\n-1,17,1\n", "does not exist"),
-    ("vertex,point,weight\n1,5,1\n", "is no control point"),
-]
+    ("vertex,point,weight\n-1,17,1\n", "does not exist"), ("vertex,point,weight\n1,5,1\n", "is no control point"),
+]  # fmt: skip
 
 
 def test_paint_is_checked(binding, mesh, tmp_path):

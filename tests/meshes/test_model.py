@@ -187,15 +187,13 @@ def test_controls_follow_their_sources_or_are_constant(tmp_path):
 
 
 DAMAGED_TABLES = [
-    ("", "required control,source"),
-    ("control,from\nJaw,jawOpen\n", "required control,source"),
-    ("control,source\n", "0 rows"),
-    ("control,source,gain\nJaw,jawOpen,much\n", "line 2"),
+    ("", "required control,source"), ("control,from\nJaw,jawOpen\n", "required control,source"),
+    ("control,source\n", "0 rows"), ("control,source,gain\nJaw,jawOpen,much\n", "line 2"),
     ("control,source,gain\nJaw,jawOpen,nan\n", "line 2: the number is"),
     ("control,source,gain\nJaw,jawOpen,1e9\n", "required at most"),
     ("control,source,low,high\nJaw,jawOpen,2,1\n", "goes from 2 to 1"),
     ("control,source\n,jawOpen\n", "without a control"),
-]
+]  # fmt: skip
 
 
 def test_damaged_tables_are_refused(tmp_path):

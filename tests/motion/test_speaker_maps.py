@@ -8,7 +8,15 @@ from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion import speaker_maps
 from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.motion.frame_labels import is_away_from_speech, list_speech_intervals
-from lipmotion.motion.speaker_maps import REST_PRIOR_S, compose_maps, count_speech_s, fit_transfer_map
+from lipmotion.motion.speaker_estimation import (
+    RANGE_PRIOR_S,
+    REST_PRIOR_S,
+    add_habits,
+    count_speech_s,
+    fit_transfer_map,
+    map_to_mean_person,
+)
+from lipmotion.motion.speaker_maps import compose_maps
 from lipmotion.types import Channel, Example, Features, Motion, Span, Speech, Timeline, Unit
 from testing.toy import toy_motion, toy_sentences
 
@@ -48,7 +56,7 @@ def restful(example: Example) -> np.ndarray:
 def both(*groups: Sequence[Example]) -> tuple[list[list[Example]], speaker_maps.SpeakerMaps]:
     examples = [example for group in groups for example in group]
     names = [name for name, group in zip(("anna", "ben", "cleo"), groups, strict=False) for _ in group]
-    mapped, maps = speaker_maps.map_to_mean_person(examples, names)
+    mapped, maps = map_to_mean_person(examples, names)
     parts = iter(mapped)
     return [[next(parts) for _ in group] for group in groups], maps
 
@@ -169,7 +177,7 @@ def test_unseen_frames_change_nothing() -> None:
 
 
 def test_speakers_by_name_and_channels_in_another_order() -> None:
-    mapped, maps = speaker_maps.map_to_mean_person([*anna(), *ben(), *anna(3)], ["anna"] * 6 + ["ben"] * 6 + [""] * 3)
+    mapped, maps = map_to_mean_person([*anna(), *ben(), *anna(3)], ["anna"] * 6 + ["ben"] * 6 + [""] * 3)
     assert len(mapped) == 15
     assert maps.names == ("anna", "ben")  # those without a name are one person more
     with pytest.raises(InputError, match="no speaker 'cleo', only: anna, ben"):
@@ -182,13 +190,13 @@ def test_speakers_by_name_and_channels_in_another_order() -> None:
 
 def test_habits_are_what_is_left_in_each_viseme() -> None:
     examples, names = [*anna(), *ben()], ["anna"] * 6 + ["ben"] * 6
-    mapped, maps = speaker_maps.map_to_mean_person(examples, names)
+    mapped, maps = map_to_mean_person(examples, names)
     planted = np.zeros((len(speaker_maps.VISEME_NAMES), 3))
     planted[speaker_maps.VISEME_NAMES.index("lr1"), 1], planted[speaker_maps.VISEME_NAMES.index("al"), 2] = 0.1, -0.2
     generated = [each.motion.values.copy() for each in mapped]
     for each, values in zip(mapped[6:], generated[6:], strict=True):
         values[:] -= speaker_maps.weigh_visemes(each.speech.units, len(values)) @ planted
-    found = speaker_maps.add_habits(maps, mapped, names, generated)
+    found = add_habits(maps, mapped, names, generated)
     np.testing.assert_allclose(found.of("anna").habits, 0, atol=1e-12)
     habits = found.of("ben").habits
     assert 0.05 < habits[speaker_maps.VISEME_NAMES.index("lr1"), 1] < 0.1
@@ -302,7 +310,7 @@ def test_gains_grow_with_the_seconds_of_speech() -> None:
     for count in (1, 6):
         some = examples[:count]
         person = fit_transfer_map(some, resting_open(some))
-        trust = count_speech_s(some) / (count_speech_s(some) + speaker_maps.RANGE_PRIOR_S)
+        trust = count_speech_s(some) / (count_speech_s(some) + RANGE_PRIOR_S)
         np.testing.assert_allclose(np.log(person.gain) / trust, np.log(GAIN), atol=0.05)
 
 

@@ -14,8 +14,8 @@ from lipmotion import Corpus, Model
 from lipmotion.articulation.expression import with_moods
 from lipmotion.errors import MissingDependencyError
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Features, Generation, Motion, Timeline, Track, Unit, Utterance
 from lipmotion.types.delivery import parse_moods

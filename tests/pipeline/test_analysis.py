@@ -11,14 +11,7 @@ import pytest
 from lipmotion import Model, Request, animate, load_model
 from lipmotion.engines import Engine, Inputs
 from lipmotion.errors import ExportError, InputError
-from lipmotion.pipeline.analysis.language import (
-    detect_english,
-    format_words,
-    recognise_words,
-    resolve_language,
-    warn_of_another_language,
-    write_words,
-)
+from lipmotion.pipeline.analysis import language
 from lipmotion.pipeline.analysis.read_request import read_request, read_text_or_file
 from lipmotion.pipeline.analysis.speech_analysis import analyse, analyse_speech, build_speech, recognise_speech
 from lipmotion.pipeline.generation import (
@@ -112,12 +105,12 @@ def test_another_language_has_its_own_words_and_lexicon(tmp_path):
     (tmp_path / "words.txt").write_text("¡Papa, 2!", encoding="utf-8")
     for transcript in ("¡Papa, 2!", tmp_path / "words.txt"):
         spanish = Request(SILENCE, transcript, lexicon=USER, language="es")
-        request = resolve_language(read_request(spanish, is_typed=False))
+        request = language.resolve_language(read_request(spanish, is_typed=False))
         assert request.transcript.words == ("papa", "2")
         assert request.lexicon.pronunciations("2") == (("m", "aa"),)
     written = TranscriptLine(tuple(map(TimedWord, ("perro", "$20M", "&", "St.", "21"))))  # not read as English
     user = Lexicon(dict.fromkeys(("perro", "20m", "st", "21"), (("m", "aa"),)))
-    request = resolve_language(Request(SILENCE, TimedTranscript((written,)), lexicon=user, language="es"))
+    request = language.resolve_language(Request(SILENCE, TimedTranscript((written,)), lexicon=user, language="es"))
     assert request.transcript.words == ("perro", "20m", "st", "21")
     assert request.lexicon.spoken_forms("21") == ((("m", "21"), ("aa", "21")),)
 
@@ -126,13 +119,13 @@ def test_unknown_languages_are_refused():
     with pytest.raises(InputError, match="language is 'xx', required one of: en, es, fr, "):
         as_request(SILENCE, language="xx")
     with pytest.raises(InputError, match="the language of the transcript is not known; give it, one of: en, es"):
-        resolve_language(Request(SILENCE, "mandrusa kolpeti vastrini", language="auto"))
+        language.resolve_language(Request(SILENCE, "mandrusa kolpeti vastrini", language="auto"))
 
 
 def test_auto_says_what_it_takes_the_speech_for(caplog):
     for transcript in ("bin blue at f two now", None):
-        assert resolve_language(Request(SILENCE, transcript, language="auto")).language == "en"
-    assert detect_english(SILENCE) is None
+        assert language.resolve_language(Request(SILENCE, transcript, language="auto")).language == "en"
+    assert language.detect_english(SILENCE) is None
     first, second = (message.partition(";")[0] for message in caplog.messages)
     assert first == "the transcript is taken for English"
     assert second == "the language of the speech is not known, English is assumed"
@@ -155,14 +148,14 @@ def test_the_words_of_english_are_known(caplog):
     pytest.importorskip("hama.asr")
     welcome = read_welcome().samples
     for samples, taken in ((welcome, "taken for English"), (welcome[::-1], "not")):
-        resolve_language(Request(Audio(np.tile(samples, 4), 16_000), language="auto"))
+        language.resolve_language(Request(Audio(np.tile(samples, 4), 16_000), language="auto"))
         assert taken in caplog.messages[-1]
 
 
 @pytest.mark.parametrize(("confidence", "lasts_s", "warns"), [(0.2, 2.0, True), (0.85, 2.0, False), (0.2, 0.5, False)])
 def test_words_that_are_hardly_understood_are_told(confidence, lasts_s, warns, caplog):
     words = Timeline((Span(0.0, lasts_s, RecognisedWord("hola", confidence)),))
-    warn_of_another_language(Recognition(Timeline(()), words, lasts_s, 0.0, None))
+    language.warn_of_another_language(Recognition(Timeline(()), words, lasts_s, 0.0, None))
     assert ("--language" in caplog.text) == warns
     assert (f"confidence {confidence:.2f}" in caplog.text) == warns
 
@@ -176,20 +169,20 @@ def labels(units: Timeline[Unit]) -> list[tuple[str, str]]:
 
 @pytest.fixture(scope="module")
 def found() -> Recognition:
-    return recognise_words(WELCOME)
+    return language.recognise_words(WELCOME)
 
 
 def test_long_pauses_end_a_line():
     timed = ((0.0, 0.3, "oh"), (0.4, 0.6, "no"), (1.2, 1.5, "yes"))
     words = Timeline(tuple(Span(start_s, end_s, RecognisedWord(text, 0.5)) for start_s, end_s, text in timed))
-    assert format_words(words) == "oh no\nyes\n"
-    assert format_words(Timeline(())) == ""
+    assert language.format_words(words) == "oh no\nyes\n"
+    assert language.format_words(Timeline(())) == ""
 
 
 @pytest.mark.parametrize("suffix", [".txt", ".JSON"])
 def test_files_of_words_are_transcripts(found, tmp_path, suffix):
     path = tmp_path / f"words{suffix}"
-    write_words(found.words, [path], WELCOME)
+    language.write_words(found.words, [path], WELCOME)
     aligned = animate(WELCOME, transcript=path).units
     assert labels(aligned) == labels(found.units)
     starts = [(a.start_s, b.start_s) for a, b in zip(aligned, found.units, strict=True)]
@@ -199,7 +192,7 @@ def test_files_of_words_are_transcripts(found, tmp_path, suffix):
 def test_files_that_cannot_be_written(found, tmp_path):
     for name in ("words.srt", "words", "nowhere/words.txt"):
         with pytest.raises(ExportError):
-            write_words(found.words, [tmp_path / "first.txt", tmp_path / name])
+            language.write_words(found.words, [tmp_path / "first.txt", tmp_path / name])
     assert not list(tmp_path.iterdir())
 
 
@@ -214,7 +207,7 @@ def test_speech_is_as_reliable_as_its_words(found):
     assert given.recognition is None
     assert analyse(model, Request(WELCOME, recogniser="fast")).confidence == pytest.approx(0)
     long = Audio(np.tile(read_welcome().samples, 7), 16_000)  # of more than half a minute
-    assert recognise_words(long, workers=2).words == recognise_words(long).words
+    assert language.recognise_words(long, workers=2).words == language.recognise_words(long).words
 
 
 @dataclass(frozen=True)

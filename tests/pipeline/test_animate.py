@@ -11,22 +11,6 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 import lipmotion
-from lipmotion import (
-    Corpus,
-    Delivery,
-    Job,
-    Model,
-    Outputs,
-    Request,
-    Selection,
-    Staging,
-    animate,
-    evaluate,
-    load_model,
-    save_model,
-    train,
-    write,
-)
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import write_labels
 from lipmotion.pipeline.analysis.read_request import read_request
@@ -40,9 +24,9 @@ Animate = Callable[..., Generation]
 
 
 @pytest.fixture(scope="module")
-def move(toy_model: Model, toy_sentence: ToySentence) -> Animate:
-    return lambda *, constraints=None, **known: animate(
-        Request(toy_sentence.audio, **known), model=toy_model, constraints=constraints
+def move(toy_model: lipmotion.Model, toy_sentence: ToySentence) -> Animate:
+    return lambda *, constraints=None, **known: lipmotion.animate(
+        lipmotion.Request(toy_sentence.audio, **known), model=toy_model, constraints=constraints
     )
 
 
@@ -160,27 +144,29 @@ def test_speech_that_cannot_be_used(toy_model, tmp_path):
         (np.zeros(16_000, np.float32), "ndarray, required a path, or samples"),
     ):
         with pytest.raises(InputError, match=message):
-            animate(speech, model=toy_model)
+            lipmotion.animate(speech, model=toy_model)
 
 
 def test_a_file_its_name_and_its_samples_are_the_same(toy_model, toy_speech):
-    first, *others = (animate(each, model=toy_model) for each in (toy_speech, str(toy_speech), read_sound(toy_speech)))
+    first, *others = (
+        lipmotion.animate(each, model=toy_model) for each in (toy_speech, str(toy_speech), read_sound(toy_speech))
+    )
     assert all(np.array_equal(first.motion.values, other.motion.values) for other in others)
 
 
 def test_files_may_stand_for_model_and_transcript(toy_model, toy_model_file, toy_speech, tmp_path):
     (tmp_path / "said.txt").write_text("see papa")
-    by_file = animate(str(toy_speech), model=str(toy_model_file), transcript=tmp_path / "said.txt")
+    by_file = lipmotion.animate(str(toy_speech), model=str(toy_model_file), transcript=tmp_path / "said.txt")
     assert next(span.label.word for span in by_file.units if span.label.word) == "see"
-    assert by_file.units == animate(toy_speech, model=toy_model, transcript="see papa").units
+    assert by_file.units == lipmotion.animate(toy_speech, model=toy_model, transcript="see papa").units
     with pytest.raises(InputError, match="no such transcript file"):
-        animate(toy_speech, model=toy_model, transcript=tmp_path / "other.txt")
+        lipmotion.animate(toy_speech, model=toy_model, transcript=tmp_path / "other.txt")
 
 
 def test_the_same_bytes_again_whatever_the_number_of_threads(toy_model, toy_speech, tmp_path):
-    write(animate(toy_speech, model=toy_model), tmp_path / "first.npz")
+    lipmotion.write(lipmotion.animate(toy_speech, model=toy_model), tmp_path / "first.npz")
     with threadpool_limits(2, user_api="blas"):
-        write(animate(toy_speech, model=toy_model), tmp_path / "second.npz")
+        lipmotion.write(lipmotion.animate(toy_speech, model=toy_model), tmp_path / "second.npz")
     assert (tmp_path / "first.npz").read_bytes() == (tmp_path / "second.npz").read_bytes()
 
 
@@ -196,7 +182,7 @@ def test_confidence_is_of_every_frame_that_is_delivered(move, transcript, tmp_pa
     assert len(slower.confidence) == len(slower.motion.values)
     assert result.selected(["width"]).confidence is None
     for name in ("a.npz", "a.json"):
-        write(result, tmp_path / name)
+        lipmotion.write(result, tmp_path / name)
     with np.load(tmp_path / "a.npz") as arrays:
         np.testing.assert_allclose(arrays["confidence"], result.confidence, rtol=1e-6)
     document = json.loads((tmp_path / "a.json").read_text("utf-8"))
@@ -219,7 +205,7 @@ def test_the_page_says_one_job_twice(tmp_path, monkeypatch):
     Path("scene.toml").write_text(block("toml"))
     names = {"lipmotion": lipmotion, "Path": Path}
     told = eval(block("python").partition("job = ")[2].partition("\nprint(")[0], names)  # noqa: S307
-    job = Job.from_file("scene.toml")
+    job = lipmotion.Job.from_file("scene.toml")
     assert job == told
     assert job.request.recording == Path("examples/welcome.flac")
     assert (job.outputs.motion_hz, job.delivery.intensity, job.staging.head) == (25, 1.4, False)
@@ -234,13 +220,15 @@ def test_paths_begin_at_the_folder_of_the_file(tmp_path):
         "[outputs]\nfiles = ['out/', '{name}.vtt', '-']\nface = 'my.svg'\ncurves = 'arkit'\n"
     )
     (tmp_path / "head").mkdir()
-    assert locate_paths(Outputs(face="head/"), tmp_path).face == f"{tmp_path}/head"
-    assert locate_paths(Outputs(face="head"), tmp_path).face == "head"
+    assert locate_paths(lipmotion.Outputs(face="head/"), tmp_path).face == f"{tmp_path}/head"
+    assert locate_paths(lipmotion.Outputs(face="head"), tmp_path).face == "head"
     (tmp_path / "anna").mkdir()
-    assert locate_paths(Outputs(face="anna"), tmp_path).face == str(tmp_path / "anna")
-    assert Job.from_file(file) == Job(
-        Request(tmp_path / "takes", "my words", model=Path("/else/m.lipmotion")),
-        Outputs((f"{tmp_path}/out/", f"{tmp_path}/{{name}}.vtt", "-"), face=str(tmp_path / "my.svg"), curves="arkit"),
+    assert locate_paths(lipmotion.Outputs(face="anna"), tmp_path).face == str(tmp_path / "anna")
+    assert lipmotion.Job.from_file(file) == lipmotion.Job(
+        lipmotion.Request(tmp_path / "takes", "my words", model=Path("/else/m.lipmotion")),
+        lipmotion.Outputs(
+            (f"{tmp_path}/out/", f"{tmp_path}/{{name}}.vtt", "-"), face=str(tmp_path / "my.svg"), curves="arkit"
+        ),
     )
 
 
@@ -267,19 +255,19 @@ def test_paths_begin_at_the_folder_of_the_file(tmp_path):
 def test_what_a_file_cannot_say(tmp_path, content, words):
     (tmp_path / "scene.toml").write_text(content)
     with pytest.raises(InputError, match=words) as error:
-        Job.from_file(tmp_path / "scene.toml")
+        lipmotion.Job.from_file(tmp_path / "scene.toml")
     assert str(error.value).startswith(str(tmp_path / "scene.toml"))
 
 
 def test_a_job_writes_what_animate_and_write_do(toy_speech, toy_model_file, tmp_path):
     made = [tmp_path / name for name in ("job.json", "calls.json")]
-    outputs = Outputs((str(made[0]),), fps=30, channels=("width", "tongue"))
-    delivery = Delivery(anticipation_ms=40)
-    Job(Request(toy_speech, recogniser="own", model=toy_model_file), outputs, delivery).run()
-    alone = animate(Request(toy_speech, recogniser="own"), model=toy_model_file)
-    model = load_model(toy_model_file)
+    outputs = lipmotion.Outputs((str(made[0]),), fps=30, channels=("width", "tongue"))
+    delivery = lipmotion.Delivery(anticipation_ms=40)
+    lipmotion.Job(lipmotion.Request(toy_speech, recogniser="own", model=toy_model_file), outputs, delivery).run()
+    alone = lipmotion.animate(lipmotion.Request(toy_speech, recogniser="own"), model=toy_model_file)
+    model = lipmotion.load_model(toy_model_file)
     how = {"rate_hz": 30, "channels": ("width", "tongue"), "delivery": delivery}
-    write(alone, made[1], speech=toy_speech, model=model, **how)
+    lipmotion.write(alone, made[1], speech=toy_speech, model=model, **how)
     assert made[0].read_bytes() == made[1].read_bytes()
 
 
@@ -287,7 +275,9 @@ def test_a_field_is_a_file_or_what_it_holds(toy_sentence, toy_speech, tmp_path):
     (tmp_path / "words.txt").write_text("see bob")
     (tmp_path / "own.dict").write_text("SEE  S IY\n")
     write_labels(tmp_path / "phones.TextGrid", toy_sentence.units)
-    files = Request(toy_speech, tmp_path / "words.txt", tmp_path / "own.dict", units=tmp_path / "phones.TextGrid")
+    files = lipmotion.Request(
+        toy_speech, tmp_path / "words.txt", tmp_path / "own.dict", units=tmp_path / "phones.TextGrid"
+    )
     read = read_request(files)
     assert (read.transcript, read.recording) == ("see bob", toy_speech)
     assert isinstance(read.lexicon, Lexicon)
@@ -298,23 +288,23 @@ def test_a_field_is_a_file_or_what_it_holds(toy_sentence, toy_speech, tmp_path):
     assert read_request(named).transcript == "see bob"
     assert read_request(named, is_typed=False).transcript == str(tmp_path / "words.txt")
     with pytest.raises(InputError, match="lexicon: found a dict, required a path, or a Lexicon"):
-        Request(toy_speech, lexicon={})  # type: ignore[arg-type]
+        lipmotion.Request(toy_speech, lexicon={})  # type: ignore[arg-type]
     with pytest.raises(InputError, match="names no recording"):
-        read_request(Request())
+        read_request(lipmotion.Request())
 
 
 def test_a_job_of_a_sound_writes_it(toy_sentence, toy_model_file, tmp_path):
-    request = Request(toy_sentence.audio, units=toy_sentence.units, model=toy_model_file)
+    request = lipmotion.Request(toy_sentence.audio, units=toy_sentence.units, model=toy_model_file)
     files = (str(tmp_path / "a.wav"), str(tmp_path / "a.csv"))
-    made = Job(request, Outputs(files)).run()
+    made = lipmotion.Job(request, lipmotion.Outputs(files)).run()
     assert len(read_sound(tmp_path / "a.wav").samples) == len(toy_sentence.audio.samples)
-    np.testing.assert_array_equal(made.motion.values, animate(request).motion.values)
+    np.testing.assert_array_equal(made.motion.values, lipmotion.animate(request).motion.values)
 
 
 def test_a_background_is_of_a_drawn_face_or_of_a_filmed_one(toy_speech):
     with pytest.raises(InputError, match="a video is for filmed faces"):
-        Job(Request(toy_speech), Outputs(("a.mp4",), background="sea.mp4")).run()
-    assert Staging(background="#40a0ff").colour == (64, 160, 255)
+        lipmotion.Job(lipmotion.Request(toy_speech), lipmotion.Outputs(("a.mp4",), background="sea.mp4")).run()
+    assert lipmotion.Staging(background="#40a0ff").colour == (64, 160, 255)
 
 
 TRAIN, TEST = 30, 6
@@ -350,13 +340,15 @@ def test_from_videos_to_figures(some_of_grid, tmp_path):
 
     report = prepare(some_of_grid, tmp_path / "corpus")
     assert not report.failed
-    corpus = Corpus.open(tmp_path / "corpus")
+    corpus = lipmotion.Corpus.open(tmp_path / "corpus")
     assert (corpus.splits["train"], corpus.splits["test"]) == (TRAIN, TEST)
 
-    model, trained = train(corpus)
+    model, trained = lipmotion.train(corpus)
     assert not trained.skipped
-    save_model(model, tmp_path / "s1.lipmotion")
-    figures = evaluate(load_model(tmp_path / "s1.lipmotion"), corpus, selection=Selection("test"))
+    lipmotion.save_model(model, tmp_path / "s1.lipmotion")
+    figures = lipmotion.evaluate(
+        lipmotion.load_model(tmp_path / "s1.lipmotion"), corpus, selection=lipmotion.Selection("test")
+    )
 
     # With 30 of 452 clips: 0.76 and 0.77 were measured; the bars leave room for another tracker build.
     audio_only, transcribed = figures["conditions"]["audio only"], figures["conditions"]["with transcript"]

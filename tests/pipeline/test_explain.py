@@ -10,21 +10,7 @@ import lipmotion
 from formats.examples import of_motion
 from lipmotion import Model, Request, state_runs
 from lipmotion.errors import InputError
-from lipmotion.pipeline.generate.explain import (
-    COLOURS,
-    LEFT_PX,
-    MAX_COLUMNS,
-    MIN_COLUMNS,
-    RIGHT_PX,
-    ROW_PX,
-    TITLE_PX,
-    StateRun,
-    draw_posteriors,
-    list_runs,
-    run_lines,
-    write_document,
-    write_explanation,
-)
+from lipmotion.pipeline.generate import explain
 from lipmotion.types import ChainPosteriors, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 
 WORDS = "See Bob, papa & mama!"
@@ -52,7 +38,7 @@ def test_a_model_file_and_any_engine(toy_model_file, toy_speech):
 
 def test_the_text_names_everything(coupled_model, toy_sentence):
     (found,) = lipmotion.explain(toy_sentence.audio, at=0.8, model=coupled_model, transcript=WORDS)
-    text = write_explanation(found)
+    text = explain.write_explanation(found)
     lines = text.splitlines()
     assert lines[0] == "0.80 s (frame 80)"
     for start in ("phone", "state", "chain 1: sVis", "chain 2: 2vis", "together", "asynchrony", "Gaussian of speech"):
@@ -69,7 +55,7 @@ def test_the_text_names_everything(coupled_model, toy_sentence):
 
 def test_the_document_is_json_with_all_channels(coupled_model, toy_sentence):
     (found,) = lipmotion.explain(toy_sentence.audio, at=0.8, model=coupled_model)
-    document = json.loads(json.dumps(write_document(found), allow_nan=False))
+    document = json.loads(json.dumps(explain.write_document(found), allow_nan=False))
     assert document["frame"] == 80
     assert list(document["motion"]) == list(found.motion)
     lead = document["chains"][1]["lead"]
@@ -97,20 +83,20 @@ def generation(states: tuple[str, ...], frames: list[int]) -> Generation:
 
 
 def test_runs_of_frames_with_one_state():
-    assert list_runs(generation(("x", "y"), [0, 0, 0, 1, 1, 0, 0])) == (
-        StateRun(0.0, 0.03, "sil", "", "x"),
-        StateRun(0.03, 0.05, "p", "papa", "y"),
-        StateRun(0.05, 0.07, "aa", "", "x"),
+    assert explain.list_runs(generation(("x", "y"), [0, 0, 0, 1, 1, 0, 0])) == (
+        explain.StateRun(0.0, 0.03, "sil", "", "x"),
+        explain.StateRun(0.03, 0.05, "p", "papa", "y"),
+        explain.StateRun(0.05, 0.07, "aa", "", "x"),
     )
-    assert list_runs(generation(("x",), [])) == ()
+    assert explain.list_runs(generation(("x",), [])) == ()
 
 
 def test_the_phone_is_the_one_that_takes_most_of_the_run():
-    (run,) = list_runs(generation(("x",), [0] * 20))
+    (run,) = explain.list_runs(generation(("x",), [0] * 20))
     assert (run.phone, run.end_s) == ("aa", 0.2)
-    first, second = list_runs(generation(("x", "y"), [0, 0, 0, 0, 1]))
+    first, second = explain.list_runs(generation(("x", "y"), [0, 0, 0, 0, 1]))
     assert (first.phone, second.phone) == ("sil", "p")
-    (beyond,) = list_runs(replace(generation(("x",), [0]), units=Timeline(())))
+    (beyond,) = explain.list_runs(replace(generation(("x",), [0]), units=Timeline(())))
     assert (beyond.phone, beyond.word) == ("", "")
 
 
@@ -127,13 +113,13 @@ def test_runs_are_the_trace_of_what_animate_makes(name, toy_sentence, request):
 
 
 def test_text_is_bounded():
-    runs = [StateRun(n / 100, (n + 1) / 100, "p", "papa", "s" * 500) for n in range(10)]
-    lines = list(run_lines(runs, 4))
+    runs = [explain.StateRun(n / 100, (n + 1) / 100, "p", "papa", "s" * 500) for n in range(10)]
+    lines = list(explain.run_lines(runs, 4))
     assert len(lines) == 6
     assert lines[1].split()[:4] == ["0.00", "0.01", "p", "papa"]
     assert max(map(len, lines)) < 160
     assert lines[5] == "and 6 more (--count N prints N, --json all)"
-    assert len(list(run_lines(runs, 10))) == 11
+    assert len(list(explain.run_lines(runs, 10))) == 11
 
 
 FRAMES = 400
@@ -164,10 +150,10 @@ def pixels(picture: Image.Image) -> np.ndarray:
 
 
 def test_units_have_a_row_each_in_the_order_of_their_time():
-    shown = pixels(draw_posteriors(generated(), [posteriors(halves())]))
-    rows = [2 * TITLE_PX + ROW_PX * number + ROW_PX // 2 for number in range(3)]
-    early, late = LEFT_PX + 100, LEFT_PX + 2 * FRAMES - 100
-    full, white = list(COLOURS[0]), [255, 255, 255]
+    shown = pixels(explain.draw_posteriors(generated(), [posteriors(halves())]))
+    rows = [2 * explain.TITLE_PX + explain.ROW_PX * number + explain.ROW_PX // 2 for number in range(3)]
+    early, late = explain.LEFT_PX + 100, explain.LEFT_PX + 2 * FRAMES - 100
+    full, white = list(explain.COLOURS[0]), [255, 255, 255]
     assert shown[rows[0], early].tolist() == full
     assert shown[rows[0], late].tolist() == white
     assert shown[rows[1], early].tolist() == white
@@ -179,19 +165,22 @@ def test_units_have_a_row_each_in_the_order_of_their_time():
 def test_units_that_are_never_likely_have_no_row():
     three, four = halves(), halves()
     four[9, 3] = 0.06
-    heights = [draw_posteriors(generated(), [posteriors(probability)]).height for probability in (three, four)]
-    assert heights[1] - heights[0] == ROW_PX
-    few = draw_posteriors(generated(), [posteriors(np.full((FRAMES, 30), 1 / 30))])
+    heights = [explain.draw_posteriors(generated(), [posteriors(probability)]).height for probability in (three, four)]
+    assert heights[1] - heights[0] == explain.ROW_PX
+    few = explain.draw_posteriors(generated(), [posteriors(np.full((FRAMES, 30), 1 / 30))])
     assert few.height > heights[0]
-    assert draw_posteriors(generated(), [posteriors(np.zeros((FRAMES, 3)))]).height > 0
+    assert explain.draw_posteriors(generated(), [posteriors(np.zeros((FRAMES, 3)))]).height > 0
 
 
 def test_a_column_of_a_long_recording_is_the_mean_of_its_frames():
-    for frames, columns in {1: MIN_COLUMNS, 400: 800, 5_345: MAX_COLUMNS}.items():
-        picture = draw_posteriors(generated(frames), [posteriors(halves(frames))])
-        assert picture.width == LEFT_PX + columns + RIGHT_PX
-    probability = np.zeros((8 * MAX_COLUMNS, 1))
+    for frames, columns in {1: explain.MIN_COLUMNS, 400: 800, 5_345: explain.MAX_COLUMNS}.items():
+        picture = explain.draw_posteriors(generated(frames), [posteriors(halves(frames))])
+        assert picture.width == explain.LEFT_PX + columns + explain.RIGHT_PX
+    probability = np.zeros((8 * explain.MAX_COLUMNS, 1))
     probability[::4] = 1
-    shown = pixels(draw_posteriors(generated(8 * MAX_COLUMNS), [posteriors(probability)]))
-    row = shown[2 * TITLE_PX + ROW_PX // 2, LEFT_PX + 10 : LEFT_PX + MAX_COLUMNS // 2 - 10]
-    assert (row == [round(255 + 0.25 * (part - 255)) for part in COLOURS[0]]).all()
+    shown = pixels(explain.draw_posteriors(generated(8 * explain.MAX_COLUMNS), [posteriors(probability)]))
+    row = shown[
+        2 * explain.TITLE_PX + explain.ROW_PX // 2,
+        explain.LEFT_PX + 10 : explain.LEFT_PX + explain.MAX_COLUMNS // 2 - 10,
+    ]
+    assert (row == [round(255 + 0.25 * (part - 255)) for part in explain.COLOURS[0]]).all()

@@ -5,13 +5,7 @@ import pytest
 
 from lipmotion import Model, load_model
 from lipmotion.errors import AlignmentError
-from lipmotion.pipeline.analysis.transcribe import (
-    MAX_WARNINGS,
-    Transcription,
-    transcribe,
-    warn_of_guesses,
-    warn_of_misfit,
-)
+from lipmotion.pipeline.analysis import transcribe
 from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser
 from lipmotion.speech.recognition.recognised_speech import select_reliable
@@ -38,13 +32,13 @@ def phones(toy_model: Model) -> Any:
 
 
 def test_unknown_words_are_recognised(phones, audio, toy_sentence, features):
-    units, _ = transcribe(phones, audio, features, None, Lexicon())
+    units, _ = transcribe.transcribe(phones, audio, features, None, Lexicon())
     assert [span.label.phone for span in units] == [span.label.phone for span in toy_sentence.units]
     assert not any(span.label.word for span in units)
 
 
 def test_what_is_not_in_the_dictionary_is_reported_once(phones, audio, features, caplog):
-    transcribe(phones, audio, features, ("see", "bimab", "papa", "bimab"), Lexicon())
+    transcribe.transcribe(phones, audio, features, ("see", "bimab", "papa", "bimab"), Lexicon())
     (message,) = caplog.messages
     assert "'bimab' is not in the dictionary; read as 'b " in message
 
@@ -58,7 +52,7 @@ def test_a_transcript_of_something_else_is_doubted(toy_model, audio, features, c
         pytest.skip("no phone recogniser is installed")
     phones = recogniser_of(toy_model, "auto" if network else "general")
     recognised = lambda: phones.recognise(audio, features)  # noqa: E731
-    units, _ = transcribe(phones, audio, features, WRONG, Lexicon(), recognised)
+    units, _ = transcribe.transcribe(phones, audio, features, WRONG, Lexicon(), recognised)
     assert (units is None) == network  # what is said is to be recognised
     (record,) = caplog.records
     assert (record.name, record.levelname) == ("lipmotion", "WARNING")
@@ -69,8 +63,8 @@ def test_a_transcript_of_something_else_is_doubted(toy_model, audio, features, c
 
 def test_the_right_one_is_not(toy_model, phones, toy_sentence, audio, features, caplog):
     for words in (toy_sentence.words, None):
-        transcribe(recogniser_of(toy_model, "auto"), audio, features, words, Lexicon())
-    transcribe(phones, audio, features, WRONG, Lexicon())  # without general models nothing is doubted
+        transcribe.transcribe(recogniser_of(toy_model, "auto"), audio, features, words, Lexicon())
+    transcribe.transcribe(phones, audio, features, WRONG, Lexicon())  # without general models nothing is doubted
     assert not caplog.records
 
 
@@ -80,20 +74,20 @@ def welcome() -> tuple[Any, tuple[str, ...]]:
     return read_welcome(), split_words(WELCOME.with_suffix(".txt").read_text())
 
 
-def corrected(audio: Any, words: tuple[str, ...]) -> Transcription:
+def corrected(audio: Any, words: tuple[str, ...]) -> transcribe.Transcription:
     """Return what the shipped model makes of words, with what it recognises where they are wrong."""
     phones = recogniser_of(load_model(), "auto")
 
     def recognised() -> Timeline[Unit]:
         return select_reliable(phones.recognise(audio, audio.mfcc()), 0.7)
 
-    return transcribe(phones, audio, audio.mfcc(), words, Lexicon(), recognised)
+    return transcribe.transcribe(phones, audio, audio.mfcc(), words, Lexicon(), recognised)
 
 
 @pytest.mark.parametrize("kept", [slice(0, 7), slice(7, None)])
 def test_speech_that_the_transcript_leaves_out_is_reported_with_its_times(welcome, kept, caplog):
     (audio, words), phones = welcome, recogniser_of(load_model(), "auto")
-    whole = transcribe(phones, audio, audio.mfcc(), words, Lexicon())
+    whole = transcribe.transcribe(phones, audio, audio.mfcc(), words, Lexicon())
     assert whole.fit.missing == ()
     assert whole.fit.share == pytest.approx(1)
     assert not caplog.records
@@ -128,7 +122,7 @@ def test_words_here_and_there_are_no_worse_than_none(welcome, kept):
 def test_a_sentence_that_nobody_says_is_left_out(welcome, first, caplog):
     (audio, words), phones = welcome, recogniser_of(load_model(), "auto")
     extra = split_words("nobody answered the bell")
-    whole = transcribe(phones, audio, audio.mfcc(), words, Lexicon()).units
+    whole = transcribe.transcribe(phones, audio, audio.mfcc(), words, Lexicon()).units
     longer = corrected(audio, (*extra, *words) if first else (*words, *extra))
     assert [span.label for span in longer.units] == [span.label for span in whole]
     assert tuple(word.word for word in longer.fit.unsaid) == extra
@@ -139,14 +133,16 @@ def test_a_sentence_that_nobody_says_is_left_out(welcome, first, caplog):
 def test_speech_outside_of_the_times_of_a_transcript_is_reported(welcome, caplog):
     audio, words = welcome
     first = TranscriptLine(tuple(map(TimedWord, words[:2])), 0.3, 0.9)
-    part = transcribe(recogniser_of(load_model(), "auto"), audio, audio.mfcc(), TimedTranscript((first,)), Lexicon())
+    part = transcribe.transcribe(
+        recogniser_of(load_model(), "auto"), audio, audio.mfcc(), TimedTranscript((first,)), Lexicon()
+    )
     assert part.fit.share < 0.5
     (record,) = caplog.records
     assert "to leave out words at" in record.getMessage()
 
 
 def test_three_stretches_are_named(caplog):
-    warn_of_misfit(TranscriptFit(-2.0, ((0.0, 2.0), (3.0, 3.5), (5.0, 9.0), (10.0, 11.04)), 20.0))
+    transcribe.warn_of_misfit(TranscriptFit(-2.0, ((0.0, 2.0), (3.0, 3.5), (5.0, 9.0), (10.0, 11.04)), 20.0))
     assert caplog.messages == [
         "the transcript seems to leave out words at 0.0 to 2.0 s, 5.0 to 9.0 s, 10.0 to 11.0 s and at 1 more places "
         "(7.5 of 20.0 s spoken): the lips are wrong there; add the words, or leave the whole transcript out"
@@ -154,19 +150,19 @@ def test_three_stretches_are_named(caplog):
 
 
 def test_a_long_word_is_not_repeated_in_full(caplog):
-    warn_of_guesses(("ab" * 5000,), Lexicon())
+    transcribe.warn_of_guesses(("ab" * 5000,), Lexicon())
     (message,) = caplog.messages
     assert len(message) < 300
 
 
 @pytest.mark.long
 def test_of_many_guesses_some_are_reported_one_by_one(caplog):
-    warn_of_guesses([f"bimab{'ab' * i}" for i in range(MAX_WARNINGS + 7)], Lexicon())
+    transcribe.warn_of_guesses([f"bimab{'ab' * i}" for i in range(transcribe.MAX_WARNINGS + 7)], Lexicon())
     *each, last = caplog.messages
-    assert len(each) == MAX_WARNINGS
+    assert len(each) == transcribe.MAX_WARNINGS
     assert last == "7 more words are not in the dictionary; a lexicon file can say better"
 
 
 def test_words_beyond_the_recording_are_refused(phones, audio, features):
     with pytest.raises(AlignmentError, match="nobody says so much"):
-        transcribe(phones, audio, features, ("five",) * 5000, Lexicon())
+        transcribe.transcribe(phones, audio, features, ("five",) * 5000, Lexicon())

@@ -3,6 +3,7 @@ import re
 import shutil
 import struct
 import sys
+from itertools import product
 from pathlib import Path
 
 import av
@@ -126,11 +127,16 @@ FORMS = {
     "24 in 32, a length of 0": riff(chunk(b"fmt ", long_form(24, 32)), chunk(b"data", S24_IN_32, 0), length=0),
     "a frame of no bytes": riff(chunk(b"fmt ", form(16, block=0, per_second=32_000)), SOUND),
     "a frame of too many bytes": riff(chunk(b"fmt ", form(16, block=4, per_second=32_000)), SOUND),
-    "a padded chunk of odd length": riff(chunk(b"fmt ", form()), chunk(b"junk", b"12345"), SOUND),
+    "a padded chunk of odd length": riff(chunk(b"fmt ", form()), chunk(b"_PMX", b"12345"), SOUND),
     "an odd chunk without its pad": riff(chunk(b"fmt ", form()), chunk(b"junk", b"12345", pad=False), SOUND),
     "RF64": riff(wide(len(S16)), chunk(b"fmt ", form()), chunk(b"data", S16, TO_THE_END), kind=b"RF64"),
     "BW64, 24 in 32, more behind it": riff(wide(len(S24_IN_32)), chunk(b"fmt ", long_form(24, 32)), chunk(
         b"data", S24_IN_32, TO_THE_END), chunk(b"axml", bytes(range(1, 200))), kind=b"BW64"),
+    "RF64, unfinished": riff(wide(0), chunk(b"fmt ", form()), chunk(b"data", S16, TO_THE_END), kind=b"RF64"),
+    "two pieces": riff(chunk(b"fmt ", form()), chunk(b"data", S16[:2000]), chunk(b"cue ", b"1"), chunk(
+        b"data", S16[2000:])),
+    "two files": riff(chunk(b"fmt ", form()), chunk(b"data", S16[:2000])) + riff(
+        chunk(b"fmt ", form()), chunk(b"data", S16[2000:])),
     "Wave64": wave64((b"fmt ", form()), (b"data", S16)),
     "Wave64, 24 in 32": wave64((b"fmt ", long_form(24, 32)), (b"data", S24_IN_32)),
     "AIFC sowt": aifc(b"sowt", 16, S16),
@@ -165,7 +171,11 @@ def test_forms(name: str, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> N
 
 
 def test_what_is_missing_of_other_files_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    for name, codec, said in (("a.flac", "flac", "; the last"), ("a.opus", "libopus", "its last page is not marked")):
+    for name, codec, said in (
+        ("a.flac", "flac", "; the last"),
+        ("a.caf", "pcm_s16le", "; the last"),
+        ("a.opus", "libopus", "its last page is not marked"),
+    ):
         path = write_sound(tmp_path / name, babble(16_000, 12), 16_000, codec)
         for share in (1, 0.93):
             caplog.clear()
@@ -181,6 +191,15 @@ def test_what_is_missing_of_a_wave_file_is_said(tmp_path: Path, caplog: pytest.L
             read(riff(chunk(b"fmt ", long_form(bits, container)), chunk(b"data", content, size)), tmp_path)
     said = "cut short: it states 0.8 s of sound and holds 0.2 s; the last 0.5 s are missing"
     assert [message.partition(": ")[2] for message in caplog.messages] == [said] * 2
+
+
+def test_sound_that_the_header_does_not_name_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    read(riff(chunk(b"fmt ", form()), chunk(b"data", S16, len(S16) // 2)), tmp_path)
+    assert "its header states 0.1 s of sound, and more bytes follow" in caplog.text
+    caplog.clear()
+    for behind in (bytes(len(S16)), chunk(b"LIST", S16), riff(chunk(b"fmt ", form(8)), chunk(b"data", S16))):
+        read(riff(chunk(b"fmt ", form()), SOUND) + behind, tmp_path)
+    assert caplog.text.count("more bytes follow") == 1
 
 
 def test_the_logarithmic_form_says_any_number_of_valid_bits(tmp_path: Path) -> None:
@@ -281,9 +300,10 @@ def test_the_first_of_several_tracks(tmp_path: Path, original: Samples) -> None:
 
 
 def test_channels_that_cancel(tmp_path: Path, original: Samples, caplog: pytest.LogCaptureFixture) -> None:
-    for weights, loudest in (((0.8, -1), 1), ((0, 0, 0, 0, 1, 0), None), ((1, 0), None), ((1, -0.3), None)):
+    several = (((0.8, -1), 1), ((0, 0, 0, 0, 1, 0), None), ((1, 0), None), ((1, -0.3), None))
+    for constant, (weights, loudest) in product((0.0, 0.3), several):
         caplog.clear()
-        sound = np.array(weights, np.float32)[:, None] * original
+        sound = np.array(weights, np.float32)[:, None] * original + np.float32(constant)
         audio = read_audio(write_sound(tmp_path / "a.wav", sound, 16_000, "pcm_f32le"))
         wanted = sound.mean(axis=0) if loudest is None else sound[loudest]
         assert np.allclose(audio.samples, wanted, atol=1e-6)

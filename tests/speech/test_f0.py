@@ -15,14 +15,14 @@ from scipy.signal import butter, lfilter
 
 from lipmotion import Model
 from lipmotion.speech.features import f0
-from lipmotion.speech.features.speaker_similarity import (
+from lipmotion.speech.sound.acoustic_conditions import mix_noise
+from lipmotion.speech.sound.speaker_similarity import (
     WARPS,
     average_speaker,
     embed_speaker,
     rate_knowledge,
     speaker_similarity,
 )
-from lipmotion.speech.sound.acoustic_conditions import mix_noise
 from lipmotion.types import Audio
 from pipeline.made import read_sound
 from speech.mfcc_oracle import sample

@@ -6,16 +6,10 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion import load_model
+from lipmotion.speech.features.mfcc import general_features
 from lipmotion.speech.recognition import agreement, general
 from lipmotion.speech.recognition import transcript_evidence as module
-from lipmotion.speech.recognition.transcript_evidence import (
-    GAP_COST,
-    PHONE_COST,
-    WORD_COST,
-    _best_path,
-    find_evidence,
-    label_evidence,
-)
+from lipmotion.speech.recognition.transcript_evidence import _best_path
 from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon
 from lipmotion_faces.corpus.folder import spell_name
@@ -50,7 +44,7 @@ def transcript(words: list[str], end_s: float, word_s: float = 0.1) -> Timeline[
 
 
 def test_a_right_transcript_is_said() -> None:
-    found = find_evidence(heard([*SAID]), FRAME_S, transcript([*SAID], 1.0))
+    found = module.find_evidence(heard([*SAID]), FRAME_S, transcript([*SAID], 1.0))
     assert [word.word for word in found.words] == [*SAID]
     assert (found.unsaid, found.others, found.is_doubtful) == ((), (), False)
     assert found.words[0].start_s == pytest.approx(0.22)
@@ -58,13 +52,13 @@ def test_a_right_transcript_is_said() -> None:
 
 
 def test_words_that_do_not_fit_into_the_frames_are_not_said() -> None:
-    crowded = find_evidence(heard([], pause=12), FRAME_S, transcript([*SAID] * 3, 0.5, word_s=0.02))
+    crowded = module.find_evidence(heard([], pause=12), FRAME_S, transcript([*SAID] * 3, 0.5, word_s=0.02))
     assert (crowded.unsaid, crowded.gaps) == (crowded.words, ())
 
 
 def test_another_transcript_is_doubtful() -> None:
     for words in ([*OTHER], [*SAID][::-1]):
-        found = find_evidence(heard([*SAID], sure=0.99999), FRAME_S, transcript(words, 1.0))
+        found = module.find_evidence(heard([*SAID], sure=0.99999), FRAME_S, transcript(words, 1.0))
         assert found.is_doubtful
         assert found.gaps
 
@@ -72,7 +66,7 @@ def test_another_transcript_is_doubtful() -> None:
 def test_the_word_that_is_not_said_is_left_out_where_another_is() -> None:
     words = ["papa", "sees", "meow", "fish"]
     said = heard(["papa", "sees", "away", "fish"], sure=0.99999)
-    found = find_evidence(said, FRAME_S, transcript(words, 1.0))
+    found = module.find_evidence(said, FRAME_S, transcript(words, 1.0))
     (wrong,) = found.unsaid
     assert wrong.word == "meow"
     assert (wrong.start_s, wrong.end_s) == pytest.approx((0.4, 0.5))  # where it was aligned
@@ -86,19 +80,19 @@ def test_the_word_that_is_not_said_is_left_out_where_another_is() -> None:
 @pytest.mark.parametrize("first", [False, True])
 def test_a_sentence_too_many_is_left_out_and_nothing_is_missing(first: bool) -> None:
     words = [*OTHER, *SAID] if first else [*SAID, *OTHER]
-    found = find_evidence(heard([*SAID], sure=0.99999), FRAME_S, transcript(words, 2.0, word_s=0.05))
+    found = module.find_evidence(heard([*SAID], sure=0.99999), FRAME_S, transcript(words, 2.0, word_s=0.05))
     assert [word.word for word in found.unsaid] == [*OTHER]
     assert found.gaps == ()
 
 
 def test_words_that_are_left_out_are_a_gap_in_their_place() -> None:
     whole, part = ["papa", "meow", "away", "fish"], ["papa", "fish"]
-    found = find_evidence(heard(whole, sure=0.999), FRAME_S, transcript(part, 1.0))
+    found = module.find_evidence(heard(whole, sure=0.999), FRAME_S, transcript(part, 1.0))
     first = 10 + 1 + 2 * 4  # pause, blank, papa
     (gap,) = found.gaps
     assert gap == pytest.approx((first * FRAME_S, (first + 11) * FRAME_S), abs=0.03)
     assert found.unsaid == ()
-    nothing = find_evidence(heard(whole, sure=0.999), FRAME_S, Timeline((Span(0.0, 1.0, Unit("sil")),)))
+    nothing = module.find_evidence(heard(whole, sure=0.999), FRAME_S, Timeline((Span(0.0, 1.0, Unit("sil")),)))
     assert len(nothing.gaps) == 1
     assert nothing.words == ()
 
@@ -106,8 +100,8 @@ def test_words_that_are_left_out_are_a_gap_in_their_place() -> None:
 def test_similar_phones_are_heard_for_one_another() -> None:
     """And an unsure network has no strong opinion."""
     spoken = Timeline(tuple(Span(n / 10, (n + 1) / 10, Unit(p, word="c")) for n, p in enumerate(["z", "ih", "s"])))
-    assert find_evidence(heard(["sees"]), FRAME_S, spoken).others == ()
-    wrong = [find_evidence(heard(["sees"], sure), FRAME_S, transcript(["book"], 1.0)) for sure in (0.9999, 0.2)]
+    assert module.find_evidence(heard(["sees"]), FRAME_S, spoken).others == ()
+    wrong = [module.find_evidence(heard(["sees"], sure), FRAME_S, transcript(["book"], 1.0)) for sure in (0.9999, 0.2)]
     assert [len(found.unsaid) for found in wrong] == [1, 0]
 
 
@@ -118,10 +112,10 @@ def test_a_long_recording_is_divided(monkeypatch: pytest.MonkeyPatch) -> None:
     spans = []
     for number in range(3):
         spans += list(transcript([*SAID] if number != 1 else [*OTHER], piece_s).shifted(number * piece_s))
-    whole = find_evidence(log_posteriors, FRAME_S, Timeline(tuple(spans)))
+    whole = module.find_evidence(log_posteriors, FRAME_S, Timeline(tuple(spans)))
     monkeypatch.setattr(module, "LARGEST_SEARCH", 0)
     monkeypatch.setattr(module, "MIN_STRETCH_S", 0.3)
-    parts = find_evidence(log_posteriors, FRAME_S, Timeline(tuple(spans)))
+    parts = module.find_evidence(log_posteriors, FRAME_S, Timeline(tuple(spans)))
     assert [word.is_said for word in parts.words] == [True] * 4 + [False] * 3 + [True] * 4
     assert [word[:2] for word in parts.words] == [word[:2] for word in whole.words]
     (one,), (other,) = whole.others, parts.others
@@ -130,9 +124,9 @@ def test_a_long_recording_is_divided(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_posteriors_of_something_else_are_refused() -> None:
     with pytest.raises(ValueError, match="47 classes, required 48"):
-        find_evidence(np.zeros((20, 47)), FRAME_S, transcript(["a"], 0.1))
+        module.find_evidence(np.zeros((20, 47)), FRAME_S, transcript(["a"], 0.1))
     with pytest.raises(ValueError, match=r"posteriors of 0\.20 s, required 0\.60"):
-        find_evidence(np.zeros((10, 48)), FRAME_S, transcript([*SAID], 0.7))
+        module.find_evidence(np.zeros((10, 48)), FRAME_S, transcript([*SAID], 0.7))
 
 
 def best_by_trying(log_posteriors: NDArray[np.float64], words: list[list[int]]) -> tuple[float, list[bool]]:
@@ -159,8 +153,10 @@ def best_by_trying(log_posteriors: NDArray[np.float64], words: list[list[int]]) 
         if n in edges:
             for stop in edges[edges.index(n) :]:
                 left_out = edges.index(stop) - edges.index(n)
-                first_cost = 0.0 if how in ("free", "instead") else GAP_COST
-                cost = first_cost + bool(left_out and how != "instead") * WORD_COST + PHONE_COST * (stop - n)
+                first_cost = 0.0 if how in ("free", "instead") else module.GAP_COST
+                cost = (
+                    first_cost + bool(left_out and how != "instead") * module.WORD_COST + module.PHONE_COST * (stop - n)
+                )
                 rest, said = best(t + 1, stop, "instead" if left_out or how == "instead" else "free")
                 ways.append((anything[t] - cost + rest, [False] * left_out + said))
         return max(ways)
@@ -191,17 +187,17 @@ def labels(words: list[str], start_s: float = 0.2) -> Timeline[Unit]:
 def test_labels_are_compared_with_what_is_said_at_their_times() -> None:
     words = [*SAID] * 2
     log_posteriors = heard(words, pause=40)
-    right = label_evidence(log_posteriors, FRAME_S, labels(words, 0.8))
+    right = module.label_evidence(log_posteriors, FRAME_S, labels(words, 0.8))
     assert right == ((), (), ())
-    half = label_evidence(log_posteriors, FRAME_S, labels([*SAID], 0.8))
+    half = module.label_evidence(log_posteriors, FRAME_S, labels([*SAID], 0.8))
     ((start_s, end_s),) = half.missing
     assert (start_s, end_s) == pytest.approx((1.3, 1.7), abs=0.15)
     assert half[1:] == ((), ())
-    silent = label_evidence(heard([], pause=60), FRAME_S, labels(words, 0.8))
+    silent = module.label_evidence(heard([], pause=60), FRAME_S, labels(words, 0.8))
     assert silent.idle == ((pytest.approx(0.8), pytest.approx(0.8 + 22 * ROW_S)),)
-    other = label_evidence(log_posteriors, FRAME_S, labels([*OTHER] * 2, 0.8))
+    other = module.label_evidence(log_posteriors, FRAME_S, labels([*OTHER] * 2, 0.8))
     assert other.wrong
-    late = label_evidence(log_posteriors, FRAME_S, labels(words, 1.3))
+    late = module.label_evidence(log_posteriors, FRAME_S, labels(words, 1.3))
     assert late.missing
     assert late.idle
 
@@ -214,7 +210,7 @@ def sentences() -> list[ToySentence]:
 def test_it_is_the_mean_over_phones_of_the_best_state_of_what_is_said(sentences: list[ToySentence]) -> None:
     """Frame by frame, by name."""
     sentence = sentences[0]
-    density = general.load_general().log_density(general.general_features(sentence.audio))
+    density = general.load_general().log_density(general_features(sentence.audio))
     names = {"ax": "AH", "axr": "ER", "ix": "IH"}
     spoken = [
         (n, number, span.label.phone)

@@ -6,8 +6,8 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.hmm.loudness import DECIBEL, MIN_FRAMES, average_power, find_spoken_frames
-from lipmotion.speech.features import analysed_audio, mfcc
-from lipmotion.speech.sound import acoustic_conditions, pauses, voice_activity
+from lipmotion.speech.features import mfcc
+from lipmotion.speech.sound import acoustic_conditions, analysed_audio, pauses, voice_activity
 from lipmotion.types import Audio
 from speech.made_voices import RATE_HZ, hiss, spoken
 from testing.toy import toy_sentences

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.signal import find_peaks
 
-from lipmotion.speech.features.voice_events import find_risen_peaks, find_voice_events, silence_units
+from lipmotion.speech.sound.voice_events import find_risen_peaks, find_voice_events, silence_units
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
 from speech.made_voices import RATE_HZ, laugh, noise, pulses, recording, said, vowels

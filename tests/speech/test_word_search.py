@@ -29,7 +29,8 @@ SAID = "please speak and my lips will move five big blue boats float by".split()
 def without_a_phone_recogniser(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Words are searched by pocketsphinx, and read by rules, where ``hama`` is not installed."""
     monkeypatch.setitem(sys.modules, "hama", None)
-    cached = (find_installed_recogniser, lexicon._network, lexicon.pronounce_by_network, word_search._decoder)
+    cached = [find_installed_recogniser, lexicon._network, lexicon.pronounce_by_network, word_search._decoder]
+    cached.append(beam_search.load_english)  # as large as the decoder, of the same words
     for each in cached:
         each.cache_clear()
     yield

@@ -25,7 +25,7 @@ def test_components_are_those_of_the_svd(count, dimensions, seed):
     pca = fit_pca(values, 5)
     mean, basis = components(values, 5)
     assert pca.mean == pytest.approx(mean)
-    assert pca.basis == pytest.approx(basis, abs=1e-6)
+    np.testing.assert_allclose(pca.basis, basis, rtol=0, atol=1e-6, equal_nan=False)
 
 
 @pytest.mark.long

@@ -46,11 +46,9 @@ def test_a_zip_may_not_grow_without_end(tmp_path: Path) -> None:
 
 ARRAYS: dict[str, NDArray[Any]] = {
     "single": np.array([[1 / 3, np.nan], [-0.0, np.inf]], np.float32),
-    "double": np.array([np.pi, np.nextafter(1, 2)]),
-    "names": np.array(["b.0<ih", "ä"]),
-    "count": np.array(7),
+    "double": np.array([np.pi, np.nextafter(1, 2)]), "names": np.array(["b.0<ih", "ä"]), "count": np.array(7),
     "empty": np.zeros((0, 3)),
-}
+}  # fmt: skip
 
 
 def test_every_bit_comes_back(tmp_path: Path) -> None:
@@ -142,14 +140,10 @@ TABLE = {
 
 def good() -> dict[str, np.ndarray]:
     return {
-        "means": np.linspace(-2, 2, 24).reshape(4, 3, 2).astype(np.float16),
-        "variances": np.ones((4, 3, 2)),
-        "log_weights": np.array([0, -np.inf, -1, -2]),
-        "share": np.full(4, 0.5, np.float32),
-        "log_stay": np.full(4, -0.1),
-        "rows": np.array([], np.int64),
-        "names": np.array(["a", "b"]),
-    }
+        "means": np.linspace(-2, 2, 24).reshape(4, 3, 2).astype(np.float16), "variances": np.ones((4, 3, 2)),
+        "log_weights": np.array([0, -np.inf, -1, -2]), "share": np.full(4, 0.5, np.float32),
+        "log_stay": np.full(4, -0.1), "rows": np.array([], np.int64), "names": np.array(["a", "b"]),
+    }  # fmt: skip
 
 
 def test_arrays_become_what_the_table_says() -> None:

@@ -320,25 +320,17 @@ def packed(*names: str, kind: str = "") -> bytes:
 
 OLD_OFFICE = bytes.fromhex("d0cf11e0a1b11ae1") + bytes(600)
 FILES = {
-    "a Word document": packed("[Content_Types].xml", "word/document.xml"),
-    "old Office": OLD_OFFICE,
+    "a Word document": packed("[Content_Types].xml", "word/document.xml"), "old Office": OLD_OFFICE,
     "OpenDocument": packed("content.xml", kind="application/vnd.oasis.opendocument.text"),
-    "Excel": packed("xl/workbook.xml"),
-    "PDF": b"%PDF-1.7\n%\xe2\xe3",
-    "RTF": b"{\\rtf1\\ansi",
-    "Blender": b"BLENDER-v402REND",
-    "a Blender file": gzip.compress(b"BLENDER_v279" + bytes(600)),
-    "compressed": bytes.fromhex("28b52ffd0458"),
-    "FBX": b"Kaydara FBX Binary  \0\x1a\0",
-    "Maya": b"//Maya ASCII 2024 scene\n",
-    "Photoshop": b"8BPS\0\x01",
+    "Excel": packed("xl/workbook.xml"), "PDF": b"%PDF-1.7\n%\xe2\xe3", "RTF": b"{\\rtf1\\ansi",
+    "Blender": b"BLENDER-v402REND", "a Blender file": gzip.compress(b"BLENDER_v279" + bytes(600)),
+    "compressed": bytes.fromhex("28b52ffd0458"), "FBX": b"Kaydara FBX Binary  \0\x1a\0",
+    "Maya": b"//Maya ASCII 2024 scene\n", "Photoshop": b"8BPS\0\x01",
     "Ableton": gzip.compress(b'<?xml version="1.0" encoding="UTF-8"?>\n<Ableton MajorVersion="5">' + bytes(9000)),
-    "Audacity": b"SQLite format 3\0" + bytes(52) + b"AUDY" + bytes(28),
-    "Reaper": b'<REAPER_PROJECT 0.1 "7.0"\n',
-    "MIDI": b"MThd\0\0\0\x06",
-    "web page": b"<!DOCTYPE html>\n<html>",
+    "Audacity": b"SQLite format 3\0" + bytes(52) + b"AUDY" + bytes(28), "Reaper": b'<REAPER_PROJECT 0.1 "7.0"\n',
+    "MIDI": b"MThd\0\0\0\x06", "web page": b"<!DOCTYPE html>\n<html>",
     "Git LFS": b"version https://git-lfs.github.com/spec/v1\n",
-}
+}  # fmt: skip
 ELSEWHERE = {"a picture": b"\x89PNG\r\n\x1a\n", "archive": packed("take.wav"), "7z": b"7z\xbc\xaf\x27\x1c\0"}
 
 
@@ -364,12 +356,9 @@ def test_what_is_no_mistake_elsewhere(wanted: str, tmp_path: Path) -> None:
 
 def test_what_is_wanted_passes(tmp_path: Path) -> None:
     for wanted, content in (
-        ("recording", b"RIFF\0\0\0\0WAVEfmt "),
-        ("text", b"BLENDERS are loud. The blender of Maya is a PDF."),
-        ("motion file", packed("values.npy")),
-        ("character", b"glTF\2\0\0\0"),
-        ("recording", b""),
-    ):
+        ("recording", b"RIFF\0\0\0\0WAVEfmt "), ("text", b"BLENDERS are loud. The blender of Maya is a PDF."),
+        ("motion file", packed("values.npy")), ("character", b"glTF\2\0\0\0"), ("recording", b""),
+    ):  # fmt: skip
         (tmp_path / "take").write_bytes(content)
         check_kind(tmp_path / "take", wanted)
     check_kind(tmp_path, "recording")

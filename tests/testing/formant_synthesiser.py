@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import lfilter, sosfilt
+from scipy.signal import lfilter
+from scipy.signal._sosfilt import _sosfilt
 
 from lipmotion.types import Audio, Span, Timeline, Unit
 
@@ -245,7 +246,9 @@ def _poles(centre_hz: Array, width_hz: Array, rate_hz: int) -> tuple[Array, Arra
 
 def _filtered(samples: Array, sections: Array, hop: int) -> Array:
     """Return filtered samples: ``hop`` at a time with the sections of their frame; the filter state is carried over."""
-    filtered, state = np.empty_like(samples), np.zeros((sections.shape[1], 2))
+    filtered, state = samples[None].copy(), np.zeros((1, sections.shape[1], 2))
     for start, frame_sections in zip(range(0, len(samples), hop), sections, strict=False):
-        filtered[start : start + hop], state = sosfilt(frame_sections, samples[start : start + hop], zi=state)
-    return filtered
+        _sosfilt(
+            frame_sections, filtered[:, start : start + hop], state
+        )  # ``sosfilt`` itself checks longer than it works
+    return filtered[0]

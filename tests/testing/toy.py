@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.motion import mouth_region
-from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.motion.eigenlips import EYE_DISTANCE_PX, MOUTH_HEIGHT, MOUTH_WIDTH
+from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit, Utterance
 from lipmotion.units import is_silent
 from lipmotion.units.spelling import parse_table
@@ -150,12 +150,12 @@ def _speak_sentence(name: str, split: str, vocabulary: Iterator[str], rng: np.ra
 def _utterance(sentence: ToySentence) -> Utterance:
     motion = toy_motion(sentence.units, CAMERA_HZ)
     opening, width, outer = (
-        motion[name][:, None, None] * mouth_region.EYE_DISTANCE_PX / 2 for name in ("opening", "width", "outer")
+        motion[name][:, None, None] * EYE_DISTANCE_PX / 2 for name in ("opening", "width", "outer")
     )
-    x = np.arange(mouth_region.WIDTH)[None, None, :] + 0.5 - mouth_region.WIDTH / 2
-    y = np.arange(mouth_region.HEIGHT)[None, :, None] + 0.5 - mouth_region.HEIGHT / 2
-    shade = 1 - SHADE * np.arange(mouth_region.HEIGHT)[:, None, None] / mouth_region.HEIGHT
-    picture = np.broadcast_to(np.array(SKIN) * shade, (len(motion.values), mouth_region.HEIGHT, mouth_region.WIDTH, 3))
+    x = np.arange(MOUTH_WIDTH)[None, None, :] + 0.5 - MOUTH_WIDTH / 2
+    y = np.arange(MOUTH_HEIGHT)[None, :, None] + 0.5 - MOUTH_HEIGHT / 2
+    shade = 1 - SHADE * np.arange(MOUTH_HEIGHT)[:, None, None] / MOUTH_HEIGHT
+    picture = np.broadcast_to(np.array(SKIN) * shade, (len(motion.values), MOUTH_HEIGHT, MOUTH_WIDTH, 3))
     for colour, across, down in ((LIPS, width, outer), (INSIDE, INNER_WIDTH * width, opening)):
         across, down = np.maximum(across, THINNEST_PX), np.maximum(down, THINNEST_PX)  # noqa: PLW2901
         radius = np.hypot(x / across, y / down)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion import mouth_region
+from lipmotion.motion.eigenlips import EYE_DISTANCE_PX, MOUTH_CORNER, MOUTH_HEIGHT
 from lipmotion.speech.sound.pauses import STEP_S, measure_levels_db
 from lipmotion.types import Audio, Motion
 from lipmotion_faces.appearance.lower_face import CORNER, HEIGHT, WIDTH, FaceShape
@@ -123,14 +123,14 @@ def _levels(sentence: ToySentence, frames: int) -> Array:
 
 def _shapes(motion: Motion) -> Array:
     """Return opening, width, outer and place of the chin in every frame, px of the face [shape=(T, 4)]."""
-    distances = [motion[name] * mouth_region.EYE_DISTANCE_PX for name in ("opening", "width", "outer")]
+    distances = [motion[name] * EYE_DISTANCE_PX for name in ("opening", "width", "outer")]
     return np.column_stack([*distances, toy_chin_px(motion)])
 
 
 def _picture(x: Values, y: Values, shape: Array, pixel_px: float, noise: float, draw: np.random.Generator) -> Pictures:
     """Return the toy person at some positions [each shape=(H, W)], px of the face, uint8 [shape=(H, W, 3)]."""
     opening, width, outer, chin = shape.tolist()
-    middle = mouth_region.CORNER[1] + mouth_region.HEIGHT / 2
+    middle = MOUTH_CORNER[1] + MOUTH_HEIGHT / 2
     x, y = x.astype(np.float32), y.astype(np.float32)
     picture: Values = np.array(WALL, np.float32) * (1 + 0.1 * np.sin(x / 17) * np.cos(y / 23))[..., None]
     picture = _over(picture, NECK, np.clip(0.5 + (NECK_PX - np.abs(x)) / pixel_px, 0, 1) * (y > 40))
@@ -140,19 +140,33 @@ def _picture(x: Values, y: Values, shape: Array, pixel_px: float, noise: float, 
     skin = skin * (1 - CREASE * crease)[..., None]
     picture = _over(picture, skin, _inside(x, y - HEAD_MIDDLE_PX, HEAD_PX[0], below, pixel_px, 4))
     for side in (-30.0, 30.0):
-        picture = _over(picture, EYES, _inside(x - side, y, 15.0, 6.0, pixel_px))
-    picture = _over(picture, LIPS, _inside(x, y - middle, width / 2, outer / 2, pixel_px))
+        _paint(picture, EYES, _part(x - side, y, 15.0, 6.0, pixel_px))
+    _paint(picture, LIPS, _part(x, y - middle, width / 2, outer / 2, pixel_px))
     if opening > MIN_OPENING_PX:
-        inside = _inside(x, y - middle, INNER_WIDTH * width / 2, opening / 2, pixel_px)
-        picture = _over(picture, INSIDE, inside)
-        teeth = np.clip(0.5 + (middle - opening / 2 + TEETH_PX - y) / pixel_px, 0, 1) * (1 - 0.5 * (np.abs(x % 6) < 1))
-        picture = _over(picture, TEETH, inside * teeth)
+        part, inside = _part(x, y - middle, INNER_WIDTH * width / 2, opening / 2, pixel_px)
+        _paint(picture, INSIDE, (part, inside))
+        above = np.clip(0.5 + (middle - opening / 2 + TEETH_PX - y[part]) / pixel_px, 0, 1)
+        teeth = above * (1 - 0.5 * (np.abs(x[part] % 6) < 1))
+        _paint(picture, TEETH, (part, inside * teeth))
     picture = picture + np.float32(noise) * draw.standard_normal(picture.shape, np.float32)
     return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
 
 
 def _over(picture: Values, colour: tuple[float, ...] | Values, share: Values) -> Values:
     return (picture + share[..., None] * (np.asarray(colour, np.float32) - picture)).astype(np.float32)
+
+
+def _paint(picture: Values, colour: tuple[float, ...], shape: tuple[tuple[slice, slice], Values]) -> None:
+    picture[shape[0]] = _over(picture[shape[0]], colour, shape[1])
+
+
+def _part(x: Values, y: Values, across: float, down: float, pixel_px: float) -> tuple[tuple[slice, slice], Values]:
+    """Return the rows and columns that an ellipse reaches, and the share of each of their pixels inside it."""
+    reach = 1 + 0.5 * pixel_px / min(across, down)
+    at = np.nonzero((np.abs(x) < across * reach) & (np.abs(y) < down * reach))
+    rows, columns = (slice(int(each.min(initial=each.size)), int(each.max(initial=-1)) + 1) for each in at)
+    part = rows, columns
+    return part, _inside(x[part], y[part], across, down, pixel_px)
 
 
 def _inside(x: Values, y: Values, across: float, down: float | Values, pixel_px: float, power: int = 2) -> Values:

@@ -3,7 +3,7 @@ import pytest
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.types.delivery import NEUTRAL, MoodKey, MoodTag
 from lipmotion.units import split_words
-from lipmotion.units.mood_tags import SYNONYMS, parse_tagged_text, remove_known_tags, time_moods
+from lipmotion.units.spoken_text import SYNONYMS, parse_tagged_text, remove_known_tags, time_moods
 
 
 def test_tags_hold_until_the_next_and_end_tags_are_neutral():
@@ -62,6 +62,11 @@ def test_manners_and_what_somebody_does_between_asterisks_are_tags_too():
         ("*laughs* {angry}no{/angry} *gasps*", ["happy", "angry", NEUTRAL, "surprised"]),
     ):
         assert [tag.mood for tag in parse_tagged_text(text).tags] == moods
+
+
+def test_links_and_times_are_not_spoken():
+    text = parse_tagged_text("see [our site](https://a.org/b) [0:12] and ![a cat](c.png) [2s]").text
+    assert text.split() == ["see", "our", "site", "and", "a", "cat"]
 
 
 def test_known_tags_alone_can_be_taken_out():

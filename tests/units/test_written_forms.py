@@ -80,7 +80,15 @@ USUAL = (
     ("1GB/s", "one gigabyte per second"), ("USD 20 or 20 EUR", "twenty dollars or twenty euros"),
     ("the USDA", "the usda"), ("5%-10%", "five percent to ten percent"), ("$5-$10", "five dollars to ten dollars"),
     ("18th–19th", "eighteenth to nineteenth"), ("in '05", "in oh five"), ("±5", "plus or minus five"),
-    ("WWII", "world war two"),
+    ("WWII", "world war two"), ("3×10⁵ of 2³⁰", "three times ten to the fifth of two to the thirtieth"),
+    ("hello¹ you,²³", "hello you"), ("m̄a n̈o", "ma no"), ("3,50 €", "three point five zero euros"),
+    ("€1.234,56", "one thousand two hundred thirty four euros and fifty six cents"),
+    ("1,5 km, 2,5%", "one point five kilometers two point five percent"), ("1.000.000", "one million"),
+    ("$-5, A$5, CA$20", "minus five dollars five dollars twenty dollars"), ("y ≥ 3", "y at least three"),
+    ("Fig. 3, vol. 2, pp. 10-12", "figure three volume two pages ten to twelve"), ("Ph.D., Mon.", "p h d monday"),
+    ("Super Bowl LVIII", "super bowl fifty eight"), ("2021/03/04", "march fourth twenty twenty one"),
+    ("CO₂", "c o two"), ("0800 123 4567", "zero eight zero zero one two three four five six seven"),
+    ("9 a.m.–5 p.m.", "nine a m to five p m"),
 )  # fmt: skip
 """What is said of a form where nothing else is known."""
 SAID = (

@@ -12,16 +12,7 @@ from lipmotion.types import Motion, Track
 from lipmotion_faces.tracking import track as video_scan
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from lipmotion_faces.tracking.steadying import REGISTERED_NOISE_PX, register_maps, steady_maps
-from lipmotion_faces.tracking.track import (
-    CHANNELS,
-    Footage,
-    decode_footage,
-    measure_motion,
-    open_footage,
-    read_video_frames,
-    track,
-    track_footage,
-)
+from lipmotion_faces.tracking.track import track
 from lipmotion_faces.tracking.trackers import JAW_POINTS, LIP_POINTS
 from vision.scripted import COLUMN, face
 from vision.variants import write_frames
@@ -46,7 +37,7 @@ def eyes_in_frames(footage) -> np.ndarray:
 def test_it_tracks_as_track_does(write_video, scripted):
     path = write_video(ticks=range(20))
     scripted(FACES)
-    footage = track_footage(path, crops=True)
+    footage = video_scan.track_footage(path, crops=True)
     scripted(FACES)
     expected = track(path)
     np.testing.assert_array_equal(footage.track.motion.values, expected.motion.values)
@@ -57,13 +48,13 @@ def test_it_tracks_as_track_does(write_video, scripted):
 
 def test_maps_follow_the_face(write_video, scripted):
     scripted(FACES)
-    eyes = eyes_in_frames(track_footage(write_video(ticks=range(20))))
+    eyes = eyes_in_frames(video_scan.track_footage(write_video(ticks=range(20))))
     np.testing.assert_allclose(eyes - eyes[0], (MOVES - MOVES[0])[:, :2], atol=1e-6)
 
 
 def test_maps_of_frames_without_a_face_are_interpolated(write_video, scripted):
     scripted([None if n in (0, 8, 19) else one for n, one in enumerate(FACES)])
-    footage = track_footage(write_video(ticks=range(20)))
+    footage = video_scan.track_footage(write_video(ticks=range(20)))
     eyes = eyes_in_frames(footage)
     assert np.flatnonzero(~footage.track.seen).tolist() == [0, 8, 19]
     np.testing.assert_allclose(eyes[8] - eyes[1], (MOVES[8] - MOVES[1])[:2], atol=0.02)
@@ -77,7 +68,7 @@ def test_maps_do_not_run_over_a_cut(write_video, scripted):
     moved = [one + (n >= 10) * np.array([JUMP_PX, 0, 0]) for n, one in enumerate(FACES)]
     asked = sorted([*ticks, 10])  # the mesh that has lost the face, and the next one
     scripted([moved[n] + (60, 30, 0) for n in asked])
-    footage = track_footage(write_video(ticks=ticks, size=(320, 96), picture=picture))
+    footage = video_scan.track_footage(write_video(ticks=ticks, size=(320, 96), picture=picture))
     assert footage.cuts == (10,)
     eyes = eyes_in_frames(footage)[:, 0]
     np.testing.assert_allclose(eyes[9], eyes[8], atol=1e-9)
@@ -88,8 +79,8 @@ def test_maps_do_not_run_over_a_cut(write_video, scripted):
 def test_frames_come_in_their_constant_order(write_video, scripted, dropped):
     ticks = [n for n in range(20) if n not in dropped]
     scripted([FACES[n] for n in ticks])
-    footage = track_footage(write_video(ticks=ticks))
-    shown = [ticks[index] for index in levels(decode_footage(footage))]
+    footage = video_scan.track_footage(write_video(ticks=ticks))
+    shown = [ticks[index] for index in levels(video_scan.decode_footage(footage))]
     assert len(shown) == len(footage) == 20
     assert [shown[n] for n in ticks] == ticks
     distance = np.abs(np.array(shown) - np.arange(20))
@@ -99,42 +90,42 @@ def test_frames_come_in_their_constant_order(write_video, scripted, dropped):
 def test_a_part_and_frames_in_any_order_are_the_same_as_in_the_whole(write_video, scripted):
     ticks = [n for n in range(20) if n not in (5, 12, 13)]
     scripted([FACES[n] for n in ticks])
-    footage = track_footage(write_video(ticks=ticks))
+    footage = video_scan.track_footage(write_video(ticks=ticks))
     order = [*range(20), *range(18, -1, -1), 3, 17]
-    shown = levels(decode_footage(footage))
+    shown = levels(video_scan.decode_footage(footage))
     for max_bytes in (0, 20 * 48 * 64 * 3):
-        groups = open_footage(footage, max_bytes)
+        groups = video_scan.open_footage(footage, max_bytes)
         assert levels(groups.decode(n) for n in order) == [shown[n] for n in order]
         assert groups.nbytes <= max(max_bytes, 2 * 48 * 64 * 3)
     for start, stop in ((0, 20), (0, 1), (7, 7), (12, 17), (19, None), (3, None)):
-        assert levels(decode_footage(footage, start, stop)) == shown[start:stop]
+        assert levels(video_scan.decode_footage(footage, start, stop)) == shown[start:stop]
     scripted(FACES[5:15])
-    footage = track_footage(write_video(ticks=range(20)), VideoSpan(0.2, 0.6))
-    assert levels(decode_footage(footage, 4, 8)) == list(range(9, 13))
+    footage = video_scan.track_footage(write_video(ticks=range(20)), VideoSpan(0.2, 0.6))
+    assert levels(video_scan.decode_footage(footage, 4, 8)) == list(range(9, 13))
     for start, stop in ((-1, 5), (6, 5), (0, 11), (11, None)):
         with pytest.raises(InputError, match=rf"frames {start} to {stop or 10} of .*, required within 0 to 10"):
-            decode_footage(footage, start, stop)
+            video_scan.decode_footage(footage, start, stop)
 
 
 def test_a_video_that_was_exchanged_is_noticed_and_one_that_became_shorter_shows_its_last_picture(
     write_video, scripted
 ):
     scripted(FACES)
-    footage = track_footage(write_video(ticks=range(20)))
+    footage = video_scan.track_footage(write_video(ticks=range(20)))
     other = write_video("other.mp4", ticks=range(20), size=(32, 32))
     with pytest.raises(InputError, match="a picture is not 64 × 48 as when it was tracked"):
-        list(decode_footage(replace(footage, path=other)))
+        list(video_scan.decode_footage(replace(footage, path=other)))
     shorter = replace(footage, path=write_video("shorter.mp4", ticks=range(15)))
-    assert levels(decode_footage(shorter)) == [*range(15), *([14] * 5)]
+    assert levels(video_scan.decode_footage(shorter)) == [*range(15), *([14] * 5)]
     with pytest.raises(InputError, match=r"no picture from 0\.72 s on"):
-        list(decode_footage(shorter, 18))
+        list(video_scan.decode_footage(shorter, 18))
 
 
 def test_untracked_frames_hold_the_last_picture(write_video):
     """At a constant rate; where pictures were dropped, the one before is shown again."""
     for dropped in ((), (3,), (7, 8, 9), (19,)):
         ticks = [n for n in range(20) if n not in dropped]
-        frames, rate_hz = read_video_frames(write_video(ticks=ticks))
+        frames, rate_hz = video_scan.read_video_frames(write_video(ticks=ticks))
         assert rate_hz == 25.0
         wanted = [sum(tick <= n for tick in ticks) - 1 for n in range(ticks[-1] + 1)]
         assert levels(frames) == wanted
@@ -186,18 +177,18 @@ def test_a_video_that_is_cut_short_is_told(tmp_path, scripted):
 
 
 def test_channels_are_named_and_ordered():
-    names = [channel.name for channel in CHANNELS]
+    names = [channel.name for channel in video_scan.CHANNELS]
     assert names[:6] == ["opening", "width", "outer", "x_61", "y_61", "z_61"]
     assert names[-1] == f"z_{JAW_POINTS[-1]}"
     assert len(names) == 3 + 3 * (len(LIP_POINTS) + len(JAW_POINTS)) == len(set(names))
-    assert {channel.unit for channel in CHANNELS} == {"eye_distance"}
+    assert {channel.unit for channel in video_scan.CHANNELS} == {"eye_distance"}
 
 
 def test_distances_are_measured_in_the_image_plane():
     points = np.stack([face(0.2)])
     points[0, COLUMN[14], 2] += 100  # depth has no part in them
     width = np.linalg.norm(points[0, COLUMN[61], :2] - points[0, COLUMN[291], :2]) / 60
-    assert measure_motion(points)[0, :2] == pytest.approx([0.2, width])
+    assert video_scan.measure_motion(points)[0, :2] == pytest.approx([0.2, width])
 
 
 def test_frames_without_a_face_are_marked_and_interpolated(write_video, scripted):
@@ -274,7 +265,7 @@ class TestRealRecordings:
     def test_a_clip_is_tracked_the_same_twice(self, recordings: Path):
         path = recordings / "grid-s1" / "clips" / "brwa3s.mkv"
         first, second = track(path), track(path)
-        assert first.motion.values.shape == (75, len(CHANNELS))
+        assert first.motion.values.shape == (75, len(video_scan.CHANNELS))
         assert first.motion.rate_hz == 25
         assert first.seen.all()
         np.testing.assert_array_equal(first.motion.values, second.motion.values)
@@ -364,7 +355,7 @@ class TestRegistration:
         from cv2 import GaussianBlur
         from scipy.ndimage import shift
 
-        def make(places, tremble, cuts=(), seen=None, contrast=4) -> Footage:
+        def make(places, tremble, cuts=(), seen=None, contrast=4) -> video_scan.Footage:
             texture = GaussianBlur(np.random.default_rng(1).uniform(0, 255, (120, 170)), (0, 0), 2.0)
             texture = 128 + contrast * (texture - texture.mean())
             greys = (np.clip(shift(texture, place[::-1], mode="reflect"), 0, 255) for place in places)
@@ -375,7 +366,7 @@ class TestRegistration:
             track = Track(Motion(np.zeros((count, 0)), RATE_HZ, ()), shown)
             times_s = np.arange(count) / RATE_HZ
             maps = at(np.asarray(places) + tremble)
-            return Footage(path, WHOLE, track, maps, times_s, tuple(cuts), (120, 170), RATE_HZ)
+            return video_scan.Footage(path, WHOLE, track, maps, times_s, tuple(cuts), (120, 170), RATE_HZ)
 
         return make
 

@@ -47,7 +47,7 @@ def _run(words: Sequence[str], stopper: Stopper, events: Events) -> int:
 
         command_line.run(words, stopper, events)
     except BrokenPipeError:  # the reader of standard output has gone
-        from lipmotion.cli.terminal.progress import discard_pending
+        from lipmotion.cli.terminal.printing import discard_pending
 
         stopper.settle()
         discard_pending(sys.stdout)
@@ -73,7 +73,7 @@ def _run(words: Sequence[str], stopper: Stopper, events: Events) -> int:
 
 def _report_failure(events: Events, code: int, text: str) -> int:
     """Report an error as an event and as a line; return the exit code."""
-    from lipmotion.cli.terminal.progress import print_error
+    from lipmotion.cli.terminal.printing import print_error
 
     events.fail(text.removeprefix("error: "), code)
     if not events.replaces_errors:

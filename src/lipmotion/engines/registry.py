@@ -13,7 +13,7 @@ ENGINES: Registry[type[Engine[Any]]] = Registry(
     "engine",
     "lipmotion.engines",
     {
-        "trajectory": "lipmotion.engines.trajectory.model:TrajectoryEngine",
+        "trajectory": "lipmotion.engines.trajectory.engine:TrajectoryEngine",
         "coupled": "lipmotion.engines.coupled.engine:CoupledEngine",
         "joint": "lipmotion.engines.joint.engine:JointEngine",
         "selection": "lipmotion.engines.selection.engine:SelectionEngine",

@@ -79,21 +79,15 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
     "motion format",
     "lipmotion.exporters",
     {
-        "json": "lipmotion.formats.motion_document:JSON",
-        "csv": "lipmotion.formats.tables:TABLE",
-        "npz": "lipmotion.formats.motion_document:NPZ",
-        "livelink.csv": "lipmotion.formats.tables:LIVE_LINK",
-        "blender.py": "lipmotion.formats.blender:MOTION_FORMAT",
-        "c3d": "lipmotion.formats.c3d:MOTION_FORMAT",
-        "fap": "lipmotion.formats.fap:MOTION_FORMAT",
-        "anim": "lipmotion.formats.game_engines:UNITY",
-        "tres": "lipmotion.formats.game_engines:GODOT",
-        "vmd": "lipmotion.formats.vmd:MOTION_FORMAT",
-        "bvh": "lipmotion.formats.c3d:BVH",
-        "a2f.json": "lipmotion.formats.motion_document:AUDIO2FACE",
+"json": "lipmotion.formats.motion_document:JSON", "csv": "lipmotion.formats.tables:TABLE",
+        "npz": "lipmotion.formats.motion_document:NPZ", "livelink.csv": "lipmotion.formats.tables:LIVE_LINK",
+        "blender.py": "lipmotion.formats.game_engines:BLENDER", "c3d": "lipmotion.formats.c3d:MOTION_FORMAT",
+        "fap": "lipmotion.formats.fap:MOTION_FORMAT", "anim": "lipmotion.formats.game_engines:UNITY",
+        "tres": "lipmotion.formats.game_engines:GODOT", "vmd": "lipmotion.formats.vmd:MOTION_FORMAT",
+        "bvh": "lipmotion.formats.c3d:BVH", "a2f.json": "lipmotion.formats.motion_document:AUDIO2FACE",
         "motion3.json": "lipmotion.formats.game_engines:LIVE2D",
     },
-)
+)  # fmt: skip
 """Motion formats by suffix, without the first dot; a suffix may have several parts, as ``livelink.csv``."""
 _CUES = "lipmotion.formats.cues:read_cue_motion"
 _FRAMES = "lipmotion.formats.motion_document:read_frames"
@@ -104,17 +98,10 @@ MOTION_READERS: Registry[Callable[[Path], tuple[Motion, Timeline[Unit]]]] = Regi
 )
 """Readers of files that hold motion, but are not written as motion formats, by suffix as ``MOTION_FORMATS``."""
 OTHER_JSON = {
-    b'"lipmotion.motion"': ".json",
-    b'"mouthCues"': ".tsv",
-    b'"facsNames"': ".a2f.json",
-    b'"weightMat"': ".a2f.json",
-    b"lendShapes": ".jsonl",
-    b"lendshape": ".jsonl",
-    b"ategory": ".jsonl",
-    b'awOpen"': ".jsonl",
-    b'"viseme":': ".tsv",
+    b'"lipmotion.motion"': ".json", b'"mouthCues"': ".tsv", b'"facsNames"': ".a2f.json", b'"weightMat"': ".a2f.json",
+    b"lendShapes": ".jsonl", b"lendshape": ".jsonl", b"ategory": ".jsonl", b'awOpen"': ".jsonl", b'"viseme":': ".tsv",
     b'"visemes":': ".tsv",
-}
+}  # fmt: skip
 """What the beginnings of ``.json`` files hold, and the suffix of files that are read alike; the first counts."""
 JSON_HEAD = 1 << 16  # how many bytes of a ``.json`` are searched for them
 CUE_LINE = re.compile(
@@ -158,9 +145,8 @@ def find_motion_format(path: Path) -> MotionFormat:
     try:
         return _format_of(path)
     except InputError as error:
-        raise ExportError(
-            f"{path}: cannot write motion as {_suffix(path)}; use one of {', '.join(list_suffixes())}"
-        ) from error
+        what = f"{path}: cannot write motion as {_suffix(path)};"
+        raise ExportError(f"{what} use one of {', '.join(list_suffixes())}") from error
 
 
 def write_motion(path: Path, generation: Generation, *, source: dict[str, str], model: dict[str, str]) -> None:
@@ -200,10 +186,8 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     check_kind(path, "motion file")
     named = _name_by_content(path)
     other = find_suffix(named, [f".{name}" for name in MOTION_READERS.names])
-    if find_suffix(named):
-        read = _format_of(named).read
-    else:
-        read = MOTION_READERS.load(other.removeprefix(".")) if other else None
+    added = MOTION_READERS.load(other.removeprefix(".")) if other and not find_suffix(named) else None
+    read = _format_of(named).read if find_suffix(named) else added
     if read is None:
         known = ", ".join(list_read_suffixes())
         raise InputError(f"{path}: cannot read motion from {_suffix(path)}; use one of {known}")
@@ -403,6 +387,15 @@ def _read_each(text: str, at: int, brackets: str, take: Callable[[int], int]) ->
         if text[at : at + 1] == brackets[1]:
             return at + 1
         at = find_next_at(text, _pass(text, at, ","))
+
+
+def iterate_json(text: str, decoder: json.JSONDecoder | None = None) -> Iterator[tuple[int, Any]]:
+    """Yield the values of a text, one after another, each with its place. Raises JSONDecodeError: one is damaged."""
+    at = find_next_at(text, 0)
+    while at < len(text):
+        value, end = (decoder or json.JSONDecoder()).raw_decode(text, at)
+        yield at, value
+        at = find_next_at(text, end)
 
 
 def find_next_at(text: str, at: int) -> int:

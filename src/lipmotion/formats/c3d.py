@@ -43,8 +43,7 @@ BLOCK = 512
 MARK = 0x50
 INTEL_PROCESSOR, DEC_PROCESSOR, MIPS_PROCESSOR = 84, 85, 86
 """The processor types: the lowest byte first; the same, but fractions of DEC's own kind; the highest byte first."""
-MAX_FRAMES, OVERFLOW = 65_535, 65_536
-"""Most frames that the header can number, and after how many it may begin at 0 again."""
+MAX_FRAMES, OVERFLOW = 65_535, 65_536  # most frames that the header can number, and after how many it begins at 0 again
 LARGEST_FILE_BYTES = 1 << 28  # most bytes of a file that is read
 MAX_POINTS, MAX_ANALOG_CHANNELS = 2_000, 5_000
 LONGEST_LABEL_CHARACTERS = 64
@@ -273,10 +272,8 @@ def check(motion: Motion) -> None:
     for text in [text for channel in motion.channels for text in (channel.name, channel.unit)]:
         plain = text.isascii() and text.isprintable() and text == text.strip()
         if not plain or len(text) > LONGEST_LABEL_CHARACTERS:
-            raise ExportError(
-                f"the name or unit {text[:60]!r} of a channel does not fit into .c3d, required up to 64 ASCII "
-                "characters, without blanks at its ends"
-            )
+            what = f"the name or unit {text[:60]!r} of a channel does not fit into .c3d,"
+            raise ExportError(f"{what} required up to 64 ASCII characters, without blanks at its ends")
     points = len(_points(motion))
     if max(len(motion.names) - 3 * points, points + len(EYES)) > MAX_CURVES:
         raise ExportError(f"more than {MAX_CURVES} points, or other channels, which .c3d cannot name; write .npz")
@@ -364,8 +361,7 @@ LARGEST_COORDINATE = 1e6
 MIN_DISTANCE = 1e-3  # least distance of the eye corners in any frame, as a share of the median
 
 DISTANCES = {"opening": (13, 14), "width": (61, 291), "outer": (0, 17)}  # channels that are the distance of two points
-MARKER = re.compile(r"(?:lip|jaw|p|point)[ _]?(\d{1,3})$", re.IGNORECASE)
-"""The name of a marker at a point of the face mesh."""
+MARKER = re.compile(r"(?:lip|jaw|p|point)[ _]?(\d{1,3})$", re.IGNORECASE)  # at a point of the face mesh
 
 
 def measure_markers(markers: Mapping[str, Array], rate_hz: float) -> Motion:

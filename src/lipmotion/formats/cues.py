@@ -216,55 +216,44 @@ def _one_line(text: str) -> str:
     return text if is_line(text) else printable(text)
 
 
-class _Lines:
-    """The lines of a file, one after another, with their numbers."""
-
-    def __init__(self, text: str) -> None:
-        self._lines, self.number = text.splitlines(), 0
-
-    @property
-    def place(self) -> str:
-        return f"line {self.number}"
-
-    def next(self) -> str:
-        """Return the next line. Raises InputError: there is none."""
-        self.number += 1
-        if self.number > len(self._lines):
-            raise InputError(f"the project ends after line {self.number - 1}; save it again in Papagayo")
-        return self._lines[self.number - 1].strip()
-
-    def count(self) -> int:
-        """Return the number on the next line. Raises InputError: it is none."""
-        return int(parse_cue_time(self.next(), self.place))
-
-
 def parse_project(text: str) -> CueSheet:
     """Return the cues and the words of the first voice. Raises InputError: another version, cut short, or no shape."""
-    lines = _Lines(text)
-    if lines.next() != MARK:
+    numbered, number = enumerate(text.splitlines(), 1), 0
+
+    def take() -> str:
+        nonlocal number
+        before, (number, line) = number, next(numbered, (0, ""))
+        if not number:
+            raise InputError(f"the project ends after line {before}; save it again in Papagayo")
+        return line.strip()
+
+    def count() -> int:
+        return int(parse_cue_time(take(), f"line {number}"))
+
+    if take() != MARK:
         raise InputError(f"not a project of Papagayo: the first line is no {MARK!r}; save it again")
-    lines.next()
-    fps, frames, voices = (lines.count() for _ in range(3))
+    take()
+    fps, frames, voices = (count() for _ in range(3))
     if not 1 <= fps <= FASTEST_FPS or not voices:
         raise InputError(f"{voices} voices at {fps} frames a second, required one at 1 to {FASTEST_FPS}; save it again")
-    lines.next()
-    lines.next()
+    take()
+    take()
     shapes: list[tuple[float, str, str]] = []
     words: list[Span[str]] = []
-    for _ in range(lines.count()):
+    for _ in range(count()):
         for _ in range(3):
-            lines.next()
-        for _ in range(lines.count()):
-            line = lines.next()
+            take()
+        for _ in range(count()):
+            line = take()
             fields = line.rsplit(maxsplit=3)
             if len(fields) != 4:
                 wanted = "a word, its frames and the number of its shapes"
-                raise InputError(f"{lines.place} is {shorten(line)!r}, required {wanted}")
-            first, last, count = (int(parse_cue_time(field, lines.place)) for field in fields[1:])
+                raise InputError(f"line {number} is {shorten(line)!r}, required {wanted}")
+            first, last, changes = (int(parse_cue_time(field, f"line {number}")) for field in fields[1:])
             words.append(Span(first / fps, (last + 1) / fps, fields[0]))
-            for _ in range(count):
-                frame, _, name = lines.next().partition(" ")
-                shapes.append((parse_cue_time(frame, lines.place) / fps, name, lines.place))
+            for _ in range(changes):
+                frame, _, name = take().partition(" ")
+                shapes.append((parse_cue_time(frame, f"line {number}") / fps, name, f"line {number}"))
             shapes.append(((last + 1) / fps, "", ""))
     chart = choose_chart(name for _, name, _ in shapes if name)
     rows = [(start_s, parse_shape(name, chart, place) if name else REST) for start_s, name, place in shapes]

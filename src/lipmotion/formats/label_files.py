@@ -5,11 +5,13 @@ from __future__ import annotations
 import logging
 import re
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from io import StringIO
 from itertools import islice
 from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError, shorten
+from lipmotion.formats.annotations import ROOT, TEXTGRID, parse_interval_tiers, read_xml_tiers, write_textgrid
 from lipmotion.formats.label_services import DamagedJsonError, describe_json, is_json, parse_service_tiers
 from lipmotion.formats.label_tiers import (
     LINES,
@@ -30,14 +32,12 @@ from lipmotion.formats.label_tiers import (
     with_words,
 )
 from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, parse_subtitles, write_subtitles
-from lipmotion.formats.textgrid import TEXTGRID, parse_interval_tiers, write_textgrid
 from lipmotion.formats.timed_lines import parse_line_tiers
-from lipmotion.formats.xml_labels import READ_ROOTS, ROOT, read_xml_tiers
 from lipmotion.printable import is_line
 from lipmotion.storage.sources import read_text_file
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import UNKNOWN_PHONES, RecognisedPhone, find_phone, restore_confidences
-from lipmotion.units.mood_tags import parse_tagged_text, remove_known_tags
+from lipmotion.units.spoken_text import parse_tagged_text, remove_known_tags
 from lipmotion.units.text_normalisation import LARGEST_TRANSCRIPT_BYTES, require_tokens
 from lipmotion.units.written_forms import list_readings
 
@@ -47,8 +47,7 @@ RECOGNISED = tuple(".srt .vtt .ass .ssa .sbv .lrc .ttml .dfxp .json .jsonl .ctm 
 FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".eaf", ".lab", ".wrd", *RECOGNISED)
 """Suffixes in whose files words are searched, in order: plain text first, as labels in time may not be words, and what
 may be recognised last."""
-FOR_PHONES = (".TextGrid", ".textgrid", ".eaf", ".lab", ".phn", ".txt")
-"""Suffixes in whose files phones are searched, in order."""
+FOR_PHONES = (".TextGrid", ".textgrid", ".eaf", ".lab", ".phn", ".txt")  # the same for phones
 LARGEST_LABELS = 1 << 24  # most bytes of a label file: labels of a day
 MOTION = re.compile(r'"lipmotion\.motion"|time_s,')  # how our own motion files begin: a quick answer for large ones
 MASTER = re.compile(r'^(?:#!MLF!#|\.)[ \t\r]*\n"(.*)"[ \t\r]*$', re.MULTILINE)
@@ -102,11 +101,10 @@ def find_labels(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> R
             labels = _read(path, unknown_json=path.suffix == ".json")
             read += [(path, labels)] if labels is not None else []
             seen.append(path)
-    name = re.escape(recording.stem)
     for path in [] if seen else find_tables(recording):
-        line = rf"{name}(?: +(.*))?" if path.name != METADATA else rf"(?:[^|\n]*/)?{name}(?:\.\w+)?\|(?:.*\|)?([^|\n]*)"
-        if not read and (row := re.search(rf"^[ \t]*{line}$", _read_text(path), re.MULTILINE)):
-            read.append((path, _read_plain(row[1] or "", path)))
+        words = _parse_table(_read_text(path), is_bars=path.name == METADATA).get(recording.stem)
+        if words is not None and not read:
+            read.append((path, _read_plain(words, path)))
         elif path.name != METADATA:
             raise InputError(f"{path}: has no line of {recording.stem}; required this name, a blank and its words")
     in_order = sorted(read, key=lambda item: (*FOR_PHONES, item[0].suffix).index(item[0].suffix))
@@ -129,6 +127,18 @@ def find_tables(recording: Path) -> list[Path]:
     chapter = recording.with_name(recording.stem.rpartition("-")[0] + CHAPTER)
     tables = (folder / METADATA for folder in recording.absolute().parents[:2])
     return [path for path in (chapter, *tables) if path.is_file()]
+
+
+@lru_cache(maxsize=2)  # many recordings have one table
+def _parse_table(text: str, *, is_bars: bool) -> dict[str, str]:
+    """Return the words of recordings by their names; ``is_bars``: fields are divided as in ``METADATA``."""
+    words: dict[str, str] = {}
+    for line in StringIO(text):
+        name, *rest = re.split(r"\|" if is_bars else " +", line.strip(), maxsplit=1)
+        if rest or not is_bars:
+            for key in {Path(name).name, Path(name).stem if is_bars else name}:
+                words.setdefault(key, rest[0].rpartition("|")[2] if rest else "")
+    return words
 
 
 def read_labels(path: Path) -> RecordingLabels:
@@ -257,7 +267,7 @@ def _read_tiers(text: str, where: str) -> list[LabelTier] | None:
     try:
         if TEXTGRID.match(text):
             tiers: list[LabelTier] | None = parse_seconds(parse_interval_tiers(text, where), where)
-        elif (root := ROOT.match(text)) and root[1] in READ_ROOTS:
+        elif ROOT.match(text):
             tiers = read_xml_tiers(text, where)
         elif is_subtitles(text):
             tiers = [parse_subtitles(text, where)]

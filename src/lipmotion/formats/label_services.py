@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.formats.base import find_next_at
+from lipmotion.formats.base import iterate_json
 from lipmotion.formats.label_tiers import (
     EARLIEST_S,
     LINES,
@@ -68,8 +68,7 @@ class Times(NamedTuple):
 
 
 POLLY = Times("time", usual=1000)
-SPEECHIFY = Times("starttime", "endtime", "duration", 1000)
-"""Times of marks, whose start and end are places in the text."""
+SPEECHIFY = Times("starttime", "endtime", "duration", 1000)  # of marks, whose start and end are places in the text
 TIMES = (
     Times("offsetsfrom", "offsetsto", per_s=1000),  # whisper.cpp
     Times("timestampstart", "timestampend", per_s=1),  # transformers
@@ -88,13 +87,10 @@ TIMES = (
     Times("startoffset", "endoffset", usual=0),  # Google, version 2 ("0.1s"); NeMo's are frames
     Times("timestart", "timeend"),  # PlayHT
     Times("timebegin", "timeend", usual=1000),  # MiniMax, Hume; Gladia's first version in seconds
-    Times("startsec", "endsec", per_s=1),
-    Times("startseconds", "endseconds", per_s=1),
-    Times("starttimestamp", "endtimestamp"),
-    Times("from", "to"),
+    *(Times("startsec", "endsec", per_s=1), Times("startseconds", "endseconds", per_s=1)),
+    *(Times("starttimestamp", "endtimestamp"), Times("from", "to"), Times("begintime", "endtime")),
     Times("timeseconds", per_s=1),  # Google, text to speech
-    Times("", "resultendtime", per_s=1),  # Google, a result without words
-    Times("", "resultendoffset", per_s=1),
+    *(Times("", "resultendtime", per_s=1), Times("", "resultendoffset", per_s=1)),  # Google, results without words
 )
 TEXTS = (
     "punctuatedword word alignedword text content value transcript sentence display lexical markname token lines "
@@ -103,14 +99,14 @@ TEXTS = (
 """The names of what is said, in order; of alternatives it is the first one."""
 ALTERNATIVES = ("alternatives", "nbest")
 WORD_LISTS = ("words", "items", "elements", "tokens", "timestamps", "timepoints", "timestampedwords")
-"""Members that hold words in time, within a line or alone."""
 PHONE_LISTS = ("phones", "phonemes")
-LINE_LISTS = (
-    "segments transcription utterances monologues events chunks fragments channels recognizedphrases sentences phrases "
-    "paragraphs result results transcript alternatives nbest data response output prediction predictions documents"
-).split()
-"""Members in which lines or further lists are searched, in this order."""
-MISSED = "not-found-in-audio"  # Gentle's case of a word that is not said
+LISTS = (
+    *WORD_LISTS,
+    *"segments transcription utterances monologues events chunks fragments channels recognizedphrases".split(),
+    *"sentences phrases paragraphs result results transcript alternatives nbest data response output".split(),
+)
+"""Members that hold words, phones, or lines of them, the best ones first; those of other names are read after them."""
+MISSED, OMITTED = "not-found-in-audio", "Omission"  # Gentle's case, and Azure's error, of a word that is not said
 KINDS = ("type", "boundarytype", "kind", "category")
 NOT_SAID = re.compile(r"punct|spac|audio.?event|sentence|ssml|pause|silence|non.?speech|blank|laugh|noise|session")
 """Kinds of items that are no words."""
@@ -142,12 +138,14 @@ COLUMNS = (
 COLUMN_OWNERS = ("normalizedalignment", "alignment", "wordtimestamps", "phonemetimestamps", "wordalignment")
 SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
 """A word of characters, or a direction in brackets (``[whispers]``), which is not said."""
-UNFINISHED = {"isfinal": False, "final": False, "endofturn": False, "ispartial": True}
+PARTIAL = "AddPartialTranscript"  # Speechmatics' message
+UNFINISHED = {"isfinal": False, "final": False, "endofturn": False, "ispartial": True, "message": PARTIAL}
 """Members of what a service heard while somebody spoke, and says again when it is sure."""
 TEXT_ALONE = {*"text partial result language duration task usage logprobs alternatives confidence".split()}
 """Members of what a recogniser says without times."""
 KNOWN_SHAPES = "segments, words, results, utterances, monologues, alignment, tiers, fragments, ..."
-DIGITS = re.compile(r"(?:PT)?([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d{1,3})?)\s*(s|ms)?", re.IGNORECASE)
+DURATION = re.compile(r"PT(?:(\d+)H)?(?:(\d+)M)?(?:([\d.]+)S)?", re.IGNORECASE)  # ISO 8601
+DIGITS = re.compile(r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d{1,3})?)\s*(s|ms)?", re.IGNORECASE)
 
 
 class DamagedJsonError(InputError):
@@ -157,9 +155,9 @@ class DamagedJsonError(InputError):
 UNTIMED = Times("")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Row:
-    """An item of a list: its times as they stand, NaN where they are missing, their names, and what it is."""
+    """An item of a list: its times as they stand, NaN where they are missing, their names, what it is, and its line."""
 
     start: float
     end: float
@@ -169,6 +167,12 @@ class Row:
     speaker: str = ""
     role: str = ""
     parts: tuple[Row, ...] = ()
+    owner: Row | None = None
+
+
+Path = tuple[str, ...]
+Found = dict[tuple[Path, bool], list[Row]]
+"""Items by the names of the members that lead to their list, and whether they are phones."""
 
 
 def is_json(text: str) -> bool:
@@ -219,18 +223,16 @@ def _decode_documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
         object_pairs_hook=lambda pairs: {plain(name): value for name, value in pairs},
         parse_constant=lambda _: None,  # NaN: missing
     )
-    at, line, counted = find_next_at(text, 0), 1, 0
-    while at < len(text):
-        line, counted = line + text.count("\n", counted, at), at
-        try:
-            value, at = decoder.raw_decode(text, at)
-        except json.JSONDecodeError as error:
-            what = f"line {error.lineno}: damaged JSON ({error.msg})"
-            raise DamagedJsonError(f"{where}: {what}; write it again") from error
-        except (ValueError, RecursionError) as error:
-            raise DamagedJsonError(f"{where}: damaged JSON: nested too deeply, or a number too long") from error
-        yield line, value
-        at = find_next_at(text, at)
+    line, counted = 1, 0
+    try:
+        for at, value in iterate_json(text, decoder):
+            line, counted = line + text.count("\n", counted, at), at
+            yield line, value
+    except json.JSONDecodeError as error:
+        what = f"line {error.lineno}: damaged JSON ({error.msg})"
+        raise DamagedJsonError(f"{where}: {what}; write it again") from error
+    except (ValueError, RecursionError) as error:
+        raise DamagedJsonError(f"{where}: damaged JSON: nested too deeply, or a number too long") from error
 
 
 def _parse_number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
@@ -238,12 +240,14 @@ def _parse_number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
 
     Times are numbers, texts (``"1.5"``, ``"1.500s"``, ``"PT1.5S"``, ``"00:00:01,500"``), or seconds with nanos.
     """
-    if isinstance(value, dict) and value.keys() & {"seconds", "nanos"}:
+    if isinstance(value, dict) and value.keys() <= {"seconds", "nanos"}:  # 0 is left out
         seconds, nanos = (_parse_number(value.get(name, 0), where)[0] for name in ("seconds", "nanos"))
         return seconds + nanos / 1e9, 1
     if not isinstance(value, str):
         missing = value in (None, -1)  # some services write -1 where they have none
         return math.nan if missing else require(values.number(), value, f"{where}: a time"), per_s
+    if parts := DURATION.fullmatch(value):
+        return sum(float(part or 0) * unit_s for part, unit_s in zip(parts.groups(), (3600, 60, 1), strict=True)), 1
     match, clock_s = DIGITS.fullmatch(value.strip()), parse_clock(value)
     if match is None and not math.isnan(clock_s):
         return clock_s, 1
@@ -264,10 +268,11 @@ def _parse_time(value: Any, where: str, per_s: float = 1) -> float:
     return time / (stated_per_s or per_s)
 
 
-def _read_row(item: dict[str, Any], place: str, where: str, name: str) -> Row | None:
+def _read_row(item: dict[str, Any], place: str, where: str, name: str, owner: Row | None, who: str) -> Row | None:
     """Return an item with its text and the times that it has; None: it has no text."""
     text = next((text for name in TEXTS if name in item and (text := _find_text(item[name])) is not None), None)
-    role = WORDS if "word" in item or name in WORD_LISTS else PHONE_LABELS if {"phone", "phoneme"} & {*item} else ""
+    is_phone = name in PHONE_LISTS or ({"phone", "phoneme"} & {*item} and "word" not in item)
+    role = PHONE_LABELS if is_phone else WORDS if "word" in item or name in WORD_LISTS else ""
     if text is None and any(item.get(name) for name in ("text", "word")):
         stored = shorten(repr(item.get("text") or item.get("word"))[:200])
         raise InputError(f"{where}: {place}: its text is {stored}, required a text")
@@ -287,7 +292,8 @@ def _read_row(item: dict[str, Any], place: str, where: str, name: str) -> Row | 
             'follows it, <mark name="hello"/>hello, or give the words as a transcript'
         )
     start, end, times = _find_times(item, f"{where}: {place}")
-    return None if text is None else Row(start, end, text, place, times, _find_speaker(item), role)
+    times = times._replace(pieces=times.pieces and name == "tokens")
+    return None if text is None else Row(start, end, text, place, times, who, role, owner=owner)
 
 
 def _find_times(item: dict[str, Any], where: str) -> tuple[float, float, Times]:
@@ -305,7 +311,9 @@ def _find_times(item: dict[str, Any], where: str) -> tuple[float, float, Times]:
     start, per_s = _parse_number(members.get(times.start), where, times.per_s)
     end, per_s = _parse_number(members.get(times.end), where, per_s)
     if math.isnan(end) and times.duration in members:
-        end = start + _parse_number(members[times.duration], where)[0]
+        length, length_per_s = _parse_number(members[times.duration], where, per_s)
+        share = per_s / length_per_s if length_per_s else 1.0  # that of two units
+        end = start + length * share if share else math.nan
     return start, end, times._replace(per_s=per_s)
 
 
@@ -322,32 +330,84 @@ def _find_text(value: Any) -> str | None:
     return value if isinstance(value, str) else None
 
 
-def _find_rows(value: Any, place: str, where: str, name: str = "", depth: int = 0) -> list[Row]:
-    """Return the lines and words in a value, in order; ``name``: of the member that it is."""
-    if depth > DEEPEST:
-        return []
-    if isinstance(value, dict):
-        spoken = "chunks" in value or not any(NOT_SAID.search(str(value.get(kind, "")).lower()) for kind in KINDS)
-        spoken = spoken and not any(value.get(name) is state for name, state in UNFINISHED.items())
-        return _read_object(value, place, where, name, depth) if spoken else []
-    rows: list[Row] = []
-    items = value if isinstance(value, list) else []
-    for number, each in enumerate(items[:1] if name in ALTERNATIVES else items, 1):
-        item = dict(zip(_name_stamp(each), each, strict=True)) if _name_stamp(each) else each
-        item_rows: list[Row] = []
-        if isinstance(item, dict):
-            item_rows = _find_rows(item, f"{place}, {name or 'item'} {number}".strip(", "), where, name, depth + 1)
-        elif name in ("segments", "words"):
-            require(values.members({}), item, f"{where}: {name!r}, item {number}")
-        for row in item_rows:  # a token that is a piece of a word goes on with the one ahead of it
-            piece = name == "tokens" and row.times.pieces and not row.text[:1].isspace()
-            if rows and piece and row.speaker == rows[-1].speaker:
-                end = rows[-1].end if math.isnan(row.end) or not any(map(str.isalnum, row.text)) else row.end
-                rows[-1] = replace(rows[-1], end=end, text=rows[-1].text + row.text)
-            else:
-                rows.append(row)
+def _collect_rows(
+    value: Any, found: Found, where: str, place: str = "", path: Path = ("",), owner: Row | None = None, who: str = ""
+) -> None:
+    """Add the items with a text in a value and in all its members to those of the same lists.
+
+    path       : the names of the members that lead to the value
+    owner, who : the line that it is in, and who speaks there
+    Of alternatives it is the first one; what is no speech, or not yet sure, is passed over, with all that is in it.
+    """
+    name = path[-1]
+    if isinstance(value, list):
+        for number, each in enumerate(value[:1] if name in ALTERNATIVES else value, 1):
+            item = dict(zip(_name_stamp(each), each, strict=True)) if _name_stamp(each) else each
+            if isinstance(item, dict):
+                at = f"{place}, {name or 'item'} {number}".strip(", ")
+                _collect_rows(item, found, where, at, path, owner, who)
+            elif name in ("segments", "words"):
+                require(values.members({}), item, f"{where}: {name!r}, item {number}")
+    if not isinstance(value, dict) or len(path) > DEEPEST or not _is_said(value):
+        return
+    who = _find_speaker(value) or who
+    row = _read_row(value, place, where, name, owner, who)
+    if name == "words" and row is None:
+        raise InputError(f"{where}: {place}: no text; required a member 'word'")
+    if row is not None and (row.text or row.role != WORDS):
+        rows = found[path, row.role == PHONE_LABELS]
+        _add_row(rows, row, value, where)
         check_count(len(rows), where)
-    return rows
+    timed = row is not None and not math.isnan(row.start)
+    for member, each in value.items():
+        if not (timed and member == "tokens"):
+            _collect_rows(each, found, where, place, (*path, member), row if timed else owner, who)
+
+
+def _is_said(item: dict[str, Any]) -> bool:
+    """Return whether an item may hold speech: it is of such a kind, it is sure, and it is in the sound."""
+    kinds = () if "chunks" in item else (str(item.get(kind, "")).lower() for kind in KINDS)
+    assessed = item.get("pronunciationassessment")
+    missed = item.get("case") == MISSED or (isinstance(assessed, dict) and assessed.get("errortype") == OMITTED)
+    unsure = any(item.get(name) == state for name, state in UNFINISHED.items())
+    return not (missed or unsure or any(map(NOT_SAID.search, kinds)))
+
+
+def _add_row(rows: list[Row], row: Row, item: dict[str, Any], where: str) -> None:
+    """Add an item; Gentle's phones have lengths alone, and a piece of a word goes on with the token ahead of it."""
+    same = bool(rows) and rows[-1].owner is row.owner
+    if row.role == PHONE_LABELS and math.isnan(row.start) and row.owner:
+        start = rows[-1].end if same else row.owner.start
+        length, phone = _parse_time(item.get("duration"), f"{where}: {row.place}"), row.text.partition("_")[0]
+        row = replace(row, start=start, end=start + length, text=phone, times=row.owner.times)
+    if same and row.times.pieces and not row.text[:1].isspace() and row.speaker == rows[-1].speaker:
+        end = rows[-1].end if math.isnan(row.end) or not any(map(str.isalnum, row.text)) else row.end
+        before = rows.pop()
+        row = replace(before, end=end, text=before.text + row.text)
+    rows.append(row)
+
+
+def _choose_rows(found: Found, *, phones: bool) -> list[Row]:
+    """Return the words, or else the lines, or the phones, of the lists that are known best; words within their lines.
+
+    Services say the same in several lists: the first ones count.
+    """
+
+    def rank(path: Path) -> tuple[bool, int]:
+        has_words = any(row.role == WORDS for row in kept[path])
+        return not has_words, LISTS.index(path[-1]) if path[-1] in LISTS else len(LISTS)
+
+    kept = {path: rows for (path, kind), rows in found.items() if kind == phones}
+    timed = [path for path in kept if any(row.times.end or not math.isnan(row.start) for row in kept[path])]
+    rows = kept[min(timed, key=rank)] if timed else []
+    parts: dict[int, list[Row]] = defaultdict(list)
+    for row in rows:
+        parts[id(row.owner)].append(row)
+    around = (lines for (_, kind), lines in found.items() if not (kind or phones))
+    lines = next((lines for lines in around if any(id(line) in parts for line in lines)), None)
+    if lines is None:
+        return rows
+    return [*(replace(line, parts=tuple(parts[id(line)])) for line in lines), *parts[id(None)]]
 
 
 def _name_stamp(item: Any) -> tuple[str, ...]:
@@ -357,46 +417,6 @@ def _name_stamp(item: Any) -> tuple[str, ...]:
     return ("text", "start", "end") if isinstance(item[0], str) else ("start", "end", "text")
 
 
-def _read_object(item: dict[str, Any], place: str, where: str, name: str, depth: int) -> list[Row]:
-    """Return an object's lines with words in time, else its words, alone or within its own time, else its lines."""
-
-    def first_of(names: Iterable[str]) -> list[Row]:
-        members = (each for each in names if isinstance(item.get(each), dict | list))
-        return next((rows for each in members if (rows := _find_rows(item[each], place, where, each, depth + 1))), [])
-
-    own = _read_row(item, place, where, name)
-    timed = own is not None and not math.isnan(own.start)
-    if name == "words" and own is None:
-        raise InputError(f"{where}: {place}: no text; required a member 'word'")
-    heard = [row for row in first_of(each for each in WORD_LISTS if not (timed and each == "tokens")) if row.text]
-    words = [row for row in heard if row.role != PHONE_LABELS]
-    phones = [replace(row, role=PHONE_LABELS) for row in first_of(PHONE_LISTS) if not math.isnan(row.start)]
-    phones += [row for row in heard if row.role == PHONE_LABELS]
-    lines = first_of(LINE_LISTS)
-    if words and not any(line.parts for line in lines):
-        lines = [replace(own, parts=tuple(words))] if own is not None and timed else words
-    elif not (lines or timed or phones):  # under a name that is not known
-        lines = first_of(each for each in item if each not in (*WORD_LISTS, *LINE_LISTS))
-        lines = [line for line in lines if line.parts or not math.isnan(line.start)]
-    if not lines and (own is None or item.get("case") == MISSED):
-        return phones
-    if not lines and own is not None and not phones:
-        return [own, *_read_gentle_phones(item, own, place, where)]
-    lines = lines or [own] if own is not None else lines
-    if len(lines) == 1 and math.isnan(lines[0].start) and own is not None:  # one alternative, whose owner has the time
-        lines = [replace(lines[0], start=own.start, end=own.end, times=own.times)]
-    speaker = own.speaker if own is not None else _find_speaker(item)
-    return [line if line.speaker else replace(line, speaker=speaker) for line in (*lines, *phones)]
-
-
-def _read_gentle_phones(item: dict[str, Any], word: Row, place: str, where: str) -> list[Row]:
-    """Return the phones of a word of Gentle, whose lengths are given; none of other services."""
-    lengths = _list_durations(item.get("phones"), "phone", "duration", f"{place}, phone", 1)
-    spans = _sum_durations(lengths, word.start, where) if lengths else []
-    rows = ((span.start_s, span.end_s, span.text.partition("_")[0], span.position) for span in spans)
-    return [Row(*row, word.times, word.speaker, PHONE_LABELS) for row in rows]
-
-
 def _find_speaker(item: dict[str, Any]) -> str:
     names = (item[name] for name in SPEAKERS if isinstance(item.get(name), str | int))
     return next((str(name) for name in names if name != ""), "")
@@ -404,19 +424,22 @@ def _find_speaker(item: dict[str, Any]) -> str:
 
 def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     """Return lists of items in time: phones, and a tier of each speaker, of words if nearly all are, else of lines."""
-    rows = [row for place, item in objects for row in _find_rows(item, place if len(objects) > 1 else "", where)]
-    check_count(len(rows), where)
+    found: Found = defaultdict(list)
+    for place, item in objects:
+        _collect_rows(item, found, where, place if len(objects) > 1 else "")
     words = [word for _, item in objects if isinstance(item.get("words"), list) for word in item["words"]]
     missed = sum(isinstance(word, dict) and word.get("case") == MISSED for word in words)
     if missed and where:
         LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
-    timed = any(row.parts or not math.isnan(row.start) or row.times.end for row in rows)
-    if not timed and not (rows and all(item.keys() <= TEXT_ALONE for _, item in objects)):
-        lists = [item[name] for _, item in objects for name in (*LINE_LISTS, *WORD_LISTS) if name in item]
-        return [] if lists and not any(lists) else None
-    phones = _extend_to_next([row for row in rows if row.role == PHONE_LABELS], [])
+    spoken, phones = (_choose_rows(found, phones=kind) for kind in (False, True))
+    if not (spoken or phones):
+        if not (any(found.values()) and all(item.keys() <= TEXT_ALONE for _, item in objects)):
+            lists = [item[name] for _, item in objects for name in LISTS if name in item]
+            return [] if lists and not any(lists) else None
+        spoken = next(filter(None, found.values()))
+    phones = _extend_to_next(phones, [])
     silences = [row.start for row in phones if row.text == SILENCE]
-    spoken = _extend_to_next([row for row in rows if row.role != PHONE_LABELS], silences)
+    spoken = _extend_to_next(spoken, silences)
     half = len(spoken) // 2  # Google's last result repeats the first half, with speakers
     first, again = ([(row.text, row.start) for row in part] for part in (spoken[:half], spoken[half:]))
     if half and first == again and spoken[0].speaker != spoken[-1].speaker:
@@ -469,23 +492,6 @@ def _scale_rows(rows: list[Row], role: str, where: str) -> list[TimedLabel]:
         return TimedLabel(start_s, end_s, row.text, row.place, tuple(map(label, row.parts)))
 
     return [label(row) for row in rows]
-
-
-def _list_durations(items: Any, text: str, length: str, place: str, per_s: float) -> list[tuple[str, Any, Any, float]]:
-    """Return the items of a list of objects: place, text, length and how many of its units are a second."""
-    fields = [each if isinstance(each, dict) else {} for each in (items if isinstance(items, list) else [])]
-    return [(f"{place} {number}", each.get(text), each.get(length), per_s) for number, each in enumerate(fields, 1)]
-
-
-def _sum_durations(items: Sequence[tuple[str, Any, Any, float]], start_s: float, where: str) -> list[TimedLabel]:
-    """Return labels of which the lengths are given, one after another."""
-    check_count(len(items), where)
-    labels: list[TimedLabel] = []
-    for place, text, length, per_s in items:
-        end_s = start_s + _parse_time(length, f"{where}: {place}", per_s)
-        labels.append(TimedLabel(start_s, end_s, require(_TEXT, text, f"{where}: {place}"), place))
-        start_s = end_s
-    return labels
 
 
 def _make_tiers(words: Sequence[TimedLabel], phones: Sequence[TimedLabel], where: str) -> list[LabelTier]:
@@ -547,22 +553,29 @@ def _read_durations(objects: Objects, where: str) -> list[LabelTier] | None:
         raise InputError(f"{where}: holds {len(kokoro)} sentences, whose times each begin at 0; give those of one")
     if not kokoro and (len(piper) < len(objects)):
         return None
-    items: list[tuple[str, Any, Any, float]] = []
+    phones, end_s = list[TimedLabel](), 0.0
+
+    def add(place: str, text: Any, length: Any, per_s: float) -> None:
+        nonlocal end_s
+        start_s, end_s = end_s, end_s + _parse_time(length, f"{where}: {place}", per_s)
+        phones.append(TimedLabel(start_s, end_s, require(_TEXT, text, f"{where}: {place}"), place))
+
     for place, item in piper:
         rate = require(values.number(1000, 1e6), item.get("samplerate"), f"{where}: {place}: the sample rate in hertz")
-        items += _list_durations(item["phonemealignments"], "phoneme", "numsamples", f"{place}, phoneme", rate)
+        for number, each in enumerate(item["phonemealignments"], 1):
+            fields = each if isinstance(each, dict) else {}
+            add(f"{place}, phoneme {number}", fields.get("phoneme"), fields.get("numsamples"), rate)
     for item in kokoro:
         letters = f"^{require(_TEXT, item['phonemes'], f'{where}: phonemes')}$"
         if len(item["preddur"]) != len(letters):
-            raise InputError(
-                f"{where}: {len(item['preddur'])} durations of {len(letters) - 2} phonemes, required two more than "
-                "phonemes"
-            )
-        pairs = enumerate(zip(letters, item["preddur"], strict=True))
-        items += [(f"phoneme {n}", KOKORO_LETTERS.get(a, a), frames, KOKORO_FRAMES_PER_S) for n, (a, frames) in pairs]
-    phones = _sum_durations(items, 0.0, where)
-    words = [row for item in kokoro for row in _find_rows({"tokens": item.get("tokens")}, "", where)]
-    timed = _scale_rows([row for row in words if not math.isnan(row.start)], WORDS, where)
+            what = f"{len(item['preddur'])} durations of {len(letters) - 2} phonemes"
+            raise InputError(f"{where}: {what}, required two more than phonemes")
+        for number, (letter, frames) in enumerate(zip(letters, item["preddur"], strict=True)):
+            add(f"phoneme {number}", KOKORO_LETTERS.get(letter, letter), frames, KOKORO_FRAMES_PER_S)
+    found: Found = defaultdict(list)
+    for item in kokoro:
+        _collect_rows({"tokens": item.get("tokens")}, found, where)
+    timed = _scale_rows([row for rows in found.values() for row in rows if not math.isnan(row.start)], WORDS, where)
     return _make_tiers(timed, phones, where)
 
 

@@ -52,10 +52,10 @@ IN_CONTEXT = re.compile(r"\A[^-+]*-([^-+]+)\+.*\Z")
 """Triphones and full-context labels of HTK and HTS: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
 GLOTTAL_STOP = "q"  # TIMIT's: a sound of the throat, with any lips
 STATE_NUMBER = re.compile(r"\[(\d{1,9})\]$")
-RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")
-"""A phone or unit, and its confidence from 0 to 1."""
+RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")  # a phone or unit, and its confidence
 MAX_LABELS = 250_000  # most labels of a file: phones of five hours of speech
 TYPICAL_PHONE_S, TYPICAL_WORD_S = 0.08, 0.3  # how long a phone, and a word, alone or of a line, last
+LONGEST_WORD_S = 100.0  # a single word that lasts longer than this is in another unit
 UNIT_LIMITS = ((150, 1), (6000, 1000), (300_000, 0), (3_200_000, 1_000_000))
 """If they last up to so many times as long as is typical, so many units are a second; 0: these are samples."""
 WHOLE_LIMITS = ((15, 1), (70, 0), (220, 100), *UNIT_LIMITS[1:])
@@ -99,8 +99,7 @@ def find_tier(name: str, labels: Sequence[TimedLabel], speaker: str = "") -> Lab
     """Return a tier in order of time whose name says what it holds and perhaps who speaks."""
     owner = next(filter(None, (re.fullmatch(form, name, re.IGNORECASE) for form in SPEAKERS)), None)
     role = next((role for role, form in ROLES if re.search(form, name.lower())), "")
-    if name == RECOGNISED:
-        role = RECOGNISED_PHONES
+    role = RECOGNISED_PHONES if name == RECOGNISED else role
     last_s = -math.inf
     known_s = [last_s := label.start_s if label.start_s > EARLIEST_S else last_s for label in labels]
     in_time = [label for _, label in sorted(zip(known_s, labels, strict=True), key=lambda pair: pair[0])]
@@ -134,7 +133,7 @@ def find_time_unit(spans: Sequence[tuple[float, float, str]], role: str, where: 
         if math.inf > end > start and classify_label(text) is SpokenAs.SPEECH
     ]
     all_whole = all(time == int(time) for span in spans for time in span[:2] if math.isfinite(time))
-    if len(lengths) < 1 + (usual == 1):
+    if not lengths or (len(lengths) < 2 and usual == 1 and lengths[0] < LONGEST_WORD_S):
         return usual if all_whole else 1
     times = median(lengths) / (TYPICAL_PHONE_S if role == PHONE_LABELS else TYPICAL_WORD_S)
     limits = WHOLE_LIMITS if all_whole and role in (WORDS, PHONE_LABELS) else UNIT_LIMITS
@@ -158,11 +157,11 @@ def parse_seconds(tiers: list[LabelTier], where: str, per_s: float = 0) -> list[
     single = WORDS if all(len(text.split()) < 2 for *_, text in spans) else ""
     role = PHONE_LABELS if judged and holds_phones(judged) else judged.role or single if judged else ""
     per_s = per_s or find_time_unit(spans, role, where)
-    scaled = []
-    for tier in tiers:
-        labels = (replace(each, start_s=each.start_s / per_s, end_s=each.end_s / per_s) for each in tier.labels)
-        scaled.append(replace(tier, labels=tuple(labels)))
-    return scaled
+
+    def scale(label: TimedLabel) -> TimedLabel:
+        return replace(label, start_s=label.start_s / per_s, end_s=label.end_s / per_s)
+
+    return [replace(tier, labels=tuple(map(scale, tier.labels))) for tier in tiers]
 
 
 def holds_phones(tier: LabelTier) -> bool:
@@ -275,21 +274,19 @@ def read_phone_tier(
             raise InputError(f"{which}{gap}: label silence as sil")
         reached_s = label.end_s
     labels = _join_states(tier.labels)
-    phones: list[str] = []
-    for label in labels:
-        phone = to_phone(label.text) or to_phone(label.text.lower().removesuffix("n"))  # nasal vowels of Buckeye
-        if phone is None:
-            which_label = f"{label.position} is {label.text[:40]!r}"
-            raise InputError(f"{where}: {which_label}, which is no phone; the phones are: {' '.join(PHONES)}")
-        phones.append(phone)
+    nasal = (label.text.lower().removesuffix("n") for label in labels)  # vowels of Buckeye
+    phones = [to_phone(label.text) or to_phone(other) or "" for label, other in zip(labels, nasal, strict=True)]
+    if "" in phones:
+        wrong = labels[phones.index("")]
+        what = f"{where}: {wrong.position} is {wrong.text[:40]!r}, which is no phone"
+        raise InputError(f"{what}; the phones are: {' '.join(PHONES)}")
     marked = any(re.search(r"\d$", label.text) for label in labels) or set(REDUCED_VOWELS.values()) & set(phones)
     if words and not marked:
         phones = _reduce_vowels(labels, phones, words)
     starts_s = [max(label.start_s, 0.0) for label in labels]
-    ends_s = [
-        label.end_s if following_s > label.end_s + ROUNDING_S else following_s
-        for label, following_s in zip(labels, starts_s[1:], strict=False)
-    ] + [max(labels[-1].end_s, 0.0)]
+    pairs = zip(labels, starts_s[1:], strict=False)
+    ends_s = [after_s if after_s <= label.end_s + ROUNDING_S else label.end_s for label, after_s in pairs]
+    ends_s.append(max(labels[-1].end_s, 0.0))
     units = (Unit("", UNKNOWN_PHONES) if phone == UNKNOWN_PHONES else Unit(phone) for phone in phones)
     return Timeline(tuple(Span(*row) for row in zip(starts_s, ends_s, units, strict=True)))
 
@@ -364,10 +361,8 @@ def split_ipa(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
             raise InputError(f"{where}: {long}, required a phone: {LONGEST_SYMBOL} at most")
         unknown = "" if pause else read_ipa(label.text)[1]
         if unknown:
-            raise InputError(
-                f"{where}: {label.position} is {shorten(label.text)!r}, which is no phone (not IPA: {unknown!r}); "
-                f"required IPA, X-SAMPA, or: {' '.join(PHONES)}"
-            )
+            what = f"{where}: {label.position} is {shorten(label.text)!r}, which is no phone (not IPA: {unknown!r});"
+            raise InputError(f"{what} required IPA, X-SAMPA, or: {' '.join(PHONES)}")
     phones_of: dict[int, list[str]] = defaultdict(list)
     # no sound goes on beyond silence
     tokens = ["<sil>" if pause else label.text for label, pause in zip(labels, unspoken, strict=True)]
@@ -415,11 +410,8 @@ def add_pauses(phones: Sequence[TimedLabel]) -> tuple[TimedLabel, ...]:
         if gap_s > ROUNDING_S:
             filled.append(replace(label, start_s=filled[-1].end_s, end_s=label.start_s, text=SILENCE))
         filled.append(label)
-    return tuple(
-        replace(label, text=PAUSE)
-        if classify_label(label.text) is SpokenAs.SILENCE
-        and 0 < number < len(filled) - 1
-        and label.end_s - label.start_s < SHORT_PAUSE_S
-        else label
-        for number, label in enumerate(filled)
-    )
+    is_silence = [classify_label(label.text) is SpokenAs.SILENCE for label in filled]
+    for number in range(1, len(filled) - 1):
+        if is_silence[number] and filled[number].end_s - filled[number].start_s < SHORT_PAUSE_S:
+            filled[number] = replace(filled[number], text=PAUSE)
+    return tuple(filled)

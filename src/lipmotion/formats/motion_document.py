@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.formats.base import MotionFormat, find_next_at, read_members, write_json
+from lipmotion.formats.base import MotionFormat, iterate_json, read_members, write_json
 from lipmotion.formats.steady_rate import TIME_COLUMN, clean_column, convert_times, resample_rows, tabulate_frames
 from lipmotion.meshes.model.shape_names import ARKIT_52, is_known
 from lipmotion.printable import is_line
@@ -214,7 +214,6 @@ ANIMATION, AUDIO_OFFSET = ("animation", "privanimation"), ("audiooffset", "priva
 RATES = ("fps", "framerate", "exportfps", "ratehz")
 NAMED, SCORED = ("categoryname", "blendshape", "blendshapename", "name", "shape"), ("score", "value", "weight")
 DEEPEST, MAX_FRAMES = 6, 1 << 22
-_DECODER = json.JSONDecoder()
 
 
 def write_audio2face(path: Path, generation: Generation, source: Mapping[str, str], _model: Mapping[str, str]) -> None:
@@ -252,7 +251,7 @@ AUDIO2FACE = MotionFormat(write_audio2face, read_audio2face, curves="face", rate
 def read_frames(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """Return the weights of a file. Raises InputError: none of these forms, no times, or contradicting pieces."""
     with catch_errors("the file of frames of weights"):
-        documents = list(_decode_documents(path.read_text(encoding="utf-8-sig")))
+        documents = [value for _, value in iterate_json(path.read_text(encoding="utf-8-sig"))]
         objects = [_list_key_members(each) for each in _find_objects(documents, DEEPEST)]
         pieces = [each for each in objects if "frameindex" in each and each.get("blendshapes")]
         if pieces:
@@ -273,15 +272,6 @@ def read_frames(path: Path) -> tuple[Motion, Timeline[Unit]]:
                 raise InputError(f"{len(frames)} frames have no time, required one in each, or a member fps")
             time_s = np.arange(len(frames)) / rate_hz
         return resample_rows(names, time_s, values)[0], Timeline(())
-
-
-def _decode_documents(text: str) -> Iterator[Any]:
-    """Yield the documents of a text: one, or several one after the other."""
-    at = find_next_at(text, 0)
-    while at < len(text):
-        value, at = _DECODER.raw_decode(text, at)
-        yield value
-        at = find_next_at(text, at)
 
 
 def _find_objects(value: Any, deepest: int) -> Iterator[dict[str, Any]]:

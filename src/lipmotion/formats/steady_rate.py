@@ -18,8 +18,7 @@ from lipmotion.types.motion import RADIAN
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")
 
-USUAL_RATES_HZ = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 90.0, 100.0, 120.0, 240.0)
-"""Frame rates of cameras and of motion capture."""
+USUAL_RATES_HZ = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 90.0, 100.0, 120.0, 240.0)  # of cameras
 TELEVISION_RATES_HZ = tuple(whole * 1000 / 1001 for whole in (24, 30, 48, 60, 120, 240))
 """Rates that even rows have where none of the usual ones fits."""
 NEAR_RATE = 0.15
@@ -89,10 +88,8 @@ def resample_evenly(time_s: Array, rows: Array) -> tuple[Array, float]:
         hertz = nearest
     frames = round(float(passed_s[-1]) * hertz) + 1
     if frames > LONGEST_GAP * len(time_s) + SPARE_FRAMES:
-        raise InputError(
-            f"{len(time_s)} rows in {passed_s[-1]:.1f} s at {hertz:g} rows a second: most of the time there are none; "
-            "cut the take where it has gaps"
-        )
+        what = f"{len(time_s)} rows in {passed_s[-1]:.1f} s at {hertz:g} rows a second:"
+        raise InputError(f"{what} most of the time there are none; cut the take where it has gaps")
     missing = np.maximum(np.rint(steps * hertz) - 1, 0)
     if missing.any():
         spans = _name_spans([(passed_s[start], passed_s[stop]) for start, stop in find_runs(missing > 0)])

@@ -35,8 +35,7 @@ SBV = re.compile(r"^TIME\s?,\s?TIME\s*?$".replace("TIME", r"((?:\d{1,4}:)?\d{1,2
 COUNTED = re.compile(r"^([{\[])(\d{1,7})[}\]][{\[](\d{0,7})[}\]][ \t/]*(.*)$|^(\d{1,2}:\d\d:\d\d)[:=](?!\d)", re.M)
 """The start of lines of MicroDVD (``{25}{63}Hello``, frames), MPL2 (``[10][25]``, tenths), TMPlayer (``00:00:01:``)."""
 RATE = re.compile(r"\{\d\}\{\d\}(\d{2,3}(?:[.,]\d{1,6})?)[ \t]*$", re.M)  # MicroDVD's: {1}{1}23.976
-WORD_TIME = re.compile(rf"<{TIME}>")
-"""The time at which the words after it are said, as in the captions that YouTube makes."""
+WORD_TIME = re.compile(rf"<{TIME}>")  # when the words after it are said, as in the captions that YouTube makes
 NO_CUE = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")  # the start of a block of WebVTT that is not shown
 BRIDGE_S, BRIDGES_SHARE, NEAR_S = 0.1, 0.2, 0.1
 """Captions that scroll repeat each line, and between them are bridges shorter than this; if so large a share of cues

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats import steady_rate
 from lipmotion.formats.base import MotionFormat, format_rows
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, is_known, to_arkit
+from lipmotion.meshes.model.shape_names import ARKIT_52, ARKIT_MOUTH, is_known, to_arkit
 from lipmotion.storage.text_table import LONGEST_LINE, open_table, parse_numbers
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, Timeline, Unit
 
@@ -34,18 +34,9 @@ LOG = logging.getLogger("lipmotion")
 
 TIME = "time_s"  # the first column
 LONGEST_S = 1e6  # largest time that is accepted: more than eleven days
-CURVES = (
-    *("EyeBlinkLeft", "EyeLookDownLeft", "EyeLookInLeft", "EyeLookOutLeft", "EyeLookUpLeft", "EyeSquintLeft"),
-    *("EyeWideLeft", "EyeBlinkRight", "EyeLookDownRight", "EyeLookInRight", "EyeLookOutRight", "EyeLookUpRight"),
-    *("EyeSquintRight", "EyeWideRight", "JawForward", "JawRight", "JawLeft", "JawOpen", "MouthClose", "MouthFunnel"),
-    *("MouthPucker", "MouthRight", "MouthLeft", "MouthSmileLeft", "MouthSmileRight", "MouthFrownLeft"),
-    *("MouthFrownRight", "MouthDimpleLeft", "MouthDimpleRight", "MouthStretchLeft", "MouthStretchRight"),
-    *("MouthRollLower", "MouthRollUpper", "MouthShrugLower", "MouthShrugUpper", "MouthPressLeft", "MouthPressRight"),
-    *("MouthLowerDownLeft", "MouthLowerDownRight", "MouthUpperUpLeft", "MouthUpperUpRight", "BrowDownLeft"),
-    *("BrowDownRight", "BrowInnerUp", "BrowOuterUpLeft", "BrowOuterUpRight", "CheekPuff", "CheekSquintLeft"),
-    *("CheekSquintRight", "NoseSneerLeft", "NoseSneerRight", "TongueOut", "HeadYaw", "HeadPitch", "HeadRoll"),
-    *("LeftEyeYaw", "LeftEyePitch", "LeftEyeRoll", "RightEyeYaw", "RightEyePitch", "RightEyeRoll"),
-)
+_SWAPPED = {"jawLeft": "jawRight", "jawRight": "jawLeft", "mouthLeft": "mouthRight", "mouthRight": "mouthLeft"}
+_ANGLES = (f"{part}{angle}" for part in ("Head", "LeftEye", "RightEye") for angle in ("Yaw", "Pitch", "Roll"))
+CURVES = (*((name := _SWAPPED.get(each, each))[:1].upper() + name[1:] for each in ARKIT_52), *_ANGLES)
 """The 61 curves in the order of the app's own takes: ARKit's 52 blendshapes, then angles of head and eyes."""
 TICKS_HZ = 60
 """The frames of a timecode are counted in 60ths of a second at any rate: Unreal's importer divides them by 60."""
@@ -262,10 +253,8 @@ def _parse_timecode(text: str, line: int) -> tuple[int, float, str]:
     """Return whole seconds since midnight, frames (fractions included), and what stands before the frames."""
     code = _TIMECODE.fullmatch(text)
     if code is None or int(code[2]) > 59 or int(code[3]) > 59:
-        raise ValueError(
-            f"line {line} begins with {shorten(text)!r}, required a timecode as 12:30:59:29.500; spreadsheets "
-            "shorten it: take the file as it was recorded"
-        )
+        what = f"line {line} begins with {shorten(text)!r}, required a timecode as 12:30:59:29.500;"
+        raise ValueError(f"{what} spreadsheets shorten it: take the file as it was recorded")
     seconds, mark = (int(code[1]) * 60 + int(code[2])) * 60 + int(code[3]), code[4] or ""
     if mark and mark in ".,":
         return seconds, float("0." + re.sub("[.,]", "", code[5])), "."
@@ -278,6 +267,9 @@ def _read_timecodes(codes: list[tuple[int, float, str]]) -> Array:
     day_s, mark = DAY_S, codes[0][2]
     if mark == "." and len(codes) > MISREAD_ROWS and (frames == frames[0]).all():
         mark = ""
+    hundredths, passes = np.rint(100 * frames), np.count_nonzero(np.diff(seconds))
+    if mark == "." and passes > 1 and hundredths.max() + 1 in TIMECODE_RATES and np.allclose(hundredths, 100 * frames):
+        frames, mark = hundredths, ":"
     if not mark and len(codes) > MISREAD_ROWS and np.median(np.diff(seconds)) == 1:
         LOG.warning("rows are a second apart: the last field of the timecodes is taken for frames (MM:SS:FF)")
         seconds, frames, mark = seconds // 60, seconds % 60, ":"

@@ -30,8 +30,7 @@ from lipmotion.formats.label_tiers import (
 )
 from lipmotion.units.spoken_text import SpokenAs, classify_label
 
-SHORTEST_TICKS = 10_000
-"""Whole numbers below a millisecond are not taken as ticks at sight: "20 30 people" is a sentence."""
+SHORTEST_TICKS = 10_000  # whole numbers below a millisecond are no ticks at sight: "20 30 people" is a sentence
 LONG_SPAN = 45  # Whole numbers in order that are further apart than this are no seconds
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?|nan|inf"
 WHOLE = re.compile(r"(\d+)[\s,;]\s*(\d+)[\s,;]\s*(\S+)(?:\s.*)?")

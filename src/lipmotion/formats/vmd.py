@@ -100,10 +100,8 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     channels = {name for morph in morphs for name in _find_channels(morph)}
     if not channels & {*VRM_VOWELS, *ARKIT_MOUTH}:
         named = ", ".join([*morphs][:8]) or "none"
-        raise InputError(
-            f"the motion has none of the morphs あ い う え お; its morphs are: {named}; "
-            f"it moves {len(bones)} bones and has {camera} keys of a camera; save the motion of the face"
-        )
+        what = f"the motion has none of the morphs あ い う え お; its morphs are: {named}; it moves {len(bones)} bones"
+        raise InputError(f"{what} and has {camera} keys of a camera; save the motion of the face")
     frames = np.arange(max(keys[-1][0] for keys in (*morphs.values(), *bones.values())) + 1)
     curves: dict[str, tuple[np.ndarray, str]] = {}
     for morph, keys in sorted(morphs.items(), key=lambda each: each[0] not in MORPHS):

@@ -108,7 +108,7 @@ class UnitHmm:
 
     log_stay    : float32 array [shape=(G,)], log P(stay in the state), of the states without context
     typical_fit : mean ``fit`` of the recordings that the models were trained on
-    speaker     : mean speaker vector of these recordings (``speech.features.speaker_similarity``) [shape=(128,)];
+    speaker     : mean speaker vector of these recordings (``speech.sound.speaker_similarity``) [shape=(128,)];
                   None: a model of an earlier version
     """
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.compiler import compile_to_rounding
+from lipmotion.kernels.compiler import compile_to_rounding, compiled
 from lipmotion.kernels.factorial_loops import (
     FactorialLogLikelihoods,
     FrameDensity,
@@ -45,6 +45,8 @@ MIN_POSTERIOR = 1e-20
 """Smaller posteriors and counts are set to 0, as those of states that cannot be are not quite 0."""
 MIN_PROBABILITY = 1e-100
 """Least probability of a transition, or of beginning or ending in a state: products of smaller ones may underflow."""
+SPARSE_SHARE = 0.2
+"""A smaller share of possible joint states is fastest in logarithms, which take no time for others."""
 LARGEST_EXPONENT = 700.0
 """Expected transitions are divided by the probability of the transition: the quotient must stay finite."""
 
@@ -79,8 +81,8 @@ def infer_factorial(
     stretch : frames whose forward probabilities are stored at once; those of the others are computed twice;
         None: √T, or as many as ``ROOM_BYTES`` hold
     Log densities in single precision are processed in single precision where that loses nothing, which takes half the
-    time. Where double precision may lose paths that count, because they were some 250 nats below a frame's best, the
-    recording is processed in logarithms.
+    time. Where few joint states are possible, or double precision may lose paths that count, because they were some 250
+    nats below a frame's best, the recording is processed in logarithms.
     Source: Ghahramani & Jordan (1997), "Factorial hidden Markov models", appendix B. Forward and backward probabilities
     are raised to a least one, never set to 0, and so are upper bounds; how much may come of that follows from the
     overlap of both in each frame.
@@ -89,22 +91,21 @@ def infer_factorial(
     order = np.lexsort(logs.pairs.T[::-1])
     logs = logs._replace(pair=logs.pair[:, order], pairs=logs.pairs[order])
     ways: list[_Scaled | _InLogs] = []
+    share = np.prod([np.mean(log > -np.inf) for log in (logs.audio, logs.visual)])
     probabilities = (
         part
         for loop in (audio, visual)
         for part in (loop.stay, loop.onward, loop.leave[:, None] * loop.enter, loop.initial, loop.final)
     )
-    if min(float(part.min(where=part > 0, initial=1.0)) for part in probabilities) >= MIN_PROBABILITY:
+    least = min(float(part.min(where=part > 0, initial=1.0)) for part in probabilities)
+    if least >= MIN_PROBABILITY and share > SPARSE_SHARE:
         ways += [_Scaled(audio, visual, logs, kind) for kind in OFF if kind in (DOUBLE, logs.audio.dtype)]
     results = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
     result = next((each for each in results if each is not None), None)
     if result is None:  # there is no path
-        of_audio, of_visual = (
-            LoopCounts(*(np.zeros_like(part) for part in (loop.stay, loop.onward, loop.enter, loop.initial)))
-            for loop in (audio, visual)
-        )
-        in_audio, in_visual, in_pairs = (np.zeros(log.shape) for log in (logs.audio, logs.visual, logs.pair))
-        return FactorialPosteriors(in_audio, in_visual, in_pairs, of_audio, of_visual, -np.inf)
+        first, second = (LoopCounts(*map(np.zeros_like, (*loop[:2], *loop[3:5]))) for loop in (audio, visual))
+        in_audio, in_visual, in_pairs = (np.zeros(log.shape) for log in logs[:3])
+        return FactorialPosteriors(in_audio, in_visual, in_pairs, first, second, -np.inf)
     return result._replace(pair=result.pair[:, np.argsort(order)])
 
 
@@ -217,8 +218,7 @@ class _Scaled:
         return log_total
 
     def end(self, before: Array) -> _StepBack:
-        final = np.exp(self.final)
-        frame = _frame(np.multiply(before, final, dtype=np.float64), self.logs.pairs, self.whole)
+        frame = _frame(np.log(before.astype(np.float64)), self.final, self.logs.pairs, self.whole)
         backward, log = self._shares(self.final + self.logs.joint(len(self.logs.audio) - 1))
         return _StepBack(frame if log > -math.inf else frame._replace(log_overlap=-math.inf), backward, *_NONE)
 
@@ -268,52 +268,83 @@ class _InLogs:
 
     def __init__(self, audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -> None:
         self.audio, self.visual, self.logs = LogTransitions.of(audio), LogTransitions.of(visual), logs
+        self.audio_back, self.visual_back = self.audio.reverse(), self.visual.reverse()
         self.initial, self.final = log_ends(audio, visual)
         self.frame_bytes = self.initial.nbytes
+        self.possible = [log > -np.inf for log in logs[:2]]
+        for possible, states in zip(self.possible, logs.pairs.T, strict=True):
+            np.logical_or.at(possible.T, states, -np.inf < logs.pair.T)
 
     def forward(self, start: int, stop: int, before: Array | None, results: list[tuple[Array, Array]]) -> float:
         for t in range(start, stop):
-            prior, leaving = self.initial, self.initial
+            prior = moved = self.initial
             if before is not None:
-                moved = self.audio.forward(before)
-                prior, leaving = self.visual.forward(moved.T).T, moved[:, -len(self.visual.leaving) :]
+                moved = self.audio.forward(before, self.possible[0][t])
+                prior = self.visual.forward(moved.T, self.possible[1][t]).T
             before = prior + self.logs.joint(t)
-            results.append((before, leaving))
+            results.append((before, moved[:, -len(self.visual.leaving) :]))
         return 0.0
 
     def end(self, before: Array) -> _StepBack:
-        return _StepBack(
-            self._frame(before + self.final), self.final + self.logs.joint(len(self.logs.audio) - 1), *_NONE
-        )
+        last = self.logs.joint(len(self.logs.audio) - 1)
+        return _StepBack(_frame(before, self.final, self.logs.pairs), self.final + last, *_NONE)
 
     def back(self, before: Array, backward: Array, leaving: Array, t: int) -> _StepBack:
         units_audio, units_visual = len(self.audio.leaving), len(self.visual.leaving)
-        moved = self.visual.backward(backward.T).T
-        beta = self.audio.backward(moved)
-        frame = self._frame(before + beta)
-        audio_entered = np.logaddexp.reduce(before[-units_audio:, None] + moved[None, :units_audio], axis=2)
-        visual_entered = np.logaddexp.reduce(leaving[:, :, None] + backward[:, None, :units_visual], axis=0)
-        entered = (
-            np.exp(np.minimum(part - frame.log_overlap, LARGEST_EXPONENT)) for part in (audio_entered, visual_entered)
-        )
-        return _StepBack(frame, beta + self.logs.joint(t), *entered)
+        possible = self.possible[0][t, ::-1]
+        moved = self.visual_back.forward(backward.T[::-1], np.ones(backward.shape[1], bool))[::-1].T
+        beta = self.audio_back.forward(moved[::-1], possible)[::-1]
+        frame = _frame(before, beta, self.logs.pairs)
+        of_audio = _count_entered(before[-units_audio:], moved[:units_audio], frame.log_overlap)
+        of_visual = _count_entered(leaving.T, backward[:, :units_visual].T, frame.log_overlap)
+        return _StepBack(frame, beta + self.logs.joint(t), of_audio, of_visual)
 
-    def _frame(self, joint: Double) -> _Frame:
-        log_overlap = float(np.logaddexp.reduce(joint, axis=None))
-        joint = np.exp(joint - log_overlap) if math.isfinite(log_overlap) else np.zeros_like(joint)
-        return _frame(joint, self.logs.pairs, 1.0)._replace(log_overlap=log_overlap)
+
+@compiled
+def _meet_in_logs(before: Double, beta: Double, pairs: Index) -> tuple[Double, Double, Double, float, float]:
+    """Return the sums of the products of probabilities [shapes=(N, M)] along both axes, and those of pairs, relative to
+    the greatest; its logarithm; and the sum of all.
+    """
+    audio, visual, pair = np.zeros(before.shape[0]), np.zeros(before.shape[1]), np.zeros(len(pairs))
+    best, total = -np.inf, 0.0
+    for i in range(len(before)):
+        for j in range(before.shape[1]):
+            best = max(best, before[i, j] + beta[i, j])
+    for i in range(len(before) if best > -np.inf else 0):
+        for j in range(before.shape[1]):
+            log = before[i, j] + beta[i, j] - best
+            share = math.exp(log) if log > -np.inf else 0.0
+            total += share
+            audio[i] += share
+            visual[j] += share
+    for p in range(len(pairs) if total else 0):
+        i, j = pairs[p]
+        pair[p] = math.exp(before[i, j] + beta[i, j] - best)
+    return audio, visual, pair, best, total
+
+
+@compiled
+def _count_entered(last: Array, first: Array, log_overlap: float) -> Double:
+    """Return the sums of the products of leaving units and of entering units [shapes=(U, M)], from logarithms."""
+    entered = np.zeros((len(last), len(first)))
+    for u in range(len(last)):
+        for j in range(last.shape[1]):
+            if last[u, j] > -np.inf:
+                for v in range(len(first)):
+                    if first[v, j] > -np.inf:
+                        entered[u, v] += math.exp(min(last[u, j] + first[v, j] - log_overlap, LARGEST_EXPONENT))
+    return entered
 
 
 _NONE = np.zeros(()), np.zeros(())
 """Expected transitions out of the last frame."""
 
 
-def _frame(joint: Double, pairs: Index, whole: float) -> _Frame:
-    """Return the posteriors of a frame from products of its forward and backward probabilities, of sum ``whole``."""
-    total = float(joint.sum())
-    joint = joint / (total if total > 0 else 1)
-    log_overlap = math.log(total / whole) if total > 0 else -math.inf
-    return _Frame(joint.sum(axis=1), joint.sum(axis=0), joint[tuple(pairs.T)], log_overlap)
+def _frame(before: Double, beta: Double, pairs: Index, whole: float = 1.0) -> _Frame:
+    """Return the posteriors of a frame from logarithms of forward (of sum ``whole``) and backward probabilities."""
+    audio, visual, pair, best, total = _meet_in_logs(before, beta, pairs)
+    log_overlap, whole = (best + math.log(total / whole), total) if total else (-math.inf, 1.0)
+    return _Frame(audio / whole, visual / whole, pair / whole, log_overlap)
 
 
 def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:

@@ -116,23 +116,14 @@ class LogTransitions(NamedTuple):
             leaving = np.log(loop.leave)[:, None] + np.log(loop.enter)
             return cls(np.log(loop.stay.ravel()), np.log(loop.onward.ravel()), leaving)
 
-    def forward(self, joint: Array) -> Array:
-        """Return log probabilities one frame on, along axis 0 [shape=(N, M)]."""
-        units = len(self.leaving)
-        after = joint + self.stay[:, None]
-        after[units:] = np.logaddexp(after[units:], joint[:-units] + self.onward[:, None])
-        entering = np.logaddexp.reduce(joint[-units:, None] + self.leaving[:, :, None], axis=0)
-        after[:units] = np.logaddexp(after[:units], entering)
-        return after
+    def forward(self, joint: Array, wanted: NDArray[np.bool_]) -> Array:
+        """Return log probabilities one frame on, along axis 0 [shape=(N, M)]; of states not ``wanted``: -inf."""
+        return _move_logs(np.ascontiguousarray(joint), self.stay, self.onward, self.leaving, wanted)
 
-    def backward(self, joint: Array) -> Array:
-        """Return log backward probabilities one frame back, along axis 0 [shape=(N, M)]."""
-        units = len(self.leaving)
-        before = joint + self.stay[:, None]
-        before[:-units] = np.logaddexp(before[:-units], joint[units:] + self.onward[:, None])
-        left = np.logaddexp.reduce(joint[None, :units] + self.leaving[:, :, None], axis=1)
-        before[-units:] = np.logaddexp(before[-units:], left)
-        return before
+    def reverse(self) -> LogTransitions:
+        """Return the transitions of the loop backward in time, states in the opposite order."""
+        parts = self.stay[::-1], self.onward[::-1], self.leaving.T[::-1, ::-1]
+        return LogTransitions(*map(np.ascontiguousarray, parts))
 
     def best_forward(self, score: Array) -> tuple[Array, NDArray[Any]]:
         """Return the best scores a frame on, along axis 0, and decisions: U for staying, U + 1 for the next, else the
@@ -182,13 +173,24 @@ def find_factorial_path(
     """
     frames = len(logs.audio)
     stretch = stretch or count_cached_frames(frames, 2 * logs.audio.shape[1] * logs.visual.shape[1])
-    search = _FactorialSearch(LogTransitions.of(audio), LogTransitions.of(visual), logs)
+    loops = LogTransitions.of(audio), LogTransitions.of(visual)
+
+    def search(start: int, stop: int, score: Array) -> tuple[Array, list[tuple[NDArray[Any], NDArray[Any]]]]:
+        """Return the scores after the frames of a stretch, and for each the decisions [shapes=(Na, Nv), (Nv, Na)]."""
+        decisions = list[tuple[NDArray[Any], NDArray[Any]]]()
+        for t in range(start, stop):
+            score, by_audio = loops[0].best_forward(score)
+            turned, by_visual = loops[1].best_forward(np.ascontiguousarray(score.T))
+            score = turned.T + logs.joint(t)
+            decisions.append((by_audio, by_visual))
+        return score, decisions
+
     initial, final = log_ends(audio, visual)
     score = initial + logs.joint(0)
-    befores, decisions = [], list[_Decisions]()
+    befores, decisions = [], list[tuple[NDArray[Any], NDArray[Any]]]()
     for start in range(1, frames, stretch):
         befores.append((start, score))
-        score, decisions = search.through(start, min(start + stretch, frames), score)
+        score, decisions = search(start, min(start + stretch, frames), score)
     path = np.zeros((frames, 2), np.intp)
     score = score + final
     best = float(score.max())
@@ -197,36 +199,13 @@ def find_factorial_path(
     path[-1] = np.unravel_index(int(score.argmax()), score.shape)
     for start, before in reversed(befores):
         if start != befores[-1][0]:
-            _, decisions = search.through(start, min(start + stretch, frames), before)
+            _, decisions = search(start, min(start + stretch, frames), before)
         for t in range(start + len(decisions) - 1, start - 1, -1):
-            path[t - 1] = search.previous(decisions[t - start], *path[t])
+            by_audio, by_visual = decisions[t - start]
+            state, other = path[t]
+            other = loops[1].previous(other, int(by_visual[other, state]))  # the later decision
+            path[t - 1] = loops[0].previous(state, int(by_audio[state, other])), other
     return path[:, 0], path[:, 1], best
-
-
-_Decisions = tuple[NDArray[Any], NDArray[Any]]
-"""For each loop, the decision at each joint state [shape=(N, M)], the loop's own states along axis 0."""
-
-
-class _FactorialSearch(NamedTuple):
-    audio: LogTransitions
-    visual: LogTransitions
-    logs: FactorialLogLikelihoods
-
-    def through(self, start: int, stop: int, score: Array) -> tuple[Array, list[_Decisions]]:
-        """Return the scores after the frames of a stretch, and the decisions of each frame."""
-        decisions = []
-        for t in range(start, stop):
-            score, by_audio = self.audio.best_forward(score)
-            turned, by_visual = self.visual.best_forward(np.ascontiguousarray(score.T))
-            score = turned.T + self.logs.joint(t)
-            decisions.append((by_audio, by_visual))
-        return score, decisions
-
-    def previous(self, decisions: _Decisions, audio: int, visual: int) -> tuple[int, int]:
-        """Return both states one frame before; the decision of the visual loop was the later one."""
-        by_audio, by_visual = decisions
-        visual = self.visual.previous(visual, int(by_visual[visual, audio]))
-        return self.audio.previous(audio, int(by_audio[audio, visual])), visual
 
 
 @compiled
@@ -247,3 +226,30 @@ def _take_best_entering(last: Array, leaving: Array, score: Array, decision: Arr
                 is_better = other > best[j]
                 best[j] = other if is_better else best[j]
                 unit[j] = u if is_better else unit[j]
+
+
+@compiled
+def _move_logs(before: Array, stay: Array, onward: Array, leaving: Array, wanted: NDArray[np.bool_]) -> Array:
+    """Return log probabilities one frame on, along axis 0; what cannot be takes no time."""
+    after = np.full(before.shape, -np.inf)
+    units = len(leaving)
+    last = before[len(before) - units :]
+    for i in range(len(before)):
+        row = after[i]
+        for j in range(len(row) if wanted[i] else 0):
+            row[j] = before[i, j] + stay[i]
+            best = row[j]
+            if i >= units:
+                moved = before[i - units, j] + onward[i - units]
+                best = max(best, moved)
+                if best > -np.inf:
+                    row[j] = best + math.log(math.exp(row[j] - best) + math.exp(moved - best))
+                continue
+            for u in range(units):
+                best = max(best, last[u, j] + leaving[u, i])
+            if best > -np.inf:
+                total = math.exp(row[j] - best)
+                for u in range(units):
+                    total += math.exp(last[u, j] + leaving[u, i] - best)
+                row[j] = best + math.log(total)
+    return after

@@ -24,8 +24,8 @@ from lipmotion.live.face import LiveFrame
 from lipmotion.live.network import STEP_S
 from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.meshes.model.shape_names import ARKIT_52
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.files import atomic_file
+from lipmotion.types import SPEECH_RATE_HZ
 
 Consumer = Callable[[LiveFrame], object]
 

@@ -22,9 +22,8 @@ from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.network_steps import ConvolutionalShape
 from lipmotion.speech.features.mfcc import BANDS, FFT_SIZE, HOP, WINDOW, mel_filters
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.stats.networks import ConvolutionalNetwork
-from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS
+from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS, SPEECH_RATE_HZ
 
 TAPS, BLOCK = 16, 160
 """Zero crossings of the resampling filter on either side; and samples that are resampled at a time, 10 ms."""

@@ -34,8 +34,7 @@ from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.request import Pauses, Request
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.types import Audio
+from lipmotion.types import SPEECH_RATE_HZ, Audio
 from lipmotion.types.delivery import Staging
 from lipmotion.units.lexicon import Lexicon
 

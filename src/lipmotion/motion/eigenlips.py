@@ -15,6 +15,9 @@ from lipmotion.types import GREY, Channel
 
 COLOURS = "rgb"
 COMPONENTS = 30  # components of each colour, as in the paper
+MOUTH_WIDTH, MOUTH_HEIGHT = 72, 56  # size of a mouth picture, px of a head that is upright and faces the camera
+MOUTH_CORNER = (-36.0, 48.0)  # its upper left corner, px from the point between the eyes, y down
+EYE_DISTANCE_PX = 90.0  # distance between the outer eye corners
 Images = NDArray[np.uint8]
 
 

@@ -1,38 +1,31 @@
 """Several people in one model: maps between the motion of each person and that of the mean person.
 
-Engines learn and generate the motion of the mean person; the maps are outside of them.
+Engines learn and generate the motion of the mean person; ``speaker_estimation`` fits the maps, outside of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.motion.closure import OPENING, estimate_closed_opening, find_closable_ranges
-from lipmotion.motion.frame_labels import list_speech_intervals, mark_distant
+from lipmotion.motion.closure import OPENING
+from lipmotion.motion.frame_labels import list_speech_intervals
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
-from lipmotion.types import FRAME_RATE_HZ, Channel, Example, Motion, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Channel, Motion, Timeline, Unit
 from lipmotion.units import VISEME_OF, VISEMES
 
 NEAR_SPEECH_S, FAR_FROM_SPEECH_S = 0.1, 0.48
 """Within the first distance of speech the map is that of speech, beyond the second the rest pose is exactly the
 person's; the second is the one beyond which engines generate the rest pose."""
-RANGE_PERCENTILES = (5.0, 95.0)  # the range of a channel lies between these percentiles of the frames of speech
-RANGE_PRIOR_S = 2.0  # seconds of speech that count as much as the assumption that a person's range is the mean person's
 MIN_GAIN, MAX_GAIN = 0.25, 4.0
 """Ranges of people differ by no more; beyond, they are differences of trackers or of units."""
-MIN_FRAMES = 10  # fewest frames of silence from which a rest pose is taken
-MIN_RANGE_SHARE = 0.05
-"""A channel that somebody moves by less than this share of the widest range has a gain of 1 for everyone."""
 VISEME_NAMES = tuple(VISEMES)  # the order of the visemes in stored habits
 FADE_FRAMES = 11
-HABIT_PRIOR_FRAMES = 50.0  # frames of a viseme that count as much as the assumption that a person has no habit in it
-FULL_HABIT_SHARE = 0.25  # share of the mean range by which lips must be open for habits to show wholly
 Array = NDArray[np.float64]
 
 
@@ -152,61 +145,6 @@ def weigh_visemes(units: Timeline[Unit], frames: int) -> Array:
     return weights * (1 - measure_restfulness(units, frames))[:, None]
 
 
-def add_habits(
-    maps: SpeakerMaps, examples: Sequence[Example], speakers: Sequence[str], generated: Iterable[NDArray[Any]]
-) -> SpeakerMaps:
-    """Return maps with the habits of each person: what is left of their motion in each viseme, on average.
-
-    examples  : from ``map_to_mean_person``
-    speakers  : the name of each example's speaker
-    generated : the mean person's motion of each, as the engine generates it [each shape=(T, P)]
-    Averages are drawn towards 0 with the weight of ``HABIT_PRIOR_FRAMES``.
-    """
-    sums = np.zeros(maps.habits.shape)
-    counts = np.full(maps.habits.shape[:2], HABIT_PRIOR_FRAMES)
-    for example, speaker, values in zip(examples, speakers, generated, strict=True):
-        if speaker in maps.names:
-            weights = weigh_visemes(example.speech.units, len(values)) * example.valid[:, None]
-            number = maps.names.index(speaker)
-            sums[number] += weights.T @ np.where(example.valid[:, None], example.motion.values - values, 0)
-            counts[number] += weights.sum(axis=0)
-    return replace(maps, habits=sums / counts[:, :, None])
-
-
-def map_to_mean_person(examples: Sequence[Example], speakers: Sequence[str]) -> tuple[list[Example], SpeakerMaps]:
-    """Return examples with the motion of the mean person, and the maps of all people who have a name.
-
-    examples : with the same channels
-    speakers : the name of each example's speaker; examples without a name are of one person more
-    The mean person's poses are the means of all people's, its ranges their geometric means; whoever says more counts
-    no more. Closed lips map onto closed lips and, in silence, rest pose onto rest pose. Ranges of people who say little
-    are drawn towards the mean person's. Points share one gain for each axis, so that faces keep their shape.
-    """
-    names = tuple(sorted(set(speakers)))
-    channels, motion_names = examples[0].motion.channels, examples[0].motion.names
-    column = motion_names.index(OPENING) if OPENING in motion_names else None
-    groups = [[e for e, speaker in zip(examples, speakers, strict=True) if speaker == name] for name in names]
-    people = [measure_person(group, column) for group in groups]
-    rests, follow = estimate_rest_poses(people), np.mean([person.follow for person in people], axis=0)
-    closed = np.array([person.closed for person in people])
-    parted = rests[:, column] - closed if column is not None else np.zeros(len(people))
-    anchors = rests - parted[:, None] * follow  # the rest poses, but with lips that touch
-    gain = estimate_gains(people, channels)
-    offset = anchors - gain * anchors.mean(axis=0)
-    rest = rests - offset - gain * rests.mean(axis=0)
-    shut = float(closed.mean())
-    wide = float(np.mean([person.range[column] for person in people])) if column is not None else 0.0
-    habits = np.zeros((len(names), len(VISEME_NAMES), len(channels)))
-    maps = SpeakerMaps(channels, names, gain, offset, rest, habits, (shut, shut + FULL_HABIT_SHARE * wide))
-    mapped = []
-    for example, speaker in zip(examples, speakers, strict=True):
-        motion = example.motion
-        restful = measure_restfulness(example.speech.units, len(motion.values))
-        values = maps.of(speaker).to_mean(motion.values, restful)
-        mapped.append(replace(example, motion=replace(motion, values=values)))
-    return mapped, maps.select([name for name in names if name])
-
-
 def speakers_to_arrays(maps: SpeakerMaps) -> dict[str, NDArray[Any]]:
     """Serialise maps."""
     channels = np.array([(channel.name, channel.unit) for channel in maps.channels])
@@ -228,89 +166,6 @@ def speakers_from_arrays(arrays: Arrays) -> SpeakerMaps:
         return SpeakerMaps(channels, names, *parts, (closed, opened))
 
 
-@dataclass(frozen=True, eq=False)
-class PersonStatistics:
-    """Statistics of one person's motion.
-
-    rest     : rest pose, NaN where there is no silence [shape=(P,)]
-    rest_s   : seconds of silence away from speech
-    spoken   : median pose in speech [shape=(P,)]
-    range    : of each channel in speech [shape=(P,)]
-    follow   : change of each channel per unit of opening [shape=(P,)]; zeros without a channel of that name
-    closed   : opening of closed lips; 0 without a channel of that name
-    speech_s : seconds of speech
-    """
-
-    rest: Array
-    rest_s: float
-    spoken: Array
-    range: Array
-    follow: Array
-    closed: float
-    speech_s: float
-
-
-def measure_person(examples: Sequence[Example], column: int | None) -> PersonStatistics:
-    """Return the statistics of one person's motion; column : of the opening (None: there is no such channel)."""
-    silent, silence, spoken, measured, smallest = [], [], [], [], []
-    for example in examples:
-        values, valid, units = np.asarray(example.motion.values, float), example.valid, example.speech.units
-        silent.append(values[valid & mark_distant(units, len(values), FAR_FROM_SPEECH_S)])
-        silence.append(values[valid & mark_distant(units, len(values), NEAR_SPEECH_S)])
-        measured.append(values[valid])
-        spoken.append(values[valid & ~mark_distant(units, len(values), 0.0)])
-        if column is not None:
-            ranges = find_closable_ranges(example.speech.units, len(values))
-            smallest += [values[frames, column][valid[frames]].min() for frames in ranges if valid[frames].any()]
-    resting, speech = np.concatenate(silent), np.concatenate(spoken)
-    quiet = next((each for each in (resting, np.concatenate(silence)) if len(each) >= MIN_FRAMES), None)
-    if not len(speech):
-        speech = np.concatenate(measured)
-    if not len(speech):
-        speech = np.zeros((1, examples[0].motion.values.shape[1]))
-    low, high = np.percentile(speech, RANGE_PERCENTILES, axis=0)
-    follow, closed = np.zeros(speech.shape[1]), 0.0
-    if column is not None:
-        centred = speech - speech.mean(axis=0)
-        follow = centred[:, column] @ centred / max(float(centred[:, column] @ centred[:, column]), 1e-12)
-        follow[column] = 1
-        closed = estimate_closed_opening(smallest, speech[:, column], np.concatenate(measured)[:, column])
-    rest = np.median(quiet, axis=0) if quiet is not None else np.full(speech.shape[1], np.nan)
-    seconds = [len(frames) / FRAME_RATE_HZ for frames in (resting, speech)]
-    return PersonStatistics(rest, seconds[0], np.median(speech, axis=0), high - low, follow, closed, seconds[1])
-
-
-def estimate_rest_poses(people: Sequence[PersonStatistics]) -> Array:
-    """Return the rest poses of all people [shape=(S, P)]; who is never silent rests as far from speech as others."""
-    rests, spoken = np.stack([person.rest for person in people]), np.stack([person.spoken for person in people])
-    known: NDArray[np.bool_] = np.asarray(np.isfinite(rests).all(axis=1))
-    usual = (rests - spoken)[known].mean(axis=0) if known.any() else np.zeros(rests.shape[1])
-    return np.where(known[:, None], rests, spoken + usual)
-
-
-def estimate_gains(people: Sequence[PersonStatistics], channels: Sequence[Channel], limit: float = MAX_GAIN) -> Array:
-    """Return the range of each person as a multiple of the mean person's [shape=(S, P)].
-
-    limit : gains lie between its inverse and itself
-    Points share one gain for each axis. Of people who say little, gains are drawn towards 1 (``RANGE_PRIOR_S``).
-    """
-    ranges = np.stack([person.range for person in people])
-    moves = (ranges > MIN_RANGE_SHARE * ranges.max(axis=0)).all(axis=0) & (ranges > 0).all(axis=0)
-    ratio = np.ones(ranges.shape)
-    usual = np.exp(np.log(ranges[:, moves]).mean(axis=0))
-    ratio[:, moves] = ranges[:, moves] / usual
-    for axis in ("x_", "y_", "z_"):
-        points = moves & np.array([channel.name.startswith(axis) for channel in channels])
-        if points.any():
-            weights = np.square(np.exp(np.log(ranges[:, points]).mean(axis=0)))
-            ratio[:, points] = np.sqrt(np.square(ratio[:, points]) @ weights / weights.sum())[:, None]
-    speech_s = np.array([person.speech_s for person in people])
-    trust = speech_s / (speech_s + RANGE_PRIOR_S)
-    shrunk = np.exp(np.log(ratio) * trust[:, None])
-    shrunk /= np.exp(np.log(shrunk).mean(axis=0))  # the geometric mean of all gains is 1
-    return np.clip(shrunk, 1 / limit, limit)
-
-
 SPEAKERS = {
     "channels": ArraySpec(np.str_, "P 2"),
     "names": ArraySpec(np.str_, "S"),
@@ -321,39 +176,6 @@ SPEAKERS = {
     "lips": ArraySpec(np.float64, "2", 0, 1e6),
 }
 """Arrays of the maps of S speakers, P channels and V visemes."""
-
-
-REST_PRIOR_S = 0.5
-"""Seconds of silence that count as much as the assumption that the map of speech is right in silence, too."""
-
-
-def fit_transfer_map(source: Sequence[Example], target: Sequence[Example]) -> SpeakerMap:
-    """Return the map from the motion of a source person to that of a target person, fitted in the same speech.
-
-    source : generated motion of the source, for the speech of the target
-    target : measured motion of the target; the same channels
-    - Closed lips map onto closed lips. The median pose of all other channels in speech maps onto the target's.
-    - The range in speech (5th to 95th percentile) maps onto the target's; points share one gain for each axis, so that
-      the face keeps the shape of the target. With S seconds of speech the logarithm of a gain counts S / (S + 2), and
-      gains lie between 1 / ``MAX_GAIN`` and ``MAX_GAIN``: a short recording gives place and shape alone.
-    - In silence away from speech the rest pose maps onto the target's. With S seconds of such silence that counts
-      S / (S + 0.5): people rest with closed lips in one pause and with parted lips in the next.
-    The map has no habits (``SpeakerMap.habits`` is 0).
-    Source of the task: Minnis & Breen 2000, §7. Alternatives that were measured: docs/results/selection.md.
-    """
-    channels = source[0].motion.channels
-    names = [channel.name for channel in channels]
-    column = names.index(OPENING) if OPENING in names else None
-    people = [measure_person(examples, column) for examples in (source, target)]
-    gains, rests = estimate_gains(people, channels, float(np.sqrt(MAX_GAIN))), estimate_rest_poses(people)
-    gain = gains[1] / gains[0]
-    offset = people[1].spoken - gain * people[0].spoken
-    closed = people[0].closed
-    if column is not None:
-        offset[column] = people[1].closed - gain[column] * closed
-    rest = people[1].rest_s / (people[1].rest_s + REST_PRIOR_S) * (rests[1] - offset - gain * rests[0])
-    habits = np.zeros((len(VISEME_NAMES), len(channels)))
-    return SpeakerMap(channels, gain, offset, rest, habits, (closed, closed + 1))
 
 
 def compose_maps(first: SpeakerMap | None, second: SpeakerMap) -> SpeakerMap:
@@ -382,9 +204,3 @@ def select_channels(motion: Motion, channels: Sequence[Channel], where: str) -> 
         )
     columns = [motion.channels.index(channel) for channel in channels]
     return Motion(np.asarray(motion.values)[:, columns], motion.rate_hz, tuple(channels))
-
-
-def count_speech_s(examples: Sequence[Example]) -> float:
-    """Return the seconds of speech in which the motion of some examples was measured."""
-    spoken = (each.valid & ~mark_distant(each.speech.units, len(each.valid), 0.0) for each in examples)
-    return sum(int(frames.sum()) for frames in spoken) / FRAME_RATE_HZ

@@ -51,7 +51,7 @@ from lipmotion.types import (
 from lipmotion.types.generation import SURE_CONFIDENCE
 from lipmotion.types.languages import ENGLISH
 from lipmotion.units import SILENCE, group_words
-from lipmotion.units.mood_tags import time_moods
+from lipmotion.units.spoken_text import time_moods
 
 ModelT = TypeVar("ModelT")
 TRANSCRIPT = "the words that are spoken (--transcript)"

@@ -47,8 +47,7 @@ from lipmotion.pipeline.edits import (
 from lipmotion.pipeline.generation import apply_excerpt, cut_speech, find_excerpt, find_person, generate_motion
 from lipmotion.pipeline.model import Model, load_model, with_prior
 from lipmotion.pipeline.request import Request, SpeechInput, as_request
-from lipmotion.pipeline.workers import map_in_processes
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.types import (
     WEIGHT,
     Constraints,
@@ -57,6 +56,7 @@ from lipmotion.types import (
     Hold,
     Monitor,
     Outlook,
+    ParallelMap,
     Pin,
     Progress,
     Span,
@@ -164,7 +164,11 @@ class Session:
             if background is not None:
                 background()
 
-        self._work = map_in_processes(workers, prepare)
+        self._work: ParallelMap = map
+        if workers != 1:
+            from lipmotion.pipeline.workers import map_in_processes
+
+            self._work = map_in_processes(workers, prepare)
         self._monitor, self._curves, self._outlook = monitor, frozenset(curves), outlook
         self._lasts_s, self._motions, self._known_audio = lasts_s, 0, audio
         self._one_at_a_time = RLock()

@@ -16,7 +16,7 @@ import sys
 import time
 import uuid
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -132,10 +132,8 @@ def _reached(folder: Path, *, create: bool = False) -> Iterator[int | None]:
                 with suppress(FileExistsError):
                     os.mkdir(place if handle is None else name, dir_fd=handle)
             if is_link(place):
-                raise ExportError(
-                    f"{place}: is a link, required a folder: nothing is written outside of {root}; remove the link, or "
-                    "give another name"
-                )
+                what = f"{place}: is a link, required a folder: nothing is written outside of {root}; remove the link,"
+                raise ExportError(f"{what} or give another name")
             if handle is not None:
                 outer, handle = handle, os.open(name, _FOLDER | _NO_LINK, dir_fd=handle)
                 os.close(outer)
@@ -187,10 +185,8 @@ def check_own(path: Path) -> None:
 
 def _check_own(path: Path, status: os.stat_result) -> None:
     if not stat.S_ISREG(status.st_mode) or status.st_nlink > 1:
-        raise ExportError(
-            f"{path}: is a link, a folder, a pipe or a device, or a file that has another name, too; required a file "
-            "that lipmotion writes itself; remove it, or give another folder"
-        )
+        what = f"{path}: is a link, a folder, a pipe or a device, or a file that has another name, too;"
+        raise ExportError(f"{what} required a file that lipmotion writes itself; remove it, or give another folder")
 
 
 def open_own(path: Path, buffering: int = -1) -> IO[bytes]:
@@ -262,39 +258,31 @@ def find_place(target: Path) -> Path:
 
 
 @contextmanager
-def atomic_file(target: Path) -> Iterator[Path]:
-    """Give a temporary path to write to, with the target's suffix (lower case); rename it to ``target`` on success.
-
-    Where ``target`` is a link, the file that it points to is written; in a confined folder the file replaces the link.
-    Raises ExportError: the folder does not exist, or the file cannot be written (disk full, no permission).
-    """
-    place = find_place(target)
+def _replace(target: Path, place: Path, *, folder: bool) -> Iterator[Path]:
     temporary = _temporary(place, target.suffix)
     try:
         with _reached(place.parent):
-            remove_left_files(place)
+            temporary.mkdir() if folder else remove_left_files(place)
         yield temporary
         put_in_place(temporary, place)
     except OSError as error:
         raise write_error(target, error) from error
     finally:
-        with suppress(OSError):
-            temporary.unlink()
+        remove(temporary)
 
 
-@contextmanager
-def replace_folder(target: Path) -> Iterator[Path]:
+def atomic_file(target: Path) -> AbstractContextManager[Path]:
+    """Give a temporary path to write to, with the target's suffix (lower case); rename it to ``target`` on success.
+
+    Where ``target`` is a link, the file that it points to is written; in a confined folder the file replaces the link.
+    Raises ExportError: the folder does not exist, or the file cannot be written (disk full, no permission).
+    """
+    return _replace(target, find_place(target), folder=False)
+
+
+def replace_folder(target: Path) -> AbstractContextManager[Path]:
     """Give a temporary folder, which becomes ``target`` on success. Raises ExportError: it cannot be written."""
-    temporary = _temporary(target, target.suffix)
-    try:
-        with _reached(target.parent):
-            temporary.mkdir()
-        yield temporary
-        put_in_place(temporary, target)
-    except OSError as error:
-        raise write_error(target, error) from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+    return _replace(target, target, folder=True)
 
 
 @contextmanager

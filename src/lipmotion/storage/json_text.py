@@ -63,10 +63,10 @@ def as_json_rows(content: Mapping[str, Any], *, ensure_ascii: bool = True) -> st
     """
     members = []
     for name, value in content.items():
-        if isinstance(value, list | tuple) and value:
-            members.append(f"{as_json(name)}: [\n  {_rows(value, ensure_ascii=ensure_ascii)}\n ]")
-        else:
-            members.append(f"{as_json(name)}: {as_json(value, ensure_ascii=ensure_ascii)}")
+        rows = _rows(value, ensure_ascii=ensure_ascii) if isinstance(value, list | tuple) and value else ""
+        members.append(
+            f"{as_json(name)}: " + (f"[\n  {rows}\n ]" if rows else as_json(value, ensure_ascii=ensure_ascii))
+        )
     return "{\n " + ",\n ".join(members) + "\n}\n"
 
 

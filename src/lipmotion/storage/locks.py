@@ -82,9 +82,8 @@ def _open_lock(path: Path) -> IO[bytes]:
                     file.seek(0)
                     owner = file.read()
             who = owner.decode(errors="replace") or "unknown"
-            raise ExportError(
-                f"{path.parent}: another lipmotion (process {who}) is at work on it; wait for it, or stop it"
-            ) from error
+            what = f"{path.parent}: another lipmotion (process {who}) is at work on it; wait for it,"
+            raise ExportError(f"{what} or stop it") from error
         except BaseException:
             if file is not None:
                 file.close()

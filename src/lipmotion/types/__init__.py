@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from lipmotion.types.timeline import *
 
 __all__ = [
-    "ENERGY_FEATURE", "EYE_DISTANCE", "FRAME_RATE_HZ", "GREY", "SPECTRUM_BANDS", "WEIGHT", "Audio", "ChainPosteriors",
+    "ENERGY_FEATURE", "EYE_DISTANCE", "FRAME_RATE_HZ", "GREY", "SPECTRUM_BANDS", "SPEECH_RATE_HZ", "WEIGHT", "Audio",
+    "ChainPosteriors",
     "ChainStates", "Channel", "ChannelValue", "ConditionSpectrum", "Configuration", "Constraints", "CurveEdit",
     "Delivery", "DominantGaussian", "DrawnCurve", "Example", "Explanation", "Features", "Gain", "Generation", "Hold",
     "Item", "JoinedRows", "Monitor", "Motion", "NamedProbability", "Outlook", "ParallelMap", "Pin", "PriorOutput",

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.types.timeline import Span
 
+SPEECH_RATE_HZ = 16_000  # of all speech that is analysed
 FULL_SCALE = 32_768
 """The 16-bit value of a sample of 1, which is one more than there is."""
 LAUGHTER, BREATH, WHISPER, SHOUT = "laughter", "breath", "whisper", "shout"
@@ -62,7 +63,7 @@ class Prosody:
 
 @dataclass(frozen=True)
 class VoiceEvent:
-    """Something detected in a voice beside its words (``speech.features.voice_events``).
+    """Something detected in a voice beside its words (``speech.sound.voice_events``).
 
     start_s, end_s : seconds
     kind     : ``LAUGHTER`` (a bout), ``BREATH`` (drawn in, in a pause), ``WHISPER`` or ``SHOUT`` (a phrase)

@@ -80,8 +80,7 @@ _XSAMPA_SYMBOL = re.compile("|".join(map(re.escape, sorted(XSAMPA, key=len, reve
 _IGNORED = frozenset("'#\"ˈˌː.|‿^-_*!?;:,~%<>ˑʰʲˤˠʼʱⁿˡ0123456789()¹²³⁰⁴⁵⁻⁽⁾")
 """Marks that no mouth shape depends on; further ones are combining marks and tones."""
 _TIES = str.maketrans("", "", "͜͡")
-UNKNOWN = ("ax",)
-"""What a letter becomes of which nothing is known: the mouth at ease, slightly open."""
+UNKNOWN = ("ax",)  # what a letter becomes of which nothing is known: the mouth at ease, slightly open
 
 
 @cache

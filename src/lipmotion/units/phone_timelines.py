@@ -47,8 +47,7 @@ def close_gaps(units: Timeline[Unit], duration_s: float) -> Timeline[Unit]:
     return Timeline(tuple(filled))
 
 
-RECOGNISED = "recognised"
-"""Name of the tier, and of the member of motion files."""
+RECOGNISED = "recognised"  # name of the tier, and of the member of motion files
 
 
 class RecognisedPhone(NamedTuple):

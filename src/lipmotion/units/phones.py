@@ -77,24 +77,16 @@ def choose_drawn_shape(shape: str, drawn: str) -> str:
 
 
 SILENCE = "sil"
-PAUSE = "sp"
-"""A pause between words that is too short to be silence."""
-SHORT_PAUSE_S = 0.2
-"""Silence shorter than this is a pause between words."""
+PAUSE = "sp"  # a pause between words that is too short to be silence
+SHORT_PAUSE_S = 0.2  # silence shorter than this is a pause between words
 
 PHONES: tuple[str, ...] = tuple(sorted(VISEME_OF))
 UNKNOWN_PHONES = "spn"
 """The unit, without a phone, of a span in which somebody speaks and nobody says what: as aligners label a word that is
 in no dictionary. Its word, where it is given, is that of the whole span."""
 
-CLOSURES = {
-    "pcl": ("p",),
-    "bcl": ("b",),
-    "tcl": ("t", "ch", "dx"),
-    "dcl": ("d", "jh", "dx"),
-    "kcl": ("k",),
-    "gcl": ("g",),
-}
+_CLOSED = parse_table("pcl=p bcl=b tcl=t_ch_dx dcl=d_jh_dx kcl=k gcl=g")
+CLOSURES = {closure: tuple(phones.split()) for closure, phones in _CLOSED.items()}
 """Closures of TIMIT to the phones that they open to; alone, a closure is the first of these."""
 OTHER_NAMES = {closure: phones[0] for closure, phones in CLOSURES.items()} | dict(
     zip("dx nx eng ux hv ax-h axh tq epi pau h#".split(), "d n ng uw hh ax ax t sil sil sil".split(), strict=True)
@@ -102,13 +94,11 @@ OTHER_NAMES = {closure: phones[0] for closure, phones in CLOSURES.items()} | dic
 """Phones that TIMIT and Buckeye name otherwise: the tap of *city* is a d, of *winner* an n.
 Source: TIMIT, phoncode.doc; the Buckeye corpus manual."""
 
-REDUCED_VOWELS = {"ah": "ax", "er": "axr", "ih": "ix"}
-"""Vowels to their unstressed forms."""
+REDUCED_VOWELS = {"ah": "ax", "er": "axr", "ih": "ix"}  # vowels to their unstressed forms
 FULL_FORMS = {reduced: vowel for vowel, reduced in REDUCED_VOWELS.items()} | {"el": "l", "em": "m", "en": "n"}
 """Unstressed vowels and syllabic consonants to the phones that a dictionary writes for them."""
 
-LIP_CLOSING: tuple[str, ...] = (*VISEMES["bi"], "em")
-"""The phones in which the lips meet."""
+LIP_CLOSING: tuple[str, ...] = (*VISEMES["bi"], "em")  # the phones in which the lips meet
 
 SIMILAR_PHONES: dict[str, tuple[str, ...]] = {
     phone: tuple(others.split())

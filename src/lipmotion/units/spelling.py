@@ -22,21 +22,20 @@ SPELLINGS = parse_table(
 )
 """The longest match from the left wins. ARPAbet, lower case; an empty value is a silent letter."""
 LONG_VOWELS = {"a": "ey", "e": "iy", "i": "ay", "o": "ow", "u": "uw"}
-ACCENTS = re.compile("[\u0300-\u036f]")
-"""The accents of Latin letters; the marks of other scripts are sounds."""
+ACCENTS = re.compile("[\u0300-\u036f]")  # the accents of Latin letters; the marks of other scripts are sounds
 _LONGEST = max(map(len, SPELLINGS))
-_SILENT_E = re.compile(r"e'?s?")
-"""A silent e, with or without an s, at the end of a word."""
-_LONG_VOWEL = re.compile(r"[aeiou][bcdfgklmnpstvz]e('?s)?$")
-"""A long vowel: vowel, consonant, final e."""
+_SILENT_E = re.compile(r"e'?s?")  # a silent e, with or without an s, at the end of a word
+_LONG_VOWEL = re.compile(r"[aeiou][bcdfgklmnpstvz]e('?s)?$")  # a long vowel: vowel, consonant, final e
 
 
-MAX_MARKS = 30
-"""Largest number of accents on one letter; no language has so many."""
+MAX_MARKS = 30  # largest number of accents on one letter; no language has so many
 APOSTROPHES = re.compile("[’‘ʼʻ′´`‛ʹ＇]")
 UNSPOKEN = re.compile("\u00ad\\s*\n\\s*|[™®©]")
 """A soft hyphen at the end of a line, and signs that Unicode's NFKC makes letters of."""
 DASHES = str.maketrans({"‐": "-", "‒": "-", "²": " squared", "³": " cubed", "″": '"'})
+POWERS = re.compile("(?<=\\d)[⁰¹²³⁴-⁹]+")
+NOTES = re.compile("(?:(?<=[^\\W\\d_]{4})|(?<=[.,;:!?”’)]))[¹²³⁴-⁹][⁰¹²³⁴-⁹]*")
+"""What is raised: powers (``10⁵``), and the numbers of notes, which are not said."""
 PLAIN = str.maketrans({"ß": "ss", "æ": "ae", "œ": "oe", "ø": "o", "đ": "d", "ð": "th", "þ": "th", "ł": "l", "ı": "i"})
 """Letters of Latin alphabets that Unicode does not divide into a letter and an accent."""
 
@@ -48,6 +47,7 @@ def convert_to_plain(text: str) -> str:
         if marks:  # at most so many on a letter, as Unicode Standard Annex 15: they are sorted in quadratic time
             text = re.sub(f"([{marks}]{{{MAX_MARKS}}})[{marks}]+", r"\1", text)
         text = re.sub(r"(?<=\d)(?=[¼-¾⅐-⅞])", " ", UNSPOKEN.sub("", APOSTROPHES.sub("'", text)))
+        text = POWERS.sub(lambda power: f"^{unicodedata.normalize('NFKC', power[0])}", NOTES.sub("", text))
         text = unicodedata.normalize("NFKC", text.translate(DASHES)).translate(DASHES)
         text = "".join(letter for letter in text if unicodedata.category(letter) != "Cf")
         text = re.sub(r"\d", lambda digit: str(int(digit[0])), text)
@@ -72,10 +72,8 @@ def guess_pronunciation(word: str) -> tuple[str, ...]:
     plain = remove_accents(word)
     foreign = sorted(letter for letter in set(word) if re.search(r"[^a-z']", remove_accents(letter)))
     if foreign or not plain.strip("'"):
-        raise InputError(
-            f"cannot guess how {shorten(word)!r} is said ({shorten(' '.join(foreign)) or 'no letters'}): "
-            "give the language of the words (--language), or add it to a lexicon file"
-        )
+        what = f"cannot guess how {shorten(word)!r} is said ({shorten(' '.join(foreign)) or 'no letters'}):"
+        raise InputError(f"{what} give the language of the words (--language), or add it to a lexicon file")
     phones: list[str] = []
     letters = re.sub(r"([b-df-hj-np-tv-z])\1+", r"\1", plain)  # doubled consonants sound once
     at = 0

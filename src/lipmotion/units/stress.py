@@ -11,8 +11,7 @@ from lipmotion.units.phones import FULL_FORMS, is_silent, list_phone_classes
 
 REDUCED = frozenset(FULL_FORMS)
 """Vowels, and consonants in the place of a vowel, that are not stressed in a word with a full vowel."""
-NUCLEI = list_phone_classes()["vowel"] | REDUCED
-"""The phones that make a syllable."""
+NUCLEI = list_phone_classes()["vowel"] | REDUCED  # the phones that make a syllable
 UNSTRESSED_WORDS = WEAK_WORDS | frozenset(
     "am are as at be been by can could did do does had has have he him his i me my or our shall she should so some "
     "them they to us we will with would you".split()

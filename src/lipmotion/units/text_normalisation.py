@@ -10,33 +10,34 @@ from functools import cache
 
 from lipmotion.errors import AlignmentError, InputError, shorten
 from lipmotion.units.lexicon import SOUNDED, expand_lengthened, list_entries
-from lipmotion.units.spelling import convert_to_plain, normalise_text
+from lipmotion.units.spelling import ACCENTS, convert_to_plain, normalise_text
 from lipmotion.units.written_forms import FORMS, NUMERIC, WORD, list_readings
 
 CHINESE = "[\u3400-\u4dbf\u4e00-\u9fff]"
-INITIALS = re.compile("[A-Z]{2,5}s?")
-"""What may be letters that are said one by one."""
+INITIALS = re.compile("[A-Z]{2,5}s?")  # what may be letters that are said one by one
 RANGE = re.compile(
-    r"(?:(?<=\d[ap]m)|(?<=\d [ap]m)|(?<=:\d\d)|(?<=\d%)|(?<=\d(?:st|nd|rd|th)))\s?[-–]\s?(?=\d)"
+    r"(?:(?<=\d[ap]m)|(?<=\d [ap]m)|(?<=\d [ap]\.m\.)|(?<=:\d\d)|(?<=\d%)|(?<=\d(?:st|nd|rd|th)))\s?[-–]\s?(?=\d)"
     r"|(?<=\d)-(?=\d{1,2}\s?[ap]m\b)|(?<=\d)(?:-|\s?–\s?)(?=[$£€]\d)",
     re.IGNORECASE,
 )
 """The dash of ``9am-5pm``, ``5:00-6:30``, ``5%-10%``, ``$5-$10`` and ``1st-3rd``."""
+COMMA = re.compile(r"(?<![\d.,])(\d+(?:\.\d{3})*),(\d\d?)(?=\s?(?:[€%°]|(?:km|kg|cm|mm|m|g|l|h)\b))")
+EUROS = re.compile(r"(?<=€)\s?(\d+(?:\.\d{3})*),(\d\d)(?!\d)")
+"""Numbers with a decimal comma, where their unit says so: ``1,5 km``, ``€1.234,56``."""
 CURRENCY = re.compile(r"(?<=\d) ?(?:USD|EUR|GBP)\b|\b(?:USD|EUR|GBP) ?(?=\d)")
 GROUPED = re.compile(
-    r"(?<![\w.,])(?<!\d )[1-9](?:\d{0,2}(?:(?:'\d{3})+|(?: \d{3})* 000)|\d?(?: \d{3}){2,})(?![\d']| \d)"
+    r"(?<![\w.,])(?<!\d )[1-9](?:\d{0,2}(?:(?:'\d{3})+|(?:\.\d{3}){2,}|(?: \d{3})* 000)|\d?(?: \d{3}){2,})"
+    r"(?![\d']| \d|\.\d)"
 )
-"""Numbers whose thousands are parted by blanks or apostrophes: ``1 000 000``, ``1'000'000``."""
+"""Numbers whose thousands are parted by blanks, points or apostrophes: ``1 000 000``, ``1'000'000``."""
 SMILEY = re.compile(r"(?<!\w)(?:[:;=8][-o']?[)(\]DPpO3|/\\]+|<3+|[xX]D+|\^_+\^|[tT]_[tT])(?!\w)")
 REFERENCE = re.compile(r"&(?:[a-zA-Z]{2,8}|#\d{1,6}|#x[\da-fA-F]{1,5});")
 CHARACTERS_PER_S = 200
 """Most characters a second: three times the fastest speech on record (655 words a minute), blanks and punctuation."""
 ALWAYS_ALLOWED_CHARACTERS = 10_000
 """Characters that a text may always have, as notes and blank lines beside the words of a short recording."""
-LARGEST_TRANSCRIPT_BYTES = 1 << 22
-"""Most bytes of a transcript file: three days of speech."""
-PHONES_PER_S = 100
-"""Most phones a second: with more, a phone has less than one frame of 10 ms on average."""
+LARGEST_TRANSCRIPT_BYTES = 1 << 22  # most bytes of a transcript file: three days of speech
+PHONES_PER_S = 100  # most phones a second: with more, a phone has less than one frame of 10 ms on average
 ALWAYS_ALLOWED_PHONES = 1000
 """Phones that a list may always have; if they are those of another recording, a warning is enough."""
 
@@ -66,7 +67,10 @@ def tokenise(text: str) -> tuple[str, ...]:
     """
     text = SMILEY.sub(" ", REFERENCE.sub(lambda match: html.unescape(match[0]), text))
     text = re.sub(r"\bWW(?=II?\b)", "World War ", re.sub("№ ?", "No. ", text))
-    plain = re.sub(r"\bUS(?=\$)", "", RANGE.sub("–", convert_to_plain(text)))
+    plain = re.sub(r"\b(?:[AC]|US|CA|AU|NZ|HK)(?=\$)", "", RANGE.sub("–", ACCENTS.sub("", convert_to_plain(text))))
+    plain = re.sub(r"([$£€])-(?=\d)", r"-\1", plain)
+    for form in (COMMA, EUROS):
+        plain = form.sub(lambda number: f"{number[1].replace('.', '')}.{number[2]}", plain)
     plain = CURRENCY.sub(lambda match: {"U": "$", "E": "€", "G": "£"}[match[0].strip()[0]], plain)
     plain = GROUPED.sub(lambda match: re.sub(r"\D", ",", match[0]), plain)
     shouted = not any(letter.islower() for letter in plain)
@@ -84,8 +88,8 @@ def _scanner() -> re.Pattern[str]:
     word = rf"{WORD}(?=[,;!?]|\s+(?-i:[a-z])|\s*\Z)"  # most are words and no more; the rest takes a tenfold time
     forms = [rf"(?:{form})(?:'s)?(?![^\W_])" for form, _ in FORMS[:-1]]  # initials are words
     numeric, worded = ("|".join(part) for part in (forms[: len(NUMERIC)], forms[len(NUMERIC) :]))
-    signs = r"(?<!\w)w/o?(?=[\s.,;!?]|\Z)|[&@×÷]|[+=](?![+=])(?<![+=]{2})|#(?=\w)|[~≈±](?=\d)"
-    dashes = r"(?<![^\s(])-(?=[.$£€]?\d)|−(?=\d)|(?<=[mdht\d%])–(?=[$£€]?\d)"
+    signs = r"(?<!\w)w/o?(?=[\s.,;!?]|\Z)|[&@×÷≥≤≠]|[+=](?![+=])(?<![+=]{2})|#(?=\w)|[~≈±](?=\d)"
+    dashes = r"(?<![^\s(])-(?=[.$£€]?\d)|−(?=\d)|(?<=[mdht\d%.])–(?=[$£€]?\d)"
     begun = rf"(?<![^\W_])(?:{word}|(?=[^\W\d_])(?:{worded})|(?![\s,;!?])(?:{numeric}))"
     grouped = "|".join([begun, signs, dashes, WORD, r"\d+(?:\.\d+)*"])
     return re.compile(re.sub(r"(?<!\\)\((?!\?)", "(?:", grouped), re.IGNORECASE)
@@ -118,33 +122,26 @@ def check_text(text: str, duration_s: float) -> None:
     """Raise AlignmentError for a text that nobody can say within this duration."""
     allowed = ALWAYS_ALLOWED_CHARACTERS + int(CHARACTERS_PER_S * duration_s)
     if len(text) > allowed:
-        raise AlignmentError(
-            f"the transcript has {len(text)} characters, required at most {allowed} for {duration_s:.2f} s of sound: "
-            "nobody says so much; give the words of this recording"
-        )
+        what = f"the transcript has {len(text)} characters, required at most {allowed} for {duration_s:.2f} s of sound:"
+        raise AlignmentError(f"{what} nobody says so much; give the words of this recording")
 
 
 def check_phones(count: int, duration_s: float) -> None:
     """Raise InputError for more phones in time than there are frames in this duration."""
     allowed = ALWAYS_ALLOWED_PHONES + int(PHONES_PER_S * duration_s)
     if count > allowed:
-        raise InputError(
-            f"{count} units in time, required at most {allowed} for {duration_s:.2f} s of sound; give those of this "
-            "recording"
-        )
+        what = f"{count} units in time, required at most {allowed} for {duration_s:.2f} s of sound;"
+        raise InputError(f"{what} give those of this recording")
 
 
-MAX_CHARACTERS = 50_000
-"""Most characters of a text: about an hour of speech."""
-LONGEST_SENTENCE = 400
-"""A longer sentence is divided at a comma, else between words; in characters."""
+MAX_CHARACTERS = 50_000  # most characters of a text: about an hour of speech
+LONGEST_SENTENCE = 400  # a longer sentence is divided at a comma, else between words; in characters
 LONGEST_WORD = 200
 """Most characters without a blank in scripts that have blanks; a longer one is no word, but would take minutes."""
-ABBREVIATIONS = (
-    "mr mrs ms dr prof st jr sr vs etc no vol fig inc ltd co gen col capt lt sgt rev hon e.g i.e a.m p.m approx"
+_ABBREVIATED = frozenset(
+    "mr mrs ms dr prof st jr sr vs etc no vol fig inc ltd co gen col capt lt sgt rev hon e.g i.e a.m p.m approx".split()
 )
 """What ends in a full stop that does not end a sentence, without its last stop."""
-_ABBREVIATED = frozenset(ABBREVIATIONS.split())
 _END = re.compile(r"""(?:[.!?…]+["')\]”’»]*(?=\s)|[。！？]+["')\]”’»」』]*)\s*""")
 _BREAK = re.compile(r"[,;:–—、，；：]\s*|\s-+\s")
 
@@ -166,17 +163,13 @@ def split_sentences(text: str) -> list[str]:
     ['Dr. Smith said: wait!', 'Then he left...']
     """
     if len(text) > MAX_CHARACTERS:
-        raise InputError(
-            f"the text has {len(text)} characters, required at most {MAX_CHARACTERS}, about an hour of speech; "
-            "speak it in parts"
-        )
+        what = f"the text has {len(text)} characters, required at most {MAX_CHARACTERS}, about an hour of speech;"
+        raise InputError(f"{what} speak it in parts")
     plain = clean_text(text)
     longest = max(plain.split(), key=len, default="")
     if len(longest) > LONGEST_WORD and longest.isascii():
-        raise InputError(
-            f"a word of {len(longest)} characters ({shorten(longest)!r}), required at most {LONGEST_WORD}; "
-            "write words with blanks between them"
-        )
+        what = f"a word of {len(longest)} characters ({shorten(longest)!r}), required at most {LONGEST_WORD};"
+        raise InputError(f"{what} write words with blanks between them")
     parts = []
     for sentence in _divide(plain):
         rest = sentence

@@ -22,20 +22,10 @@ from typing import NamedTuple
 from lipmotion.errors import InputError, shorten
 from lipmotion.storage.sources import read_text_file
 from lipmotion.types import Unit
-from lipmotion.units.phones import (
-    PAUSE,
-    PHONES,
-    SILENCE,
-    VISEME_OF,
-    describe_unknown_phone,
-    is_silent,
-    list_phone_classes,
-)
+from lipmotion.units.phones import PHONES, SILENCE, VISEME_OF, describe_unknown_phone, is_silent, list_phone_classes
 
-LARGEST_TABLE_BYTES = 1 << 18
-"""The most bytes of a table file; one of 47 phones has a few hundred."""
-CLOSED_UNIT = "closed"
-"""Name of the only unit that may hold silence and speech."""
+LARGEST_TABLE_BYTES = 1 << 18  # the most bytes of a table file; one of 47 phones has a few hundred
+CLOSED_UNIT = "closed"  # name of the only unit that may hold silence and speech
 
 
 @dataclass(frozen=True)
@@ -96,9 +86,8 @@ class UnitSet:
         if label.phone:
             return self.unit(label.phone)
         if label.unit not in self.units:
-            raise InputError(
-                f"unknown unit {label.unit!r} without a phone; give a phone, or one of {' '.join(self.units)}"
-            )
+            what = f"unknown unit {label.unit!r} without a phone; give a phone,"
+            raise InputError(f"{what} or one of {' '.join(self.units)}")
         return label.unit
 
     def label(self, unit: str) -> Unit:
@@ -169,10 +158,8 @@ def _mix(of: Mapping[str, str]) -> list[str]:
     return sorted((silent & spoken) - {CLOSED_UNIT})
 
 
-_ADVICE = (
-    "unit {!r} holds silence and speech; give sil and sp a unit without other phones, or call this one "
-    f"{CLOSED_UNIT!r}: silence is then a closed mouth"
-)
+_ADVICE = f"""unit {{!r}} holds silence and speech; give sil and sp a unit without other phones, or call this one \
+{CLOSED_UNIT!r}: silence is then a closed mouth"""
 
 
 class UnitGroup(NamedTuple):
@@ -199,64 +186,40 @@ GROUPS: dict[str, tuple[UnitGroup, ...]] = {
     "sVis": _list_groups(
         "front; iy ih ix eh ey ax axr er; not low, not back: jaw half shut, lips spread or slack",
         "low; aa ae ah aw ay; low: the jaw drops; diphthongs stand where they begin, for that part is longer",
-        "back; ao ow oy uh uw; back, not low: the vowels that round the lips",
-        _BILABIAL,
-        _LABIODENTAL,
+        "back; ao ow oy uh uw; back, not low: the vowels that round the lips", _BILABIAL, _LABIODENTAL,
         "other; ch d dh el en g hh jh k l n ng r s sh t th w y z zh; all other consonants: lips hardly "
-        "needed; w rounds them, but does not shut them",
-        _SILENCE,
+        "needed; w rounds them, but does not shut them", _SILENCE,
     ),
     "pbVis": _list_groups(
         "AI; aa ae ah aw ay; wide open: a as in father, i as in ice",
         "E; eh ey iy ih ix ax er axr; open and spread: e as in let and in see, and the slack vowels near them",
-        "O; ao ow oy; round and open",
-        "U; uh uw; round and nearly shut",
-        "WQ; w; puckered tightly; q is written k w here",
-        "MBP; p b m em; the lips meet",
-        "FV; f v; the lower lip is at the upper teeth",
-        "L; l el; the tongue shows behind the upper teeth",
+        "O; ao ow oy; round and open", "U; uh uw; round and nearly shut",
+        "WQ; w; puckered tightly; q is written k w here", "MBP; p b m em; the lips meet",
+        "FV; f v; the lower lip is at the upper teeth", "L; l el; the tongue shows behind the upper teeth",
         "etc; ch d dh en g hh jh k n ng r s sh t th y z zh; teeth together: his C D G K N R S TH Y Z and "
-        "those made like them",
-        "rest; sil sp; lips together and relaxed",
+        "those made like them", "rest; sil sp; lips together and relaxed",
     ),
     "eVis": _list_groups(
-        "aw; aw; diphthong: open, then rounding",
-        "ay; ay; diphthong: open, then spreading",
-        "ey; ey; diphthong: half open, then spreading",
-        "ow; ow; diphthong: rounded, then narrower",
-        "oy; oy; diphthong: rounded, then spreading",
-        "high; iy ih ix; high front vowels: jaw nearly shut, lips spread",
+        "aw; aw; diphthong: open, then rounding", "ay; ay; diphthong: open, then spreading",
+        "ey; ey; diphthong: half open, then spreading", "ow; ow; diphthong: rounded, then narrower",
+        "oy; oy; diphthong: rounded, then spreading", "high; iy ih ix; high front vowels: jaw nearly shut, lips spread",
         "mid; eh ax axr er; mid vowels, front and central: jaw half shut, lips slack",
-        "low; aa ae ah; low vowels: the jaw drops",
-        "back; ao uh uw; back vowels: lips rounded",
-        _BILABIAL,
-        _LABIODENTAL,
-        "dental; th dh; the tongue's tip at or between the teeth: the jaw stays a little open for it",
+        "low; aa ae ah; low vowels: the jaw drops", "back; ao uh uw; back vowels: lips rounded", _BILABIAL,
+        _LABIODENTAL, "dental; th dh; the tongue's tip at or between the teeth: the jaw stays a little open for it",
         "alveolar; t d n en; the tongue at the gum, lips free to do what the neighbours want",
-        "sibilant; s z; teeth together",
-        "palatal; sh zh ch jh; teeth together, lips pushed forward",
+        "sibilant; s z; teeth together", "palatal; sh zh ch jh; teeth together, lips pushed forward",
         "hidden; k g ng hh; made at the back: nothing of it shows, the neighbours decide",
-        "glide; l el y; the tongue raised, lips not rounded",
-        "rounded; w r; lips rounded or pushed forward",
-        _SILENCE,
+        "glide; l el y; the tongue raised, lips not rounded", "rounded; w r; lips rounded or pushed forward", _SILENCE,
     ),
     "phone": tuple(UnitGroup(phone, phone, "itself") for phone in PHONES),
-}
-_UNCOUNTED = {"sVis": "silence", "pbVis": "rest", "phone": PAUSE}
-"""Units that the paper's count leaves out."""
+}  # fmt: skip
+_UNCOUNTED = {"sVis": "silence", "pbVis": "rest", "phone": "sp"}  # units that the paper's count leaves out
 
 
-UNIT_SETS: dict[str, UnitSet] = {
-    name: UnitSet(
-        name,
-        {phone: group.unit for group in groups for phone in group.phones.split()},
-        frozenset([_UNCOUNTED[name]] if name in _UNCOUNTED else []),
-    )
-    for name, groups in GROUPS.items()
-}
+_UNITS_OF = {name: {p: group.unit for group in groups for p in group.phones.split()} for name, groups in GROUPS.items()}
+UNIT_SETS = {name: UnitSet(name, of, frozenset(_UNCOUNTED.get(name, "").split())) for name, of in _UNITS_OF.items()}
 """The unit sets in the order of the paper's Table 1, except sVis, which is placed by its size."""
-VISEME_SET = UnitSet("viseme", VISEME_OF)
-"""The 13 visemes of Xie & Liu 2007, Table 1; not one of the five."""
+VISEME_SET = UnitSet("viseme", VISEME_OF)  # the 13 visemes of Xie & Liu 2007, Table 1; not one of the five
 
 
 def load_unit_set(name_or_path: str | Path) -> UnitSet:
@@ -268,8 +231,6 @@ def load_unit_set(name_or_path: str | Path) -> UnitSet:
     if str(name_or_path) in known:
         return known[str(name_or_path)]
     if not os.path.exists(name_or_path):  # noqa: PTH110 - False, not an error, for a name that no file can have
-        raise InputError(
-            f"no unit set {str(name_or_path)!r}; there are: {', '.join(known)}; or give a table file, "
-            "a unit and its phones a line"
-        )
+        what = f"no unit set {str(name_or_path)!r}; there are: {', '.join(known)}; or give a table file,"
+        raise InputError(f"{what} a unit and its phones a line")
     return read_unit_table(Path(name_or_path))

@@ -14,8 +14,7 @@ from lipmotion.units.spelling import parse_table
 Reading = tuple[str, ...]
 Forms = tuple[tuple[str, str | Callable[[str], Iterator[str]]], ...]
 
-MAX_READINGS = 8
-"""Most readings of a form: alignment tries each."""
+MAX_READINGS = 8  # most readings of a form: alignment tries each
 ONES = (
     "zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen "
     "seventeen eighteen nineteen"
@@ -23,8 +22,7 @@ ONES = (
 TENS = "_ _ twenty thirty forty fifty sixty seventy eighty ninety".split()
 SCALES = ((10**9, "billion"), (10**6, "million"), (1000, "thousand"), (100, "hundred"))
 MONTHS = "january february march april may june july august september october november december".split()
-
-
+_MONTHS = {name[:3]: name for name in MONTHS}
 ORDINALS = parse_table("one=first two=second three=third five=fifth eight=eighth nine=ninth twelve=twelfth")
 """The ordinals that do not end in ``th`` after the cardinal."""
 CURRENCIES = parse_table(
@@ -50,11 +48,11 @@ ABBREVIATIONS = parse_table(
     "jr=junior sr=senior vs=versus|v_s etc=et_cetera e.g=for_example|e_g i.e=that_is|i_e a.k.a=a_k_a|also_known_as "
     "approx=approximately dept=department ave=avenue blvd=boulevard inc=inc|incorporated ltd=limited st=street|saint "
     "corp=corporation|corp jan=january|jan feb=february aug=august sept=september oct=october nov=november "
-    "dec=december tues=tuesday thurs=thursday"
+    "dec=december mon=monday tues=tuesday thurs=thursday fri=friday ph.d=p_h_d"
 )
 """Without the full stop; those with a capital stand before a name."""
 SIGNS = parse_table(
-    "±=plus_or_minus ≈=about "
+    "±=plus_or_minus ≈=about ≥=at_least ≤=at_most ≠=is_not "
     "&=and @=at +=plus|and ×=times|by ÷=divided_by #=hashtag|number|hash ~=about -=minus|negative −=minus|negative "
     "–=to w/=with w/o=without .=dot /=slash _=underscore :=colon"
 ) | {"=": "equals"}
@@ -186,7 +184,7 @@ def _hour(digits: str, later: int = 0) -> str:
 
 
 def _roman(numeral: str) -> str:
-    values = [{"I": 1, "V": 5, "X": 10}[letter] for letter in numeral.upper()]
+    values = [{"I": 1, "V": 5, "X": 10, "L": 50}[letter] for letter in numeral.upper()]
     return str(sum(-one if one < after else one for one, after in zip(values, [*values[1:], 0], strict=True)))
 
 
@@ -234,24 +232,14 @@ def _stutter(text: str) -> Iterator[str]:
 
 
 SAID: dict[str, Callable[[str], str]] = {
-    "": _usual,
-    "w": str.lower,
+    **{"": _usual, "w": str.lower, "c": _plain, "o": _ordinal, "p": _pair, "n": _minutes, "t": _hour},
     "i": lambda amount: _cardinal(amount) if re.fullmatch(NUMBER, amount) else _usual(amount),
-    "c": _plain,
-    "o": _ordinal,
-    "p": _pair,
     "y": lambda digits: _usual(digits if len(digits) == 4 else f"{'19' if int(digits) > 50 else '20'}{digits}"),
-    "m": lambda text: (
-        MONTHS[int(text) - 1]
-        if text.isdecimal()
-        else next(name for name in MONTHS if name.startswith(text[:3].lower()))
-    ),
+    "m": lambda text: MONTHS[int(text) - 1] if text.isdecimal() else _MONTHS[text[:3].lower()],
     "q": lambda digits: "quarter" if digits == "4" else _ordinal(digits),
-    "n": _minutes,
     "N": lambda digits: _minutes(digits).replace("quarter", "a quarter"),
     "l": lambda digits: _minutes(str(60 - int(digits))),
     "L": lambda digits: _minutes(str(60 - int(digits))).replace("quarter", "a quarter"),
-    "t": _hour,
     "f": lambda digits: _hour(digits, 1),
     "e": lambda amount: _cardinal(_thousands(amount)),
     "k": lambda amount: _hundreds(_thousands(amount)),
@@ -263,14 +251,14 @@ SAID: dict[str, Callable[[str], str]] = {
     "v": lambda unit: _COUNTED.sub(_singular, f"one {UNITS[unit.lower()]}").removeprefix("one "),
     "r": lambda numeral: _cardinal(_roman(numeral)),
     "R": lambda numeral: _ordinal(_roman(numeral)),
+    "a": lambda name: {"fig": "figure", "vol": "volume", "p": "page", "pp": "pages"}[name.lower()],
     "d": lambda digits: re.sub("ys$", "ies", f"{_usual(digits)}s"),
     "g": lambda scale: "celsius" if scale in "cC" else "fahrenheit",
 }
 """What the ways of templates make of a part."""
 NUMBER = r"(?:\d{1,3}(?:,\d{3})+(?!\d)|\d+)"
 A = rf"(?:{NUMBER}(?:\.\d+)?|\.\d+)"
-R = rf"({A}(?:\s?[-–]\s?{A})?)"
-"""An amount, and one or a range of them."""
+R = rf"({A}(?:\s?[-–]\s?{A})?)"  # an amount, and one or a range of them
 WORD = r"[^\W\d_]+(?:'[^\W\d_]+)*"
 _NAME = "|".join(f"{name[:3].title()}(?:{name[3:]})?" for name in MONTHS).replace("Sep", "Sep(?:t(?!e))?")
 MONTH, MM, DD = rf"(?-i:({_NAME})\.?)", "(0?[1-9]|1[0-2])", r"(0?[1-9]|[12]\d|3[01])"
@@ -278,13 +266,14 @@ UNIT = "|".join(sorted((re.escape(unit) for unit in UNITS if len(unit) > 1 and u
 S, OVER, PM = "([$£€¥₹₩])", "[/⁄]", r"\s?([ap])\.?m(?:\.|\b)"
 DOMAIN = "(?:com|org|net|edu|gov|io|uk|de|ai|tv)"
 PARTED = "([3-9]|12|16|20|32|64)"
-NUMERAL = "(X{0,3}(?:IX|IV|V?I{0,3}))"
+NUMERAL = "((?:XL|L?X{0,3})(?:IX|IV|V?I{0,3}))"
 TITLE = "|".join(name for name in ABBREVIATIONS if name[0].isupper())
 _NAMES = {each.split()[0] for each in UNITS.values()} | set(" ".join(CURRENCIES.values()).split())
 _COUNTED: re.Pattern[str] = re.compile(rf"((?:^|\band )one )({'|'.join(sorted(_NAMES))})\b")
 NUMERIC: Forms = (
     (r"(?:\+\d{1,3}[ .-]?|1[-.])?(?:\(\d{3}\)[ -]?|\d{3}[-.])?\d{3}-\d{4}|\d{3}\.\d{3}\.\d{4}|\+\d{7,14}", _telephone),
-    (rf"(\d{{4}})-{MM}-{DD}", "{2:m} {3:o} {1}|the {3:o} of {2:m} {1}|{2:m} {3:c} {1}|{2:m} {3:o} {1:*}"),
+    (r"0\d{2,4}(?: \d{3,4}){2}", _telephone),
+    (rf"(\d{{4}})[-/]{MM}[-/]{DD}", "{2:m} {3:o} {1}|the {3:o} of {2:m} {1}|{2:m} {3:c} {1}|{2:m} {3:o} {1:*}"),
     (r"\+\d{1,3}(?:[ .-]\(?\d{1,4}\)?){2,5}|\d+(?:-\d+){2,5}", _telephone),
     (
         rf"{MM}[/.]{MM}[/.](\d{{4}}|\d\d)",
@@ -352,7 +341,7 @@ NUMERIC: Forms = (
     (rf"({A})\s?[-–]\s?({A})", "{1} to {2}|{1} {2}|{1:*} to {2}|{1} to {2:*}|{1} through {2}|{1} minus {2}"),
     (rf"({A})k", "{1} k|{1} thousand|{1:k}"),
     (rf"({A})(b|bn)", "{1} billion|{1} b"),
-    (rf"({A})\s?[x×]\s?({A})", "{1} by {2}|{1} times {2}|{1} x {2}"),
+    (rf"({A})\s?[x×]\s?({A})(?!\^)", "{1} by {2}|{1} times {2}|{1} x {2}"),
     (rf"({A})x", "{1} times|{1} x"),
     (r"#(\d+)", "number {1}|hashtag {1}"),
     (rf"({NUMBER})\^2", "{1} squared|{1} to the second"),
@@ -366,13 +355,15 @@ FORMS: Forms = (
     (rf"[a-z][\w-]{{0,63}}(?:\.[\w-]{{1,63}}){{0,4}}\.{DOMAIN}\b(?:/[\w/.-]{{0,200}}\w)?", _address),
     (rf"{MONTH}\s{DD}(?:st|nd|rd|th)?(?!\s?[-–:.]?\d)", "{1:m} {2:o}|{1:m} {2:c}|{1:m} the {2:o}|the {2:o} of {1:m}"),
     (r"no\.\s?(\d+)", "number {1}|no {1}"),
+    (r"(fig|vol|pp?)\.\s?(\d+(?:[-–]\d+)?)", "{1:a} {2}"),
+    (r"(?-i:CO)2", "c o two"),
     (r"(?-i:St\. ([A-Z][a-z]+))", "saint {1:w}|street {1:w}"),
     (rf"(?-i:(?:{TITLE})\.)(?=\s+(?-i:[A-Z])|\Z)", lambda text: iter(ABBREVIATIONS[text[:-1]].split("|"))),
     (
         "(?:" + "|".join(re.escape(name) for name in ABBREVIATIONS if name.islower()) + r")\.",
         lambda text: iter(ABBREVIATIONS[text[:-1].lower()].split("|")),
     ),
-    (rf"(?-i:({PARTS}) (?=[IVX]){NUMERAL})", "{1:w} {2:r}|{1:w} the {2:R}|{1:w} {2:w}"),
+    (rf"(?-i:({PARTS}) (?=[IVXL]){NUMERAL})", "{1:w} {2:r}|{1:w} the {2:R}|{1:w} {2:w}"),
     (r"(?-i:([A-Z][a-z]+) ([VX]))", "{1:w} {2:w}|{1:w} the {2:R}|{1:w} {2:r}"),
     (rf"(?-i:([A-Z][a-z]+) (?=[IVX]{{2}}){NUMERAL})", "{1:w} the {2:R}|{1:w} {2:r}"),
     (r"(?:[a-z]\.){2,}[a-z]?", lambda text: iter([text.lower().replace(".", " ")])),

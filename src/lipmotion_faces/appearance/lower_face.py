@@ -1,6 +1,6 @@
 """The lower face: the part of a face that speech moves, from the nose to below the chin, and the mouth region in it.
 
-Pixels are those of the mouth region (``appearance.mouth_region``): a head that is upright and faces the camera, its
+Pixels are those of the mouth region (``motion.eigenlips``): a head that is upright and faces the camera, its
 outer eye corners 90 px apart. Footage of a large face has ``scale`` samples a pixel, along each side.
 """
 
@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import smooth_step
 from lipmotion.errors import InputError
-from lipmotion.motion import mouth_region
-from lipmotion.motion.mouth_region import EYE_DISTANCE_PX
+from lipmotion.motion.eigenlips import EYE_DISTANCE_PX, MOUTH_CORNER, MOUTH_HEIGHT, MOUTH_WIDTH
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -80,8 +79,8 @@ def choose_scale(face_to_frame: Array) -> int:
 
 def find_mouth_part(scale: int) -> tuple[slice, slice]:
     """Return the rows and columns of the mouth region in a picture of the lower face."""
-    left, top = (round((near - far) * scale) for near, far in zip(mouth_region.CORNER, CORNER, strict=True))
-    return slice(top, top + mouth_region.HEIGHT * scale), slice(left, left + mouth_region.WIDTH * scale)
+    left, top = (round((near - far) * scale) for near, far in zip(MOUTH_CORNER, CORNER, strict=True))
+    return slice(top, top + MOUTH_HEIGHT * scale), slice(left, left + MOUTH_WIDTH * scale)
 
 
 def mark_replaced(shape: FaceShape, scale: int) -> Mask:
@@ -95,19 +94,17 @@ def mark_replaced(shape: FaceShape, scale: int) -> Mask:
 
 def mark_mouth(scale: int) -> Mask:
     """Return the part in which the mouth is replaced, within the mouth region: bool array [shape=(H, W)]."""
-    middle = mouth_region.CORNER[1] + mouth_region.HEIGHT / 2
+    middle = MOUTH_CORNER[1] + MOUTH_HEIGHT / 2
     x, y = _list_positions(scale)
     return (x / MOUTH_AXES_PX[0]) ** 2 + ((y - middle) / MOUTH_AXES_PX[1]) ** 2 <= 1
 
 
 def measure_cheek_light(mouths: NDArray[Any]) -> Array:
     """Return the mean colours of the corners of mouth pictures [shape=(T, 3)]. Raises InputError: another size."""
-    scale = mouths.shape[1] // mouth_region.HEIGHT if mouths.ndim == 4 else 0
-    required = (mouth_region.HEIGHT * scale, mouth_region.WIDTH * scale, 3)
+    scale = mouths.shape[1] // MOUTH_HEIGHT if mouths.ndim == 4 else 0
+    required = (MOUTH_HEIGHT * scale, MOUTH_WIDTH * scale, 3)
     if not scale or mouths.shape[1:] != required:
-        raise InputError(
-            f"pictures of shape {mouths.shape}, required (T, {mouth_region.HEIGHT} · n, {mouth_region.WIDTH} · n, 3)"
-        )
+        raise InputError(f"pictures of shape {mouths.shape}, required (T, {MOUTH_HEIGHT} · n, {MOUTH_WIDTH} · n, 3)")
     width, height = CHEEK_PX[0] * scale, CHEEK_PX[1] * scale
     corners = [
         mouths[:, rows, columns].mean(axis=(1, 2), dtype=np.float64)

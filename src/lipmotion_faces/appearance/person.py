@@ -17,14 +17,14 @@ from lipmotion.errors import InputError
 from lipmotion.motion.eigenlips import (
     COLOURS,
     COMPONENTS,
+    MOUTH_HEIGHT,
+    MOUTH_WIDTH,
     Eigenlips,
     eigenlips_from_arrays,
     eigenlips_to_arrays,
     fit_eigenlips,
 )
 from lipmotion.motion.frame_labels import find_runs
-from lipmotion.motion.mouth_region import HEIGHT as MOUTH_HEIGHT
-from lipmotion.motion.mouth_region import WIDTH as MOUTH_WIDTH
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared, select_arrays
 from lipmotion.types import Channel, Motion

@@ -19,7 +19,7 @@ from lipmotion.corpora import UTTERANCES, Corpus, quantise, read_entry, write_ut
 from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
 from lipmotion.extensions import find_version
 from lipmotion.pipeline.workers import open_workers, process_count
-from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import confine, make_portable
 from lipmotion.storage.locks import lock_folder, remove_unfinished

@@ -12,8 +12,8 @@ from lipmotion.corpora import Corpus, read_entry
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.measures.curves import Array, correlation, refine_peak
 from lipmotion.motion.space import resample_to_model
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import WINDOW
+from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.storage.locks import lock_folder
 from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Utterance
 from lipmotion_faces.corpus.sound_offset import measure_opening_speed, predict_opening_speed

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT
+from lipmotion.motion.eigenlips import EYE_DISTANCE_PX, MOUTH_CORNER, MOUTH_HEIGHT
 from lipmotion.stats.pca import choose_evenly
 from lipmotion_faces.appearance import looping, lower_face
 from lipmotion_faces.appearance.person import Appearance
@@ -84,7 +84,7 @@ class BackgroundSequence:
 
     def enlarge(self, zoom: float) -> BackgroundSequence:
         """Return the same background, on which a mouth is ``zoom`` times as large, in the same place."""
-        middle = np.array([0.0, CORNER[1] + HEIGHT / 2])
+        middle = np.array([0.0, MOUTH_CORNER[1] + MOUTH_HEIGHT / 2])
         maps = self.face_to_frame.copy()
         maps[:, :, 2] += maps[:, :, :2] @ middle * (1 - zoom)
         maps[:, :, :2] *= zoom

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT, WIDTH
+from lipmotion.motion.eigenlips import EYE_DISTANCE_PX, MOUTH_CORNER, MOUTH_HEIGHT, MOUTH_WIDTH
 from lipmotion_faces.appearance.lower_face import map_region
 from lipmotion_faces.tracking import trackers
 from lipmotion_faces.tracking.packages import import_opencv
@@ -113,13 +113,13 @@ def crop_mouth(image: NDArray[np.uint8], to_image: Array) -> NDArray[np.uint8]:
     shrink = max(1, int(np.sqrt(abs(np.linalg.det(to_image[:, :2]))) + 1e-9))
     crop: NDArray[np.uint8] = cv2.warpAffine(
         image,
-        map_region(to_image, shrink, CORNER),
-        (WIDTH * shrink, HEIGHT * shrink),
+        map_region(to_image, shrink, MOUTH_CORNER),
+        (MOUTH_WIDTH * shrink, MOUTH_HEIGHT * shrink),
         flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
         borderMode=cv2.BORDER_REPLICATE,
     )
     if shrink > 1:  # a large face is sampled finely and averaged: no pixel of it is skipped
-        crop = cv2.resize(crop, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
+        crop = cv2.resize(crop, (MOUTH_WIDTH, MOUTH_HEIGHT), interpolation=cv2.INTER_AREA)
     return crop
 
 

@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX
+from lipmotion.motion.eigenlips import EYE_DISTANCE_PX, MOUTH_CORNER
 from lipmotion_faces.appearance.lower_face import map_region
 from lipmotion_faces.tracking.packages import import_opencv
 from lipmotion_faces.tracking.track import Footage, decode_footage
@@ -50,7 +50,7 @@ LONGEST_STEP = 0.2
 """A registration that finds a longer step, in eye distances, is not believed."""
 FLAT_LEVELS = 0.1
 """A region with a smaller standard deviation, in grey levels, has no texture to register."""
-MOUTH = np.array([0.0, CORNER[1] + 28.0])
+MOUTH = np.array([0.0, MOUTH_CORNER[1] + 28.0])
 """The middle of the mouth region, px."""
 
 

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output, pick_part
-from lipmotion.cli.terminal.progress import print_line, print_lines
+from lipmotion.cli.terminal.printing import print_line, print_lines
 from lipmotion.errors import InputError, shorten
 from lipmotion.pipeline.request import Outputs
 from lipmotion.types.values import parse_number

@@ -6,7 +6,7 @@ import argparse
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output
 from lipmotion.cli.arguments.options import add_machine_readable, add_workers, list_or_all
-from lipmotion.cli.terminal.progress import print_error, print_json, print_line
+from lipmotion.cli.terminal.printing import print_error, print_json, print_line
 from lipmotion.pipeline.request import Request
 
 LINES = 12

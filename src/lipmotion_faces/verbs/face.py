@@ -6,7 +6,7 @@ import argparse
 
 from lipmotion.cli.arguments.declared import add_input, add_output
 from lipmotion.cli.arguments.options import add_execution
-from lipmotion.cli.terminal.progress import print_line
+from lipmotion.cli.terminal.printing import print_line
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -24,6 +25,7 @@ from lipmotion.pipeline.training.channels import with_visual_channels
 from lipmotion.pipeline.training.train import label_phones
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.types import GREY, Monitor, Speech, Timeline, Unit, Utterance, silent_monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon, is_silent
 
@@ -66,6 +68,11 @@ class HeldOutRecordings:
         conditions = {name: phones[:count] for name, phones in self.conditions.items()}
         parts = {name: getattr(self, name)[:count] for name in ("utterances", "reference", "recognitions")}
         return replace(self, conditions=conditions, **parts)
+
+    @cached_property
+    def sounds(self) -> Sequence[AnalysedAudio]:
+        """The sound of every utterance, which is analysed once for all systems."""
+        return [analysed(utterance.audio, utterance.features) for utterance in self.utterances]
 
     @property
     def eigenlips_channels(self) -> tuple[str, ...]:
@@ -169,8 +176,8 @@ def make_speech(
 ) -> list[Speech]:
     """Return the speech of all utterances under a condition, as ``animate`` gives it to the engine."""
     phones, speech = recordings.phones, []
-    spoken = zip(recordings.utterances, recordings.conditions[condition], recordings.recognitions, strict=True)
-    for utterance, units, recognition in spoken:
+    spoken = zip(recordings.sounds, recordings.conditions[condition], recordings.recognitions, strict=True)
+    for sound, units, recognition in spoken:
         used: list[Recognition] = []  # what was recognised, if the engine needs it
         if condition == AUDIO_ONLY:
 
@@ -178,10 +185,10 @@ def make_speech(
                 used.append(result)
                 return result
 
-            plain = recognise_speech(engine, learned, utterance.audio, utterance.features, phones, recognise)
+            plain = recognise_speech(engine, learned, sound, sound.mfcc(), phones, recognise)
         else:
-            plain = build_speech(engine, utterance.audio, utterance.features, units, phones.kind)
-        voiced = with_voice(phones.own, utterance.audio, plain, used[-1] if used else None)
+            plain = build_speech(engine, sound, sound.mfcc(), units, phones.kind)
+        voiced = with_voice(phones.own, sound, plain, used[-1] if used else None)
         speech.append(with_prior(recordings.prior, voiced))
     return speech
 

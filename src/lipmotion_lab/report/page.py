@@ -14,15 +14,14 @@ from PIL import Image
 from PIL.Image import Resampling
 
 from lipmotion.corpora import Corpus
-from lipmotion.motion.mouth_region import HEIGHT, WIDTH
+from lipmotion.motion.eigenlips import MOUTH_HEIGHT, MOUTH_WIDTH
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Audio, Channel, Monitor, Motion, Span, Timeline, Unit, with_progress
 from lipmotion_faces import Staging, stage_face
 from lipmotion_faces.video.mp4 import SOUND_HZ, write_mp4
 from lipmotion_lab.evaluation.evaluate import BILABIAL
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES, OPENING, ComparedClip, HeldOutRecordings
-from lipmotion_lab.report.charts import add_caption, draw_curve
-from lipmotion_lab.report.html import Html, build_page, element, joined
+from lipmotion_lab.report.html import Html, add_caption, build_page, draw_curve, element, joined
 from lipmotion_lab.report.section import Section, write_text
 
 FPS = 25.0
@@ -30,7 +29,7 @@ MOUTH_SCALE = 4
 """Mouth pictures of a corpus are enlarged by this factor."""
 STAGING = Staging(size=640, blinks=False, gaze=False, brows=False, head=False)
 """Only the mouth moves, so that nothing else differs between systems."""
-LOWER_FACE = (slice(340, 340 + MOUTH_SCALE * HEIGHT), slice(176, 176 + MOUTH_SCALE * WIDTH))
+LOWER_FACE = (slice(340, 340 + MOUTH_SCALE * MOUTH_HEIGHT), slice(176, 176 + MOUTH_SCALE * MOUTH_WIDTH))
 """The part of the drawn picture that is shown, as large as a filmed mouth."""
 DECIMALS = 5
 RECORDED = "recorded"

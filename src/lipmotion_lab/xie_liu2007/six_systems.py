@@ -16,7 +16,7 @@ from lipmotion.engines.coupled.chains.model import speech_observations
 from lipmotion.engines.coupled.conversion import convert
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledModel
-from lipmotion.errors import ExportError, InputError, MissingDependencyError
+from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.extensions import install_command
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.measures import curves
@@ -33,7 +33,6 @@ from lipmotion.types import GREY, Example, Monitor, Speech, Timeline, sub_monito
 from lipmotion_lab import runner
 from lipmotion_lab.evaluation import evaluate
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, OPENING, ComparedClip, HeldOutRecordings, generate_clips
-from lipmotion_lab.learning_curve import check_training_names, choose_sizes
 from lipmotion_lab.xie_liu2007 import systems
 
 CONVERGENCE_RECORDINGS, PREDICTED_RECORDINGS = 8, 6
@@ -54,10 +53,7 @@ def check_plot_folder(folder: Path) -> None:
         raise MissingDependencyError(
             f"pictures need matplotlib, which cannot be imported ({error}); {install_command('plots')}"
         ) from error
-    if not folder.parent.is_dir():
-        raise ExportError(f"{folder}: the folder {folder.parent} does not exist; create it first")
-    if folder.exists() and not folder.is_dir():
-        raise ExportError(f"{folder}: is a file; give a folder for the pictures")
+    make_folder(folder)
 
 
 def draw_plots(chains: systems.TrainedSystem, recordings: HeldOutRecordings, folder: Path) -> None:
@@ -68,7 +64,6 @@ def draw_plots(chains: systems.TrainedSystem, recordings: HeldOutRecordings, fol
     by_em = generate_clips(some, AUDIO_ONLY, chains.engine, chains.model)
     path_engine = CoupledEngine(replace(chains.engine.config, conversion="viterbi"))
     by_path = generate_clips(some, AUDIO_ONLY, path_engine, chains.model)
-    make_folder(folder)
 
     picture = Figure(figsize=(10, 4.2), layout="constrained")
     axes, clip = picture.subplots(), by_em[0]
@@ -176,8 +171,8 @@ def run_xieliu2007(  # noqa: PLR0913
     listed = tuple(order) if order is not None else runner.shuffle(corpus.required("train"), seed)
     chosen_on_val = any(systems.COMPARED_SYSTEMS[name].splits for name in names)
     held_out, validation = corpus.required(split), corpus.required("val") if chosen_on_val else ()
-    check_training_names(corpus, listed, (*held_out, *validation))
-    steps = choose_sizes(sizes if sizes is not None else [len(listed)], len(listed))
+    runner.check_training_names(corpus, listed, (*held_out, *validation))
+    steps = runner.choose_sizes(sizes if sizes is not None else [len(listed)], len(listed))
     setup = _TrainingSetup(corpus, held_out, validation, options, settings, work)
     if options.visual != EIGENLIPS:
         runner.check_opening(corpus, held_out)  # before the long work

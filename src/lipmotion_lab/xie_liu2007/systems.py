@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from itertools import chain
 from time import process_time
 from typing import Any
 
@@ -17,7 +18,7 @@ from lipmotion.engines.coupled.arrays import coupled_to_arrays
 from lipmotion.engines.coupled.chains.product import HMM, SYSTEMS, UNSEEN_LOSS
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
-from lipmotion.engines.coupled.training.coupled_training import grow_models
+from lipmotion.engines.coupled.training.coupled_training import THREADS, grow_models
 from lipmotion.errors import InputError
 from lipmotion.pipeline.training.channels import with_sound_inputs
 from lipmotion.types import Example, Monitor, silent_monitor
@@ -64,11 +65,12 @@ def find_best_trial(trials: Sequence[Trial]) -> Trial:
 
 
 def train_stages(
-    options: Options, examples: Sequence[Example], monitor: Monitor = silent_monitor
+    options: Options, examples: Sequence[Example], monitor: Monitor = silent_monitor, one: TrainedSystem | None = None
 ) -> Iterator[TrainedSystem]:
-    """Yield coupled chains with 1, 2, 4, … Gaussians a state, up to those of the options."""
-    config, count, begin_s = CoupledConfig(**options), 1, process_time()
-    for make_model in grow_models(examples, config, monitor):
+    """Yield coupled chains with 1, 2, 4, … Gaussians a state, up to those of the options; ``one``: after this first."""
+    config, count = CoupledConfig(**options), 2 if one else 1
+    begin_s = process_time() - (one.seconds if one else 0)
+    for make_model in grow_models(examples, config, monitor, THREADS, one.model if one else None):
         own = replace(config, mixtures=min(count, config.mixtures), visual_mixtures=min(count, config.visual_mixtures))
         model = make_model().model
         yield TrainedSystem(CoupledEngine(own), model, process_time() - begin_s)
@@ -218,7 +220,7 @@ def select_systems(names: Sequence[str] | None) -> list[str]:
     if unknown:
         raise InputError(f"no system {unknown[0]!r}; there are: {', '.join(COMPARED_SYSTEMS)}")
     chosen = [COMPARED_SYSTEMS[name] for name in names]
-    needed = {REFERENCE_SYSTEM} | {system.same_model_as for system in chosen}
+    needed = {REFERENCE_SYSTEM, *(each.same_model_as for each in chosen), *(name.removesuffix(SPLIT) for name in names)}
     return [name for name in COMPARED_SYSTEMS if name in {*names, *needed}]
 
 
@@ -254,10 +256,12 @@ def train_system(
         start_s, engine = process_time(), system.make()
         return TrainedSystem(engine, engine.fit(examples, monitor).model, process_time() - start_s)
     if system.splits and validation is not None:
-        candidates: list[tuple[Trial, TrainedSystem]] = []
+        one = trained[name.removesuffix(SPLIT)]
+        first = [*judge_systems([one], validation)]
+        candidates = [*first]
         for more in [{"visual_mixtures": mixtures}, {}][: 1 if system.options["structure"] == HMM else 2]:
-            grown = train_stages({**system.options, "mixtures": mixtures, **more}, examples, monitor)
-            candidates += split_while_better(judge_systems(grown, validation))
+            grown = train_stages({**system.options, "mixtures": mixtures, **more}, examples, monitor, one)
+            candidates += [*split_while_better(chain(first, judge_systems(grown, validation)))][1:]
         return choose_best(candidates)
     *_, last = train_stages(system.options, examples, monitor)
     return last

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lipmotion.cli.terminal.progress import print_error
+from lipmotion.cli.terminal.printing import print_error
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.extensions import install_command
 from lipmotion.live.consumers import Consumer, LiveSound, json_line, read_address

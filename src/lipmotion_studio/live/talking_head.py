@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from lipmotion.cli.terminal.progress import print_error
+from lipmotion.cli.terminal.printing import print_error
 from lipmotion.errors import InputError
 from lipmotion.live.consumers import Consumer, LiveSound
 from lipmotion.live.face import LiveFrame

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lipmotion.cli.terminal.progress import print_error
+from lipmotion.cli.terminal.printing import print_error
 from lipmotion.live.consumers import Consumer, LiveSound, json_line
 from lipmotion.live.face import LiveFrame
 from lipmotion.meshes.model.mesh import ANGLES, turn_head

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.cli.arguments.declared import add_input, add_output
-from lipmotion.cli.terminal.progress import flush_output, print_line
+from lipmotion.cli.terminal.printing import flush_output, print_line
 
 TOKEN_BYTES = 24
 NAMES = ("127.0.0.1", "localhost")

@@ -6,7 +6,7 @@ import argparse
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output, pick_part
 from lipmotion.cli.arguments.options import add_figures_arguments, add_machine_readable, report_figures
-from lipmotion.cli.terminal.progress import flush_output, print_line
+from lipmotion.cli.terminal.printing import flush_output, print_line
 from lipmotion.printable import printable
 from lipmotion_studio.study.answers import MOS, PAIRED, RANKING
 

@@ -152,7 +152,7 @@ def test_the_stages_of_a_training_are_trainings_of_their_own() -> None:
     assert np.array_equal(
         stages[0].hmm.models["speech"].tied.mixtures.means, alone.hmm.models["speech"].tied.mixtures.means
     )
-    assert np.array_equal(stages[0].hmm.durations, alone.hmm.durations)
+    assert np.array_equal(stages[0].hmm.log_stay, alone.hmm.log_stay)
 
 
 def test_the_two_features_of_the_paper_alone() -> None:

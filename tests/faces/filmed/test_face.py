@@ -78,8 +78,8 @@ def test_there_and_back(filmed_face: FilmedFace, filmed_face_file: Path) -> None
     assert np.array_equal(again.background.chin_px, filmed_face.background.chin_px)
     for take, stored in zip(filmed_face.takes, again.takes, strict=True):
         assert stored.sound.rate_hz == take.sound.rate_hz
-        assert stored.sound.samples == pytest.approx(take.sound.samples, abs=1e-4)
-        assert stored.motion.values == pytest.approx(take.motion.values, abs=1e-6)
+        np.testing.assert_allclose(stored.sound.samples, take.sound.samples, rtol=0, atol=1e-4, equal_nan=False)
+        np.testing.assert_allclose(stored.motion.values, take.motion.values, rtol=0, atol=1e-6, equal_nan=False)
         assert (stored.motion.channels, stored.motion.rate_hz) == (take.motion.channels, take.motion.rate_hz)
         assert np.array_equal(stored.seen, take.seen)
 

@@ -12,21 +12,10 @@ from formats.test_labels import TIERS, long_form
 from formats.test_reported_cases import LINES, OTHERS, SERVICES, SPEAKERS
 from formats.test_transcripts import OF_LINES, OF_WORDS
 from formats.timing_samples import SAMPLES
-from fuzz.inputs import (
-    LONGEST_S,
-    Files,
-    Good,
-    Reader,
-    check_generation,
-    check_motion,
-    good_model,
-    picked_up,
-    require,
-    short_speech,
-)
+from fuzz import inputs
 from lipmotion import Corpus, Request, animate, load_model, read_motion, write
 from lipmotion.formats.label_files import read_labels
-from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Motion, Span, TimedWord, Timeline, Track, TranscriptLine, Unit, Utterance
 from lipmotion.units import PHONES, Lexicon
@@ -52,7 +41,7 @@ AUDIO_TEXTS = {
 }
 
 
-def seed_audio(_: Good) -> list[Files]:
+def seed_audio(_: inputs.Good) -> list[inputs.Files]:
     """Return a tone in many containers, with video, with a gap; and texts that FFmpeg accepts as recordings."""
     with tempfile.TemporaryDirectory() as made:
         folder, paths = Path(made), list[Path]()
@@ -67,13 +56,13 @@ def seed_audio(_: Good) -> list[Files]:
     return found + [{name: text.encode()} for name, text in AUDIO_TEXTS.items()]
 
 
-def check_audio(folder: Path, _: Good) -> None:
+def check_audio(folder: Path, _: inputs.Good) -> None:
     """Read a recording; compute its features."""
     (path,) = folder.iterdir()
     audio = read_audio(path)
-    require(bool(np.isfinite(audio.samples).all()), "samples that are not finite")
-    require(audio.duration_s <= LONGEST_S, "hours of sound")
-    require(bool(np.isfinite(analysed(audio).mfcc().values).all()), "features that are not finite")
+    inputs.require(bool(np.isfinite(audio.samples).all()), "samples that are not finite")
+    inputs.require(audio.duration_s <= inputs.LONGEST_S, "hours of sound")
+    inputs.require(bool(np.isfinite(analysed(audio).mfcc().values).all()), "features that are not finite")
 
 
 CORPUS_SAMPLES, FRAMES = 8000, 13
@@ -82,7 +71,7 @@ AGES_S = 1e11
 CORPUS_PHONES = Timeline((Span(0.0, 0.3, Unit("sil")), Span(0.3, 0.5, Unit("b"))))
 
 
-def seed_corpus(good: Good) -> list[Files]:
+def seed_corpus(good: inputs.Good) -> list[inputs.Files]:
     """Return corpora of half a second: with labelled phones and tiny mouth pictures, without, without checksums."""
     corpus = Corpus.open(good.corpus)
     first = corpus.utterance(corpus.names()[0])
@@ -95,7 +84,7 @@ def seed_corpus(good: Good) -> list[Files]:
     return [_corpus(labelled), _corpus(small), _without_checksums(_corpus(small))]
 
 
-def _without_checksums(files: Files) -> Files:
+def _without_checksums(files: inputs.Files) -> inputs.Files:
     """Return a corpus without checksums, as earlier versions wrote it, so that damaged arrays are read."""
     (name,) = (name for name in files if name.endswith("entry.json"))
     entry = json.loads(files[name])
@@ -103,22 +92,22 @@ def _without_checksums(files: Files) -> Files:
     return files | {name: json.dumps(entry).encode()}
 
 
-def _corpus(utterance: Utterance) -> Files:
+def _corpus(utterance: Utterance) -> inputs.Files:
     with tempfile.TemporaryDirectory() as folder:
         corpus = Corpus.create(Path(folder) / "corpus")
         corpus.add(utterance)
-        return picked_up(Path(folder))
+        return inputs.picked_up(Path(folder))
 
 
-def check_corpus(folder: Path, _: Good) -> None:
+def check_corpus(folder: Path, _: inputs.Good) -> None:
     """Open a corpus; check every array of every utterance."""
     corpus = Corpus.open(folder / "corpus")
     corpus.summary()
-    require(all(0 <= seconds < AGES_S for _, seconds in corpus.speakers.values()), "ages of speech")
+    inputs.require(all(0 <= seconds < AGES_S for _, seconds in corpus.speakers.values()), "ages of speech")
     for name in corpus.names():
         utterance = corpus.utterance(name)
-        check_motion(utterance.track.motion)
-        require(bool(np.isfinite(utterance.features.values).all()), "features that are not finite")
+        inputs.check_motion(utterance.track.motion)
+        inputs.require(bool(np.isfinite(utterance.features.values).all()), "features that are not finite")
         if utterance.track.crops is not None:
             utterance.track.crops.mean()
 
@@ -155,12 +144,12 @@ SPLITS = {"train.txt": b"a\nb\n", "val.txt": b"c\n", "test.txt": b"d\n"}
 LENGTH_S = 4.0
 
 
-def seed_labels(_: Good) -> list[Files]:
+def seed_labels(_: inputs.Good) -> list[inputs.Files]:
     """Return labels of every kind, and lists."""
     return [SPLITS, *({name: text.encode()} for name, text in LABELS_TEXTS.items())]
 
 
-def check_labels(folder: Path, _: Good) -> None:
+def check_labels(folder: Path, _: inputs.Good) -> None:
     """Read each file by its name."""
     if any((folder / name).exists() for name in LISTS):
         recordings = tuple(SourceRecording(name, Path(f"{name}.mp4"), None) for name in "abcd")
@@ -168,7 +157,7 @@ def check_labels(folder: Path, _: Good) -> None:
         return
     for path in folder.iterdir():
         if path.suffix == ".align":
-            require(bool(read_aligned_words(path)), "no word")
+            inputs.require(bool(read_aligned_words(path)), "no word")
         else:
             _read_labels(path)
 
@@ -176,44 +165,48 @@ def check_labels(folder: Path, _: Good) -> None:
 def _read_labels(path: Path) -> None:
     labels = read_labels(path)
     for line in labels.transcript.lines if labels.transcript else ():
-        require(bool(line.words), "a line without a word")
+        inputs.require(bool(line.words), "a line without a word")
         parts: list[TranscriptLine | TimedWord] = [line, *line.words]
         for part in parts:
             times_s = [time for time in (part.start_s, part.end_s) if time is not None]
-            require(all(0 <= time_s < math.inf for time_s in times_s), "times that are none")
-            require(times_s == sorted(times_s), "times that are not in order")
+            inputs.require(all(0 <= time_s < math.inf for time_s in times_s), "times that are none")
+            inputs.require(times_s == sorted(times_s), "times that are not in order")
     phones = read_supplied_phones(SourceRecording("a", path, labels.words, phones=labels.phones), LENGTH_S)
     for span in phones or ():
-        require(0 <= span.start_s <= span.end_s <= LENGTH_S, "a phone outside of the sound")
+        inputs.require(0 <= span.start_s <= span.end_s <= LENGTH_S, "a phone outside of the sound")
 
 
-def seed_model(good: Good) -> list[Files]:
+def seed_model(good: inputs.Good) -> list[inputs.Files]:
     """Return a model of every engine."""
     return [{"a.lipmotion": path.read_bytes()} for path in good.models]
 
 
-def check_model(folder: Path, good: Good) -> None:
+def check_model(folder: Path, good: inputs.Good) -> None:
     """Load a model; animate short speech, without and with a transcript."""
     model = load_model(folder / "a.lipmotion")
     for text in (None, "baby"):
-        check_generation(animate(Request(short_speech(good), transcript=text, recogniser="own"), model=model))
+        inputs.check_generation(
+            animate(Request(inputs.short_speech(good), transcript=text, recogniser="own"), model=model)
+        )
 
 
-def seed_units(good: Good) -> list[Files]:
+def seed_units(good: inputs.Good) -> list[inputs.Files]:
     """Return motion files of ``animate``, and a minimal one."""
-    found: list[Files] = [{"a.json": json.dumps(GOOD).encode()}]
-    result = animate(Request(short_speech(good), recogniser="own"), model=good_model(good))
+    found: list[inputs.Files] = [{"a.json": json.dumps(GOOD).encode()}]
+    result = animate(Request(inputs.short_speech(good), recogniser="own"), model=inputs.good_model(good))
     with tempfile.TemporaryDirectory() as folder:
         paths = [Path(folder) / "a.json", Path(folder) / "a.npz"]
         write(result, paths, channels=["opening"])
         return found + [{path.name: path.read_bytes()} for path in paths]
 
 
-def check_units(folder: Path, good: Good) -> None:
+def check_units(folder: Path, good: inputs.Good) -> None:
     """Animate a short sound with these phones."""
     (path,) = folder.iterdir()
     units = read_motion(path)[1]
-    check_generation(animate(Request(short_speech(good), units=units, recogniser="own"), model=good_model(good)))
+    inputs.check_generation(
+        animate(Request(inputs.short_speech(good), units=units, recogniser="own"), model=inputs.good_model(good))
+    )
 
 
 LEXICONS = (
@@ -223,20 +216,20 @@ LEXICONS = (
 )
 
 
-def seed_lexicon(_: Good) -> list[Files]:
+def seed_lexicon(_: inputs.Good) -> list[inputs.Files]:
     """Return small lexicons."""
     return [{"words.dict": text.encode()} for text in LEXICONS]
 
 
-def check_lexicon(folder: Path, good: Good) -> None:
+def check_lexicon(folder: Path, good: inputs.Good) -> None:
     """Read a lexicon; align short speech with its first word."""
     lexicon = Lexicon.from_file(folder / "words.dict")
     for word, pronunciations in lexicon.user.items():
-        require(lexicon.known(word), "a word that is not known")
-        require(all(set(phones) <= set(PHONES) for phones in pronunciations), "a phone that is none")
+        inputs.require(lexicon.known(word), "a word that is not known")
+        inputs.require(all(set(phones) <= set(PHONES) for phones in pronunciations), "a phone that is none")
     words = " ".join(list(lexicon.user)[:1])
-    request = Request(short_speech(good), words or "baby", lexicon=lexicon, recogniser="own")
-    check_generation(animate(request, model=good_model(good)))
+    request = Request(inputs.short_speech(good), words or "baby", lexicon=lexicon, recogniser="own")
+    inputs.check_generation(animate(request, model=inputs.good_model(good)))
 
 
 TRANSCRIPTS = (
@@ -253,23 +246,25 @@ TRANSCRIPTS = (
 """Some are too long for the sound, or have words without a pronunciation; the last ones have times."""
 
 
-def seed_transcript(_: Good) -> list[Files]:
+def seed_transcript(_: inputs.Good) -> list[inputs.Files]:
     """Return texts with punctuation, numbers, and unknown words."""
     return [{"said.txt": text.encode()} for text in TRANSCRIPTS]
 
 
-def check_transcript(folder: Path, good: Good) -> None:
+def check_transcript(folder: Path, good: inputs.Good) -> None:
     """Animate short speech with the transcript."""
     path = folder / "said.txt"
-    check_generation(animate(Request(short_speech(good), transcript=path, recogniser="own"), model=good_model(good)))
+    inputs.check_generation(
+        animate(Request(inputs.short_speech(good), transcript=path, recogniser="own"), model=inputs.good_model(good))
+    )
 
 
 READERS = {
-    "audio": Reader("audio", seed_audio, check_audio),
-    "labels": Reader("labels", seed_labels, check_labels),
-    "corpus": Reader("corpus", seed_corpus, check_corpus),
-    "model": Reader("model", seed_model, check_model),
-    "units": Reader("units", seed_units, check_units),
-    "lexicon": Reader("lexicon", seed_lexicon, check_lexicon),
-    "transcript": Reader("transcript", seed_transcript, check_transcript),
+    "audio": inputs.Reader("audio", seed_audio, check_audio),
+    "labels": inputs.Reader("labels", seed_labels, check_labels),
+    "corpus": inputs.Reader("corpus", seed_corpus, check_corpus),
+    "model": inputs.Reader("model", seed_model, check_model),
+    "units": inputs.Reader("units", seed_units, check_units),
+    "lexicon": inputs.Reader("lexicon", seed_lexicon, check_lexicon),
+    "transcript": inputs.Reader("transcript", seed_transcript, check_transcript),
 }

@@ -68,7 +68,6 @@ def random_joint(
         known,
         parts,
         np.log(draw.uniform(0.2, 0.9, len(known.monophones))),
-        np.stack([draw.uniform(1, 4, len(known.monophones)), draw.uniform(1, 3, len(known.monophones))], axis=1),
         known.names,
         bigram.Bigram(known.names, np.log(draw.dirichlet(np.ones(count), count)).astype(np.float32)),
     )

@@ -4,14 +4,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from hmm.multistream.synthetic import CLASSES, config, inventory, observed, random_joint, utterances
+from hmm.multistream.synthetic import observed, random_joint, utterances
 from hmm.synthetic import decode
 from kernels.networks import network_posteriors
 from lipmotion import errors, types
 from lipmotion.engines import engine_named
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.model import HmmConfig, StateTable, UnitHmm
-from lipmotion.hmm.multistream import densities, multistream_training, recognise, unit_states
+from lipmotion.hmm.multistream import densities, recognise, unit_states
 from lipmotion.hmm.multistream import phone_recogniser as module
 from lipmotion.hmm.multistream.densities import SPEECH, ObservedStream, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.recognise import build_context_loop, recognise_units
@@ -238,16 +238,6 @@ def test_short_units_have_some_of_their_states():
     path = recognise.align(hmm, data, ("sil", "a", "b", "a", "sil"), np.array([0, 3, 5, 6, 6, 10]))
     assert path.frames.tolist()[:6] == [0, 1, 2, 3, 5, 7]
     assert path.bounds(5).tolist() == [0, 3, 5, 6, 6, 10]
-
-
-def test_durations_are_those_of_the_alignment():
-    data = utterances(12)
-    hmm = multistream_training.train_joint(data, inventory(), CLASSES, config(mixtures=1))
-    durations = multistream_training.measure_durations(hmm, data)
-    assert np.array_equal(durations, hmm.durations)
-    rows = [hmm.inventory.monophones["a", state] for state in range(3)]
-    assert 6 <= durations[rows, 0].sum() <= 12
-    assert (durations[:, 1] >= 1).all()
 
 
 def test_what_does_not_fit_is_refused():

@@ -10,21 +10,8 @@ import av
 import numpy as np
 import pytest
 
-from lipmotion import Corpus, prepare
+from lipmotion import Corpus, prepare, types
 from lipmotion.errors import CorpusError
-from lipmotion.types import (
-    Audio,
-    Channel,
-    Motion,
-    Span,
-    TimedTranscript,
-    TimedWord,
-    Timeline,
-    Track,
-    TranscriptLine,
-    Unit,
-    Utterance,
-)
 from lipmotion_faces.corpus import long_videos
 from lipmotion_faces.corpus import sync as module
 from lipmotion_faces.corpus.long_videos import (
@@ -103,12 +90,14 @@ def scanned(monkeypatch) -> dict[str, tuple[float, ...]]:
         person = tuple(np.full((24, 36, 3), value) for value in told["person"])
         return VideoScan(np.arange(round(DURATION_S * 25)) / 25, np.array(told["cuts_s"]), 25.0, person)
 
-    def track(_path: Path, *, crops: bool, span: VideoSpan = WHOLE, person=(), tracker: str) -> Track:
+    def track(_path: Path, *, crops: bool, span: VideoSpan = WHOLE, person=(), tracker: str) -> types.Track:
         assert tracker == "mediapipe"
         count = round((min(span.end_s, DURATION_S) - span.start_s) * 25)
         told["followed"] = tuple(float(face.mean()) for face in person)
         images = np.zeros((count, 56, 72, 3), np.uint8) if crops else None
-        return Track(Motion(np.ones((count, 1)), 25.0, (Channel("opening"),)), np.ones(count, bool), images)
+        return types.Track(
+            types.Motion(np.ones((count, 1)), 25.0, (types.Channel("opening"),)), np.ones(count, bool), images
+        )
 
     monkeypatch.setattr(long_videos, "scan_video", scan)
     replace_tracking(monkeypatch, track)
@@ -307,14 +296,14 @@ def test_transcripts_beside_a_video(tmp_path, name, text, expected):
 
 
 def test_times_that_are_missing():
-    hello, you = TimedWord("hello", 1.0, 1.4), TimedWord("you")
+    hello, you = types.TimedWord("hello", 1.0, 1.4), types.TimedWord("you")
     lines = (
-        TranscriptLine((hello, you), 1.0, None),  # lasts to the next start
-        TranscriptLine((you,)),  # not known when
-        TranscriptLine((you,), 3.0, 3.5),
-        TranscriptLine((you,), 5.0, None),  # not known how long
+        types.TranscriptLine((hello, you), 1.0, None),  # lasts to the next start
+        types.TranscriptLine((you,)),  # not known when
+        types.TranscriptLine((you,), 3.0, 3.5),
+        types.TranscriptLine((you,), 5.0, None),  # not known how long
     )
-    found = list_spoken_lines(TimedTranscript(lines))
+    found = list_spoken_lines(types.TimedTranscript(lines))
     first, second = ((part.start_s, part.end_s, part.words) for part in found)
     assert (first, second) == ((1.0, 3.0, ("hello", "you")), (3.0, 3.5, ("you",)))
 
@@ -335,12 +324,12 @@ def voice(seed: int, late_s: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     return sound.astype(np.float32), 0.05 * np.log1p(swell(np.arange(75) / 25))
 
 
-def utterance(seed: int, late_s: float, collection: str) -> Utterance:
+def utterance(seed: int, late_s: float, collection: str) -> types.Utterance:
     samples, opening = voice(seed, late_s)
-    audio = Audio(samples, RATE)
-    found = Track(Motion(opening[:, None], 25.0, (Channel("opening"),)), np.ones(75, bool))
+    audio = types.Audio(samples, RATE)
+    found = types.Track(types.Motion(opening[:, None], 25.0, (types.Channel("opening"),)), np.ones(75, bool))
     source = {"collection": collection, "sha256": "0"}
-    return Utterance(f"{collection}{seed}", audio, features_of(audio), found, ("a",), "train", source)
+    return types.Utterance(f"{collection}{seed}", audio, features_of(audio), found, ("a",), "train", source)
 
 
 @pytest.fixture
@@ -358,7 +347,7 @@ def corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Corpus:
 
 def test_curves_without_lips_are_passed_over(corpus):
     one = corpus.utterance("here0")
-    jaw = Track(Motion(np.zeros((75, 1)), 25.0, (Channel("jaw"),)), np.ones(75, bool))
+    jaw = types.Track(types.Motion(np.zeros((75, 1)), 25.0, (types.Channel("jaw"),)), np.ones(75, bool))
     corpus.add(replace(one, name="jaw", track=jaw))
     assert set(measure_offsets(corpus).clips) == set(corpus.names()) - {"jaw"}
 
@@ -401,9 +390,11 @@ def test_early_sound_gets_a_beginning(corpus):
 
 def test_labels_move_with_the_sound(corpus):
     bounds = [0.0, 0.4, 1.2, 3.0]
-    spans = tuple(Span(a, b, Unit(phone)) for (a, b), phone in zip(pairwise(bounds), ("sil", "aa", "m"), strict=True))
+    spans = tuple(
+        types.Span(a, b, types.Unit(phone)) for (a, b), phone in zip(pairwise(bounds), ("sil", "aa", "m"), strict=True)
+    )
     for late_s, expected in ((0.5, [0.0, 0.7, 2.5]), (-0.5, [0.0, 1.7, 3.5])):
-        moved = module.move_sound(replace(corpus.utterance("here0"), phones=Timeline(spans)), late_s)
+        moved = module.move_sound(replace(corpus.utterance("here0"), phones=types.Timeline(spans)), late_s)
         found = list(moved.phones)
         assert [found[0].start_s, found[-1].start_s, found[-1].end_s] == pytest.approx(expected)
         assert found[-1].end_s == pytest.approx(moved.audio.duration_s)

@@ -14,8 +14,8 @@ from lipmotion.engines import Engine
 from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.measures import curves
 from lipmotion.pipeline.generation import generate_for
-from lipmotion.speech.features.speaker_similarity import rate_knowledge
 from lipmotion.speech.recognition.recogniser import open_recogniser
+from lipmotion.speech.sound.speaker_similarity import rate_knowledge
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Speech, StateTrace, Track, Utterance
 from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation import held_out as held_out_module

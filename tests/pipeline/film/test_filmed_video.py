@@ -14,13 +14,6 @@ from lipmotion.errors import ExportError, InputError, ModelFormatError
 from lipmotion.pipeline.outputs.output import OutputSettings
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Span, Timeline, Track, Unit
 from lipmotion_faces.film import background
-from lipmotion_faces.film.background import (
-    HEAD_PX,
-    BackgroundSequence,
-    find_chin,
-    open_background,
-    open_stored_background,
-)
 from lipmotion_faces.film.filmed_video import find_other_person, is_person_of, make_film, predict_codes, write_film
 from lipmotion_faces.filmed.renderer import AS_PRINTED, Background, Stitcher
 from lipmotion_faces.outputs.shown_faces import shown_face
@@ -249,7 +242,7 @@ def _spoiled(data: np.ndarray) -> np.ndarray:
 def test_a_mouth_over_the_speakers_own_is_larger_and_has_no_jaw(filmed_face, brief, video, monkeypatch):
     install(monkeypatch, {video.path: video}, {})
     film = make_film(filmed_face, brief, speech=video.path, fps=50.0, options=Outputs(overlay="mouth"))
-    own = open_background(video.path)
+    own = background.open_background(video.path)
     assert film.rate_hz == pytest.approx(25.0)
     assert film.covered == pytest.approx(own.enlarge(1.3).face_box)
     for frame, filmed in zip(film.frames, own.decode(film.count, 25.0), strict=True):
@@ -297,8 +290,8 @@ def test_mouth_pictures_cannot_be_mapped_onto_another_person(filmed_face):
 
 
 @pytest.fixture(scope="module")
-def sequence(filmed_face: FilmedFace) -> BackgroundSequence:
-    return open_stored_background(filmed_face.background)
+def sequence(filmed_face: FilmedFace) -> background.BackgroundSequence:
+    return background.open_stored_background(filmed_face.background)
 
 
 @pytest.fixture(scope="module")
@@ -306,7 +299,7 @@ def video(tmp_path_factory: pytest.TempPathFactory) -> ToyVideo:
     return write_video(tmp_path_factory.mktemp("background") / "a.mp4", toy_sentences(3)[0])
 
 
-def numbers(sequence: BackgroundSequence, shown: list[Background]) -> list[int]:
+def numbers(sequence: background.BackgroundSequence, shown: list[Background]) -> list[int]:
     """Return which frames of the footage were shown, by the place of the face."""
     places = sequence.face_to_frame.reshape(len(sequence.chin_px), -1)
     return [int(np.abs(places - each.face_to_frame.ravel()).sum(axis=1).argmin()) for each in shown]
@@ -354,20 +347,20 @@ def test_heads_lie_upon_one_another_where_a_frame_fades(sequence):
 def test_the_face_box_holds_the_head_in_every_frame(sequence):
     left, top, right, bottom = sequence.face_box
     for place in sequence.face_to_frame:
-        for x in HEAD_PX[::2]:
-            for y in HEAD_PX[1::2]:
+        for x in background.HEAD_PX[::2]:
+            for y in background.HEAD_PX[1::2]:
                 across, down = place @ [x, y, 1]
                 assert left - 1e-9 <= across <= right + 1e-9
                 assert top - 1e-9 <= down <= bottom + 1e-9
-    assert right - left < (HEAD_PX[2] - HEAD_PX[0]) * SCALE + 20
+    assert right - left < (background.HEAD_PX[2] - background.HEAD_PX[0]) * SCALE + 20
 
 
 def test_a_video_as_a_background(video, monkeypatch):
-    found, drawn = find_chin(footage_of(video)), toy_chin_px(video.motion)
+    found, drawn = background.find_chin(footage_of(video)), toy_chin_px(video.motion)
     assert np.abs(found - drawn).max() < 4  # it is smoothed over about a frame
     assert np.corrcoef(found, drawn)[0, 1] > 0.95
     install(monkeypatch, {video.path: video}, {})
-    opened = open_background(video.path)
+    opened = background.open_background(video.path)
     count = len(opened.chin_px)
     assert count == len(video.motion.values)
     assert opened.usable.all()
@@ -383,17 +376,19 @@ def test_frames_of_odd_sizes_are_cut(sequence):
         def decode(self, _: int) -> np.ndarray:
             return np.zeros((101, 75, 3), np.uint8)
 
-    odd = BackgroundSequence(OddGroups, 25.0, sequence.face_to_frame, sequence.chin_px, sequence.usable)  # type: ignore[arg-type]
+    odd = background.BackgroundSequence(OddGroups, 25.0, sequence.face_to_frame, sequence.chin_px, sequence.usable)  # type: ignore[arg-type]
     assert {each.frame.shape for each in odd.decode(3, 25.0)} == {(100, 74, 3)}
 
 
-def without(sequence: BackgroundSequence, unseen: Iterable[int], **more: object) -> BackgroundSequence:
+def without(
+    sequence: background.BackgroundSequence, unseen: Iterable[int], **more: object
+) -> background.BackgroundSequence:
     usable = np.ones(len(sequence.chin_px), bool)
     usable[list(unseen)] = False
     return replace(sequence, usable=usable, **more)  # type: ignore[arg-type]
 
 
-def shown(sequence: BackgroundSequence, count: int) -> list[int]:
+def shown(sequence: background.BackgroundSequence, count: int) -> list[int]:
     return [int(number) for number in sequence.find_order(sequence.groups(), count).first]
 
 

@@ -12,12 +12,8 @@ from lipmotion import Corpus, Run, Selection, animate, evaluate, load_model, rea
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
+from lipmotion.pipeline.training import labels
 from lipmotion.pipeline.training.channels import train_eigenlips, with_visual_channels
-from lipmotion.pipeline.training.labels import (
-    MAX_NAMED_RECORDINGS,
-    warn_of_doubtful_transcripts,
-    warn_of_missing_transcripts,
-)
 from lipmotion.pipeline.training.other_speakers import SpokenSentence
 from lipmotion.pipeline.training.train import describe_training, label_phones
 from lipmotion.speech.recognition.general import load_general
@@ -222,11 +218,11 @@ def half_of(units: Timeline[Unit]) -> Timeline[Unit]:
 
 def test_words_that_are_left_out(right_transcripts, caplog):
     """Half of the sentence stands as silence; right transcripts are not named."""
-    warn_of_doubtful_transcripts(right_transcripts)
-    warn_of_missing_transcripts([utterance for utterance, _ in right_transcripts])
+    labels.warn_of_doubtful_transcripts(right_transcripts)
+    labels.warn_of_missing_transcripts([utterance for utterance, _ in right_transcripts])
     assert not caplog.records
     utterance, units = right_transcripts[0]
-    warn_of_doubtful_transcripts([(utterance, half_of(units))])
+    labels.warn_of_doubtful_transcripts([(utterance, half_of(units))])
     (text,) = messages(caplog)
     assert text.startswith("1 of 1 transcripts seem to leave out words that are said (toy0")
 
@@ -234,29 +230,29 @@ def test_words_that_are_left_out(right_transcripts, caplog):
 def test_labelled_phones_are_believed_and_of_two_alignments_the_better_one_counts(right_transcripts, caplog):
     """Of phones in half of their places, and of others in all of them: these cover more of the speech and fit worse."""
     (utterance, units), (_, others) = right_transcripts[:2]
-    warn_of_doubtful_transcripts([(replace(utterance, phones=units), others)])
+    labels.warn_of_doubtful_transcripts([(replace(utterance, phones=units), others)])
     assert not caplog.records
     for one, other in ((half_of(units), others), (half_of(units), half_of(units)), (half_of(units), units)):
-        warn_of_doubtful_transcripts([(utterance, one)], lambda _, other=other: other)
+        labels.warn_of_doubtful_transcripts([(utterance, one)], lambda _, other=other: other)
     assert ["leave out words" in text for text in messages(caplog)] == [True, True]
 
 
 def test_without_general_models_nothing_is_measured(right_transcripts, caplog, monkeypatch):
     monkeypatch.setitem(sys.modules, "pocketsphinx", None)
     load_general.cache_clear()
-    warn_of_doubtful_transcripts([(right_transcripts[0][0], right_transcripts[1][1])])
+    labels.warn_of_doubtful_transcripts([(right_transcripts[0][0], right_transcripts[1][1])])
     assert not caplog.records
 
 
 def test_only_some_are_named(right_transcripts, caplog):
     named = right_transcripts[0][0]
-    names = [f"take{number:02d}" for number in range(MAX_NAMED_RECORDINGS + 4)]
+    names = [f"take{number:02d}" for number in range(labels.MAX_NAMED_RECORDINGS + 4)]
     many = [replace(named, name=name, words=None, phones=None) for name in names]
-    warn_of_missing_transcripts([named, *many])
+    labels.warn_of_missing_transcripts([named, *many])
     (text,) = messages(caplog)
     assert "14 of 15 recordings" in text
     assert "take09 and 4 more)" in text
-    warn_of_missing_transcripts(many)  # that none has words is said elsewhere
+    labels.warn_of_missing_transcripts(many)  # that none has words is said elsewhere
     assert len(caplog.records) == 1
 
 

@@ -77,12 +77,9 @@ def test_temporary_files_go_even_if_not_all_is_read(faked: Path) -> None:
 @pytest.mark.usefixtures("faked")
 def test_voices_by_name() -> None:
     for name, full_name in (
-        ("flite:slt", "flite:slt"),
-        ("slt", "flite:slt"),
-        ("kal_diphone", "festival:kal_diphone"),
-        ("en-us+f2", "espeak-ng:en-us+f2"),
-        ("de+f2", "espeak-ng:de+f2"),
-    ):
+        ("flite:slt", "flite:slt"), ("slt", "flite:slt"), ("kal_diphone", "festival:kal_diphone"),
+        ("en-us+f2", "espeak-ng:en-us+f2"), ("de+f2", "espeak-ng:de+f2"),
+    ):  # fmt: skip
         assert installed.find_voice(name).full_name == full_name
     for name, message in (
         ("dectalk:paul", "unknown synthesiser 'dectalk'; required one of: flite, festival, espeak-ng"),

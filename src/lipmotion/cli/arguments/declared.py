@@ -11,7 +11,7 @@ from dataclasses import Field, dataclass, fields, replace
 from pathlib import Path
 from typing import IO, Any, TypeVar
 
-from lipmotion.cli.terminal.progress import write_bytes
+from lipmotion.cli.terminal.printing import write_bytes
 from lipmotion.errors import InputError
 from lipmotion.pipeline.job import DETAILS, Job
 from lipmotion.pipeline.request import Outputs

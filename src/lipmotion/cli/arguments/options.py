@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.arguments.declared import add_options, add_output, is_pipe
-from lipmotion.cli.terminal.progress import Report, describe_outcome, print_line, print_lines, report_progress
+from lipmotion.cli.terminal.printing import print_line, print_lines
+from lipmotion.cli.terminal.progress import Report, describe_outcome, report_progress
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.extensions import find_version
 from lipmotion.pipeline.job import Job, check_outputs, is_for_several, list_recordings, open_face, plan_outputs, run

@@ -134,7 +134,7 @@ class JsonLines(Events):
         """Write one event; nothing after the last one. Raises ExportError: standard output cannot be written."""
         if self._ended:
             return
-        from lipmotion.cli.terminal.progress import explain_output_error, print_error_json, print_json
+        from lipmotion.cli.terminal.printing import explain_output_error, print_error_json, print_json
         from lipmotion.errors import ExportError
 
         try:
@@ -176,7 +176,7 @@ class RhubarbStatus(Events):
     def emit(self, kind: str, level: str, message: str, **data: Any) -> None:
         """Write one event; nothing after the last one."""
         if not self._ended:
-            from lipmotion.cli.terminal.progress import print_error_json
+            from lipmotion.cli.terminal.printing import print_error_json
 
             print_error_json({"type": kind, **data, "log": {"level": level, "message": message}}, spaced=True)
 

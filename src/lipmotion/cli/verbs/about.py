@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.arguments.declared import add_input, add_output
 from lipmotion.cli.arguments.options import add_machine_readable
-from lipmotion.cli.terminal.progress import print_line, print_lines, report_progress
+from lipmotion.cli.terminal.printing import print_line, print_lines
+from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.types.progress import Item
 
@@ -79,7 +80,7 @@ def add_addon(verbs: Verbs) -> None:
 
 
 def _run_addon(options: argparse.Namespace) -> None:
-    from lipmotion.formats.blender import write_addon
+    from lipmotion.formats.game_engines import write_addon
 
     write_addon(options.program, options.output)
     print_line(options.output)

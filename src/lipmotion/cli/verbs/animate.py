@@ -17,7 +17,8 @@ from lipmotion.cli.arguments.declared import (
     write_pipe,
 )
 from lipmotion.cli.arguments.options import add_execution, animate_one_by_one, count_workers
-from lipmotion.cli.terminal.progress import print_error, report_progress
+from lipmotion.cli.terminal.printing import print_error
+from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.pipeline.job import run as run_job
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.printable import printable

@@ -10,7 +10,8 @@ from typing import Any
 
 from lipmotion.cli.arguments.declared import add_options, add_output, check_paths, is_pipe, pick_part, read_pipe
 from lipmotion.cli.arguments.options import Version, place_outputs
-from lipmotion.cli.terminal.progress import LEVELS, flush_output, print_line, print_lines, print_status_lines
+from lipmotion.cli.terminal.printing import flush_output, print_line, print_lines
+from lipmotion.cli.terminal.progress import LEVELS, print_status_lines
 from lipmotion.errors import shorten
 from lipmotion.pipeline.request import Request
 from lipmotion.storage.files import as_text

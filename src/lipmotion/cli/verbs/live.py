@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.cli.arguments.declared import add_input
-from lipmotion.cli.terminal.progress import flush_output, print_line
+from lipmotion.cli.terminal.printing import flush_output, print_line
 from lipmotion.errors import InputError, MissingDependencyError
 
 CHUNK_S = 0.02

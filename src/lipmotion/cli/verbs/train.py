@@ -7,7 +7,8 @@ from typing import Any
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output
 from lipmotion.cli.arguments.options import add_machine_readable, count_workers, list_or_all
-from lipmotion.cli.terminal.progress import print_line, report_progress
+from lipmotion.cli.terminal.printing import print_line
+from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Request
 from lipmotion.storage.files import check_target

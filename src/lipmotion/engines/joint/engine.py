@@ -15,7 +15,7 @@ from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
 from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.hmm.multistream.densities import MOTION, StreamObservations, StreamWeights, stream_observations
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_arrays, joint_to_arrays
-from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, grow_joint, measure_durations, train_joint
+from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, grow_joint
 from lipmotion.hmm.multistream.recognise import StatePath, align, merge_gaussians, recognise_units, select_densities
 from lipmotion.hmm.multistream.unit_states import Inventory, RecognisedUnit, frames_to_units, units_to_frames
 from lipmotion.kernels.banded import solve_mlpg
@@ -219,18 +219,17 @@ class JointEngine(Engine[JointModel]):
     def fit(  # noqa: D102
         self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
     ) -> Fit[JointModel]:
-        examples = self._with_channels(examples)
-        utterances, inventory, classes, make_model = self._prepare(examples)
-        hmm = train_joint(utterances, inventory, classes, self.config.hmm, monitor, checkpoint)
-        figures = {f"leaves_{name}": float(stream.forest.size) for name, stream in hmm.models.items()}
+        *_, model = self.growing_models(examples, monitor, checkpoint)
+        figures = {f"leaves_{name}": float(stream.forest.size) for name, stream in model.hmm.models.items()}
         frames = sum(int(example.valid.sum()) for example in examples)
-        return Fit(self._with_filter(make_model(hmm), examples), {"frames": frames, **figures})
+        return Fit(self._with_filter(model, self._with_channels(examples)), {"frames": frames, **figures})
 
-    def growing_models(self, examples: Sequence[Example], monitor: Monitor) -> Iterator[JointModel]:
+    def growing_models(
+        self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
+    ) -> Iterator[JointModel]:
         """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``."""
         utterances, inventory, classes, make_model = self._prepare(self._with_channels(examples))
-        for hmm in grow_joint(utterances, inventory, classes, self.config.hmm, monitor):
-            yield make_model(replace(hmm, durations=measure_durations(hmm, utterances)))
+        yield from map(make_model, grow_joint(utterances, inventory, classes, self.config.hmm, monitor, checkpoint))
 
     def _with_channels(self, examples: Sequence[Example]) -> Sequence[Example]:
         """Return examples with the channels that are modelled. Raises InputError: there is no such channel."""
@@ -240,7 +239,7 @@ class JointEngine(Engine[JointModel]):
     def _prepare(self, examples: Sequence[Example]) -> tuple[
         list[TrainingUtterance], Inventory, Mapping[str, frozenset[str]], Callable[[JointHmm], JointModel]
     ]:  # fmt: skip
-        """Return what ``train_joint`` takes, and what makes a model of its result. Raises CorpusError: no speech."""
+        """Return what ``grow_joint`` takes, and what makes a model of its result. Raises CorpusError: no speech."""
         units = load_unit_set(self.config.units)
         space, values = fit_reduced_motion(examples, self.config.components)
         utterances = []

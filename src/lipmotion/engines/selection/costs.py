@@ -60,7 +60,7 @@ class SelectionConfig(Configuration):
     invisible  : phones without a lip shape of their own, those of the print by default (add ``l`` for faces without a
                  tongue): they count as one phone, and their neighbours choose the unit; empty: none
     suppressed : leave invisible phones out: the vowel that follows gives the shape, and no recorded one is played
-    overlap    : how units overlap in a phone that they share: ``learned``, ``printed`` (Table 1), ``symmetric``,
+    overlap    : how units overlap in a phone that they share: ``printed`` (Table 1), ``symmetric``,
                  ``anticipatory`` (Table 1, where "forward" is the phone after), ``middle``
     context    : target cost of another phone beside the phone, ``farther`` times as much for each phone further away;
                  half as much where both are of one viseme

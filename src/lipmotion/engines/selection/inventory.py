@@ -44,10 +44,7 @@ SYMMETRIC: Overlaps = {**TABLE_1, (NORMAL, INVISIBLE): 0.73}
 ANTICIPATORY: Overlaps = {(before, after): 1 - TABLE_1[after, before] for before, after in TABLE_1}
 """Table 1 with its rows read as the phone after: the abstract calls the influence of the following segment forward."""
 MIDDLE: Overlaps = dict.fromkeys(TABLE_1, 0.5)
-LEARNED: Overlaps = {**MIDDLE, (NORMAL, PROTECTED): 0.1}
-"""The shares with the least errors of joined motion on the training list of GRID s1 (docs/results/selection.md)."""
-OVERLAPS: Mapping[str, Overlaps] = {"learned": LEARNED, "printed": TABLE_1, "symmetric": SYMMETRIC,
-                                    "anticipatory": ANTICIPATORY, "middle": MIDDLE}  # fmt: skip
+OVERLAPS = {"printed": TABLE_1, "symmetric": SYMMETRIC, "anticipatory": ANTICIPATORY, "middle": MIDDLE}
 
 
 def find_lip_class(phone: str, invisible: Collection[str]) -> str:

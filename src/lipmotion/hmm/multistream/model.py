@@ -259,7 +259,6 @@ class JointHmm:
     """Models of all units, in several streams that share their transitions.
 
     log_stay  : [shape=(R,)], log P(stay in the state) of every state without context (``Inventory.monophones``)
-    durations : [shape=(R, 2)], mean and variance of each state's duration in the training's alignment, in frames
     spoken    : the units that occurred in training: those that recognition searches
     """
 
@@ -267,7 +266,6 @@ class JointHmm:
     inventory: Inventory
     models: Mapping[str, StreamModel]
     log_stay: NDArray[np.float64]
-    durations: NDArray[np.float64]
     spoken: tuple[str, ...]
     bigram: Bigram
 
@@ -319,11 +317,7 @@ NAMES = {
     "spoken": ArraySpec(np.int8, "U", 0, 1),
     "streams": ArraySpec(np.str_, "S"),
 }
-TIMES = {
-    **BIGRAM,
-    "log_stay": ArraySpec(np.float64, "R", -1e4, NEGATIVE),
-    "durations": ArraySpec(np.float64, "R 2", POSITIVE, 1e9),
-}
+TIMES = {**BIGRAM, "log_stay": ArraySpec(np.float64, "R", -1e4, NEGATIVE)}
 MIN_STORED_SCALE = MIN_SCALE / 10
 """Below ``MIN_SCALE``, for rounding to half precision; squares of values divided by less overflow in float32."""
 STREAM = {
@@ -344,7 +338,6 @@ def joint_to_arrays(hmm: JointHmm, precision: type[np.floating[Any]] = np.float1
         "spoken": np.isin(hmm.inventory.names, hmm.spoken).astype(np.int8),
         "streams": np.array(list(hmm.models)),
         "log_stay": hmm.log_stay,
-        "durations": hmm.durations,
         "bigram": hmm.bigram.log_probability,
     }
     for name, model in hmm.models.items():
@@ -367,9 +360,8 @@ def joint_from_arrays(arrays: Arrays, config: JointConfig) -> JointHmm:
     with format_errors("the joint model"):
         named = check_arrays(arrays, NAMES)
         units, free, streams = (tuple(named[key].tolist()) for key in ("units", "free", "streams"))
-        refuse_undeclared(
-            arrays, NAMES, TIMES, (name for name in arrays if name.partition("/")[0] in streams and "/" in name)
-        )
+        of_streams = (name for name in arrays if name.partition("/")[0] in streams and "/" in name)
+        refuse_undeclared(arrays, NAMES, TIMES, ["durations"], of_streams)  # which earlier files have
         if config.states > arrays["log_stay"].size:
             raise ValueError(f"{config.states} states a unit, of {arrays['log_stay'].size} in all")
         inventory = Inventory(units, free, config.states)
@@ -381,7 +373,7 @@ def joint_from_arrays(arrays: Arrays, config: JointConfig) -> JointHmm:
         stored = check_arrays(arrays, TIMES, U=len(units), R=len(inventory.monophones))
         models = {name: _restore_stream(name, select_arrays(arrays, f"{name}/"), inventory) for name in streams}
         bigram = bigram_from_array(units, stored["bigram"])
-        return JointHmm(config, inventory, models, stored["log_stay"], stored["durations"], spoken, bigram)
+        return JointHmm(config, inventory, models, stored["log_stay"], spoken, bigram)
 
 
 def _restore_stream(name: str, arrays: Arrays, inventory: Inventory) -> StreamModel:

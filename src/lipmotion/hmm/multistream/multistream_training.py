@@ -32,7 +32,6 @@ from lipmotion.hmm.multistream.model import (
     grow_forest,
     list_context_questions,
 )
-from lipmotion.hmm.multistream.recognise import align
 from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState, expand_triphones
 from lipmotion.hmm.unit_training import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES, group_by_length
 from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors
@@ -44,8 +43,6 @@ from lipmotion.types import Monitor, Progress, silent_monitor, sub_monitor
 
 MIN_STAY_PROBABILITY = 0.05
 """Smallest probability of staying in a state."""
-MIN_DURATION_VARIANCE = 1.0
-"""Smallest variance of a duration, in frames²; durations that were all equal have variance 0."""
 MIN_MIXTURE_POSTERIOR = 1e-5
 """Smaller state posteriors are left out of the statistics of mixtures; nearly all posteriors are smaller."""
 Rows = NDArray[np.float32]
@@ -258,19 +255,6 @@ class TrainingUtterance:
     bounds: NDArray[np.intp] | None = None
 
 
-def train_joint(
-    utterances: Sequence[TrainingUtterance],
-    inventory: Inventory,
-    classes: Mapping[str, frozenset[str]],
-    config: JointConfig,
-    monitor: Monitor = silent_monitor,
-    work: Checkpoint = NO_CHECKPOINT,
-) -> JointHmm:
-    """Return models of all streams, trained together: the last of ``grow_joint``, which says what it takes."""
-    *_, hmm = grow_joint(utterances, inventory, classes, config, monitor, work)
-    return replace(hmm, durations=measure_durations(hmm, utterances))
-
-
 def grow_joint(
     utterances: Sequence[TrainingUtterance],
     inventory: Inventory,
@@ -280,8 +264,6 @@ def grow_joint(
     work: Checkpoint = NO_CHECKPOINT,
 ) -> Iterator[JointHmm]:
     """Yield models of all streams, trained together, of 1, 2, 4 … Gaussians for speech, then of more for motion.
-
-    Their durations are not measured (NaN): ``measure_durations``.
 
     classes : sets of units, by name, that the trees ask about, besides single units
     A stream of weight 0 in training does not affect the alignment, but its densities are learned.
@@ -358,30 +340,8 @@ def _make_equal_models(
     free, silence = inventory.free, inventory.silence
     sequences = [tuple(silence if unit in free else unit for unit in utterance.units) for utterance in utterances]
     log_stay = np.log(limit_stay(inventory))
-    durations = np.full((len(log_stay), 2), np.nan)
     bigram = estimate_bigram(inventory.names, sequences)
-    return JointHmm(config, inventory, models, log_stay, durations, spoken, bigram)
-
-
-def measure_durations(hmm: JointHmm, utterances: Sequence[TrainingUtterance]) -> NDArray[np.float64]:
-    """Return mean and variance of the duration of each state without context, in frames [shape=(R, 2)]."""
-    sums = np.zeros((len(hmm.log_stay), 3))
-    for utterance in utterances:
-        observed, units = utterance.observed, utterance.units
-        active = set(hmm.config.training.active) & set(observed.streams) & set(hmm.models)
-        if not active or len(expand_triphones(hmm.inventory, units).monophones) > observed.frames:
-            continue
-        path = align(hmm, observed, units, weights=hmm.config.training)
-        frames = np.bincount(path.frames, minlength=len(path.states.monophones)).astype(float)
-        np.add.at(sums, path.states.monophones, np.stack([np.ones(len(frames)), frames, frames * frames], axis=1))
-    leave = np.exp(hmm.log_move)
-    geometric = np.stack([1 / leave, (1 - leave) / leave**2], axis=1)
-    count = np.maximum(sums[:, 0], 1)
-    mean = sums[:, 1] / count
-    measured = np.stack([mean, sums[:, 2] / count - mean * mean], axis=1)
-    durations = np.where(sums[:, :1] > 0, measured, geometric)
-    durations[:, 1] = np.maximum(durations[:, 1], MIN_DURATION_VARIANCE)
-    return durations
+    return JointHmm(config, inventory, models, log_stay, spoken, bigram)
 
 
 def _split_monitor(monitor: Monitor, widths: Sequence[int]) -> list[Monitor]:

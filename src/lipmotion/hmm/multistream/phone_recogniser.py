@@ -75,7 +75,7 @@ def fit_phone_recogniser(
         return None
     arrays = checkpoint.load("joint")
     if arrays is None:
-        from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, train_joint
+        from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, grow_joint
 
         utterances = []
         for example, x in zip(examples, values, strict=True):
@@ -84,7 +84,7 @@ def fit_phone_recogniser(
             units, bounds = units_to_frames(speech.units, observed.frames, PHONES.silence[0], PHONES.unit_of)
             utterances.append(TrainingUtterance(observed, units, bounds))
         inventory = Inventory(PHONES.units, PHONES.silence, CONFIG.states)
-        hmm = train_joint(utterances, inventory, PHONES.classes(), CONFIG, monitor, checkpoint)
+        *_, hmm = grow_joint(utterances, inventory, PHONES.classes(), CONFIG, monitor, checkpoint)
         arrays = joint_to_arrays(hmm, np.float32)
         checkpoint.save("joint", arrays)
     hmm = joint_from_arrays(arrays, CONFIG)

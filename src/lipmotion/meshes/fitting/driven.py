@@ -166,10 +166,8 @@ class DrivenCharacter:
     def weights(self, motion: Motion, units: Timeline[Unit]) -> Motion:
         """Return blendshapes' weights over time, by the mesh's names. Raises InputError: it has none of the mouth."""
         if self.shapes is None:
-            raise InputError(
-                "the character is moved by control points and has no weights of blendshapes; write a video, or the "
-                "motion without --character"
-            )
+            what = "the character is moved by control points and has no weights of blendshapes; write a video,"
+            raise InputError(f"{what} or the motion without --character")
         if not self.table:
             return solve_shape_weights(motion, units, self.shapes)
         return _solve_with_table(motion, units, self.shapes, *self._mouth_rows)

@@ -105,26 +105,18 @@ LARGEST_EIGENVALUE = 16.0  # the largest eigenvalue of the squared second differ
 MAX_STEPS, TOLERANCE = 2000, 1e-5
 """Iteration stops after so many steps, or when no weight changes by more than the second number in one."""
 SIDED_SHAPES = {
-    "mouthSmile": ("smile", 0.75),
-    "mouthFrown": ("frown", 0.9),
-    "mouthStretch": ("stretched", 0.7),
-    "mouthUpperUp": ("upper_raise", 0.6),
-    "mouthPress": ("tight", 0.5),
-}
+    "mouthSmile": ("smile", 0.75), "mouthFrown": ("frown", 0.9), "mouthStretch": ("stretched", 0.7),
+    "mouthUpperUp": ("upper_raise", 0.6), "mouthPress": ("tight", 0.5),
+}  # fmt: skip
 """By blendshapes of both sides: the curve of the spoken mouth that they show, and their weight where it is 1."""
 MIDDLE_SHAPES = {"mouthShrugLower": ("chin_raise", 0.5), "mouthRollUpper": ("tight", 0.15)}
 """The same of blendshapes that have no sides."""
 MOOD_SHAPES = {f"{name}{side}": row for name, row in SIDED_SHAPES.items() for side in SIDES} | MIDDLE_SHAPES
 EXPRESSIONS: Mapping[str, tuple[tuple[str, float], ...]] = {
-    "happy": (("happy", 1.0),),
-    "sad": (("sad", 1.0),),
-    "angry": (("angry", 1.0),),
-    "surprised": (("surprised", 1.0),),
-    "afraid": (("surprised", 0.5), ("sad", 0.5)),
-    "disgusted": (("angry", 0.6), ("sad", 0.3)),
-    "tense": (("angry", 0.4),),
-    "tired": (("sad", 0.3), ("relaxed", 0.4)),
-}
+    "happy": (("happy", 1.0),), "sad": (("sad", 1.0),), "angry": (("angry", 1.0),), "surprised": (("surprised", 1.0),),
+    "afraid": (("surprised", 0.5), ("sad", 0.5)), "disgusted": (("angry", 0.6), ("sad", 0.3)),
+    "tense": (("angry", 0.4),), "tired": (("sad", 0.3), ("relaxed", 0.4)),
+}  # fmt: skip
 """The expressions of VRM that stand for a mood, with their weights, on characters without finer shapes."""
 ROUNDING = {"mouthPucker": 0.5, "mouthFunnel": 0.3}  # least weights in a phone of roundness 1
 NARROWING = 0.11

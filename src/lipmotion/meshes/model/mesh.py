@@ -205,10 +205,8 @@ class Mesh:
             _check_places(f"the blendshape {shorten(shape.name)!r}", shape.displacements)
             _check_rows(f"the blendshape {shorten(shape.name)!r}", shape.rows, len(self.vertices))
             if shape.rows.shape != shape.displacements.shape[:1]:
-                raise InputError(
-                    f"the blendshape {shorten(shape.name)!r} moves {shape.rows.shape} vertices by "
-                    f"{shape.displacements.shape} displacements, required as many"
-                )
+                what = f"the blendshape {shorten(shape.name)!r} moves {shape.rows.shape} vertices by"
+                raise InputError(f"{what} {shape.displacements.shape} displacements, required as many")
         if len(set(self.shape_names)) != len(self.shapes):
             raise InputError(f"two blendshapes have one name among {shorten(', '.join(self.shape_names))}; rename one")
 

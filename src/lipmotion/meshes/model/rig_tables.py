@@ -100,10 +100,8 @@ def apply_rig(rows: Sequence[RigRow], sources: Mapping[str, NDArray[np.float64]]
     limits: dict[str, tuple[float, float]] = {}
     for row in rows:
         if row.source and row.source not in sources:
-            raise InputError(
-                f"the control {shorten(row.control)!r} follows {shorten(row.source)!r}, which is no curve; "
-                f"{suggest_names(row.source, sources)}"
-            )
+            what = f"the control {shorten(row.control)!r} follows {shorten(row.source)!r}, which is no curve;"
+            raise InputError(f"{what} {suggest_names(row.source, sources)}")
         value = row.gain * sources[row.source] if row.source else np.zeros(len(next(iter(sources.values()))))
         curves[row.control] = curves.get(row.control, 0.0) + value + row.offset
         limits.setdefault(row.control, (row.low, row.high))

@@ -43,7 +43,8 @@ _ARKIT = {name.lower(): name for name in (*ARKIT_MOUTH, *ARKIT_OTHERS)}
 _SIDES = {"l": "left", "r": "right", "left": "left", "right": "right"}
 
 
-_COPY = re.compile(r"[._ ]\d{1,4}$")  # what programs add to a name that is there already: ``jawOpen.001``
+_COPY = re.compile(r"(?:[._ ](?:\d{1,4}|(?i:copy|mesh|head|face|body|weight|(?:mesh)?shape)))+$|(?<=[a-z])Shape$")
+"""What programs add to a name: ``jawOpen.001``, ``jawOpen_Head``, ``jawOpenShape``."""
 
 
 def to_arkit(name: str) -> str | None:
@@ -103,27 +104,17 @@ def _invert(forms: Mapping[str, str]) -> Sources:
 PAIRED = frozenset(("mouthSmile", "mouthStretch", "mouthPress", "mouthLowerDown", "mouthUpperUp"))
 CLOSED = "closed"  # the name of lips that are pressed together, beside the vowels of VRM
 VOWEL_FORMS = {
-    "aa": "jawOpen 0.5",
-    "ih": "jawOpen 0.15 mouthStretch 0.5 mouthSmile 0.3",
-    "ou": "jawOpen 0.2 mouthPucker 0.8",
-    "ee": "jawOpen 0.3 mouthStretch 0.3 mouthSmile 0.3",
-    "oh": "jawOpen 0.2 mouthFunnel 0.4 mouthPucker 0.3",
-}
+    "aa": "jawOpen 0.5", "ih": "jawOpen 0.15 mouthStretch 0.5 mouthSmile 0.3", "ou": "jawOpen 0.2 mouthPucker 0.8",
+    "ee": "jawOpen 0.3 mouthStretch 0.3 mouthSmile 0.3", "oh": "jawOpen 0.2 mouthFunnel 0.4 mouthPucker 0.3",
+}  # fmt: skip
 """The vowels of VRM, which are the あ い う え お of MikuMikuDance, as blendshapes of ARKit."""
 VOWELS = _invert({**VOWEL_FORMS, CLOSED: "mouthPress 0.4"})
 VISEME_FORMS = {
-    "PP": "mouthPress 0.4",
-    "FF": "jawOpen 0.1 mouthRollLower 0.6",
-    "TH": "jawOpen 0.2 tongueOut 0.3",
-    "DD": "jawOpen 0.15",
-    "kk": "jawOpen 0.2",
-    "CH": "jawOpen 0.15 mouthFunnel 0.3",
-    "SS": "jawOpen 0.1 mouthStretch 0.3",
-    "nn": "jawOpen 0.12",
-    "RR": "jawOpen 0.15 mouthPucker 0.4",
-    "E": "jawOpen 0.3 mouthStretch 0.3",
-    **{name: VOWEL_FORMS[name] for name in ("aa", "ih", "oh", "ou")},
-}
+    "PP": "mouthPress 0.4", "FF": "jawOpen 0.1 mouthRollLower 0.6", "TH": "jawOpen 0.2 tongueOut 0.3",
+    "DD": "jawOpen 0.15", "kk": "jawOpen 0.2", "CH": "jawOpen 0.15 mouthFunnel 0.3",
+    "SS": "jawOpen 0.1 mouthStretch 0.3", "nn": "jawOpen 0.12", "RR": "jawOpen 0.15 mouthPucker 0.4",
+    "E": "jawOpen 0.3 mouthStretch 0.3", **{name: VOWEL_FORMS[name] for name in ("aa", "ih", "oh", "ou")},
+}  # fmt: skip
 """The visemes of Oculus and OpenXR; silence moves nothing."""
 VISEMES = _invert({f"viseme_{name}": form for name, form in VISEME_FORMS.items()})
 FACEGOOD: Sources = {

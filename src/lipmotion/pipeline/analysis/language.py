@@ -14,18 +14,17 @@ from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_recording
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Request, SpeechInput, as_request
-from lipmotion.pipeline.workers import map_in_processes
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.network.posteriors import WORD_BOUNDARY, find_installed_recogniser, find_stretches
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, USING_WORDS, open_recogniser
+from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.storage.files import atomic_file, check_distinct, check_target
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import Audio, Span, TimedTranscript, TimedWord, Timeline, TranscriptLine
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
 from lipmotion.units.ipa_phones import read_tokens
-from lipmotion.units.language_detection import detect_language, is_english
-from lipmotion.units.mood_tags import parse_tagged_text
+from lipmotion.units.lexicon import detect_language, is_english
+from lipmotion.units.spoken_text import parse_tagged_text
 from lipmotion.units.text_normalisation import split_written_words
 
 LOG = logging.getLogger("lipmotion")
@@ -153,6 +152,10 @@ def recognise_words(speech: SpeechInput, *, model: Model | str | Path | None = N
         )
     audio = analysed(read_recording(request))
     recogniser = open_recogniser(chosen.phones, request.recogniser, chosen.adaptation)
+    if workers == 1:
+        return recogniser.recognition(audio, audio.mfcc())
+    from lipmotion.pipeline.workers import map_in_processes
+
     return recogniser.recognition(audio, audio.mfcc(), map_in_processes(workers))
 
 

@@ -20,11 +20,8 @@ from lipmotion.pipeline.analysis.language import warn_of_another_language
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_recording, read_request
 from lipmotion.pipeline.model import Model, with_prior
 from lipmotion.pipeline.request import DETECTED, Request
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP
-from lipmotion.speech.features.speaker_similarity import rate_knowledge
-from lipmotion.speech.features.voice_events import find_voice_events, silence_units
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recognition.network.beam_search import load_english
 from lipmotion.speech.recognition.network.posteriors import infer_posteriors
@@ -37,10 +34,13 @@ from lipmotion.speech.recognition.recognised_speech import (
     select_reliable,
 )
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, Recogniser, find_network, open_recogniser
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.sound.speaker_similarity import rate_knowledge
+from lipmotion.speech.sound.voice_events import find_voice_events, silence_units
 from lipmotion.storage.sources import is_file
 from lipmotion.types import (
     FRAME_RATE_HZ,
+    SPEECH_RATE_HZ,
     Audio,
     Features,
     Monitor,
@@ -62,7 +62,7 @@ from lipmotion.types.audio import LAUGHTER
 from lipmotion.types.delivery import MoodTag
 from lipmotion.types.languages import ENGLISH
 from lipmotion.units import SILENCE, UNKNOWN_PHONES, check_phones, check_text, close_gaps, is_silent
-from lipmotion.units.mood_tags import parse_tagged_text
+from lipmotion.units.spoken_text import parse_tagged_text
 from lipmotion.units.text_normalisation import require_tokens
 
 if TYPE_CHECKING:

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, shorten
 from lipmotion.hmm.loudness import find_loud_frames
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, measure_fit
 from lipmotion.speech.recognition.anchors import find_anchors, fit_transcript
 from lipmotion.speech.recognition.network.posteriors import (
@@ -36,6 +35,7 @@ from lipmotion.speech.recognition.transcript_evidence import (
     WordEvidence,
     find_evidence,
 )
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.voices.espeak import LanguageLexicon
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, Pronunciation, check_words, is_silent

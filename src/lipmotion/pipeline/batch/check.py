@@ -25,8 +25,8 @@ from lipmotion.speech.sound.pauses import list_spans, measure_levels_db
 from lipmotion.types import Monitor, Progress, TimedTranscript, silent_monitor
 from lipmotion.types.audio import to_sixteen_bits
 from lipmotion.types.languages import AUTO, ENGLISH, find_script
-from lipmotion.units.language_detection import COMMON_WORDS, detect_language
-from lipmotion.units.mood_tags import parse_tagged_text
+from lipmotion.units.lexicon import COMMON_WORDS, detect_language
+from lipmotion.units.spoken_text import parse_tagged_text
 from lipmotion.units.text_normalisation import find_words, split_written_words
 
 SILENT_DB = -60.0

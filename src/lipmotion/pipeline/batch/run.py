@@ -53,11 +53,21 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.output import ShownFace
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.workers import ItemT, Pool, ResultT, WorkerDiedError, cluster_pool, open_workers, process_count
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.files import check_target, confine, make_folder, put_in_place, remove
 from lipmotion.storage.locks import open_temporary
 from lipmotion.storage.sources import Source, check_apart, hash_file
-from lipmotion.types import Audio, Generation, Item, Monitor, Progress, Span, Timeline, Unit, silent_monitor
+from lipmotion.types import (
+    SPEECH_RATE_HZ,
+    Audio,
+    Generation,
+    Item,
+    Monitor,
+    Progress,
+    Span,
+    Timeline,
+    Unit,
+    silent_monitor,
+)
 from lipmotion.units import Lexicon
 from lipmotion.units.phone_timelines import group_words
 

@@ -22,14 +22,13 @@ from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generation import find_speaker_map
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import ASKED, Onto, Pauses, Request
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.sound.resampling import JoinedPieces, overlap_pieces, resample_speech
 from lipmotion.speech.voices.installed import choose_voice, find_voice, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
-from lipmotion.types import Audio, Constraints, Span, SpokenText, Timeline, Unit
+from lipmotion.types import SPEECH_RATE_HZ, Audio, Constraints, Span, SpokenText, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, split_words
-from lipmotion.units.mood_tags import parse_tagged_text, time_moods
 from lipmotion.units.phones import SHORT_PAUSE_S
+from lipmotion.units.spoken_text import parse_tagged_text, time_moods
 from lipmotion.units.text_normalisation import MAX_CHARACTERS, split_sentences
 
 BETWEEN_S = 0.35

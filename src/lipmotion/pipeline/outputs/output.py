@@ -24,13 +24,13 @@ from lipmotion.formats.sound import SOUND_CODECS, write_sound
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Outputs
-from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.speech.features.f0 import find_prosody
 from lipmotion.speech.features.mfcc import WINDOW
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.resampling import decimate
 from lipmotion.storage.files import check_distinct, check_target
-from lipmotion.types import Audio, Generation, Monitor, Prosody, silent_monitor
+from lipmotion.types import SPEECH_RATE_HZ, Audio, Generation, Monitor, Prosody, silent_monitor
 from lipmotion.types.delivery import Staging
 
 Made = TypeVar("Made")

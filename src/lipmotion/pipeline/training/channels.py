@@ -16,9 +16,9 @@ from lipmotion.errors import CorpusError, InputError, shorten
 from lipmotion.motion.eigenlips import COMPONENTS, Eigenlips, fit_eigenlips
 from lipmotion.pipeline.model import BOTH, GEOMETRY, VISUALS
 from lipmotion.printable import printable
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser, infer_posteriors
 from lipmotion.speech.sound.acoustic_conditions import list_conditions
+from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.types import (
     FRAME_RATE_HZ,

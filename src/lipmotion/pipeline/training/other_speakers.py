@@ -17,10 +17,10 @@ from lipmotion.formats.label_files import CHAPTER, find_labels
 from lipmotion.pipeline.analysis.transcribe import align_or_recognise
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.prompts import prompts
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, score_agreement
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.acoustic_conditions import mix_noise
+from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import SYNTHESISERS, list_installed, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice

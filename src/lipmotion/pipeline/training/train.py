@@ -22,7 +22,7 @@ from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.hmm.unit_training import TranscribedUtterance, UnitInventory, train_hmm
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.motion.space import resample_track
-from lipmotion.motion.speaker_maps import add_habits, map_to_mean_person
+from lipmotion.motion.speaker_estimation import add_habits, map_to_mean_person
 from lipmotion.pipeline.analysis.transcribe import align_or_recognise, warn_of_guesses
 from lipmotion.pipeline.model import GEOMETRY, Model, load_model, with_prior
 from lipmotion.pipeline.training.channels import (
@@ -40,13 +40,13 @@ from lipmotion.pipeline.training.labels import (
 )
 from lipmotion.pipeline.training.other_speakers import SpokenSentence
 from lipmotion.pipeline.workers import open_training
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import LOG_ENERGY
-from lipmotion.speech.features.speaker_similarity import JUDGED_RECORDINGS, average_speaker
 from lipmotion.speech.recognition.adaptation_estimation import estimate_adaptation
 from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.speaker_similarity import JUDGED_RECORDINGS, average_speaker
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import (

@@ -18,7 +18,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lipmotion.speech.features.mfcc import HOP, WINDOW
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
+from lipmotion.types import SPEECH_RATE_HZ
 
 Array = NDArray[np.float32]
 WEIGHTS = "speech-encoder.npz"

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from lipmotion.kernels.paths import find_cheapest, trace_back
 from lipmotion.speech.features.mfcc import HOP, check_samples, frame_count
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.types import Audio, Prosody
+from lipmotion.types import SPEECH_RATE_HZ, Audio, Prosody
 
 LOWEST_HZ, HIGHEST_HZ = 60.0, 400.0
 BLOCK = 1024

@@ -11,8 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.types import ENERGY_FEATURE, FRAME_RATE_HZ, SPECTRUM_BANDS, Audio, Features
+from lipmotion.types import ENERGY_FEATURE, FRAME_RATE_HZ, SPECTRUM_BANDS, SPEECH_RATE_HZ, Audio, Features
 
 WINDOW = 400  # 25 ms
 HOP = 160  # 10 ms
@@ -34,8 +33,8 @@ LARGEST_SAMPLE = 1e6
 """Samples beyond are damage, whatever their full scale was; their squares would not be finite."""
 KNEE_HZ = 6500.0
 """Frequencies are warped in full up to here, or until they are as high as this."""
-BLOCK = 4096
-"""Frames transformed at a time: memory stays bounded for any length."""
+BLOCK = 256
+"""Frames transformed at a time: they fit into the cache, and memory stays bounded for any length."""
 
 
 def mfcc(audio: Audio, warp: float = 1.0) -> Features:
@@ -240,3 +239,43 @@ def find_centres() -> NDArray[np.float64]:
     """Return the frequencies in Hz at which the bands of ``log_bands`` are most sensitive [shape=(40,)]."""
     hertz = np.arange(SPEECH_RATE_HZ / 2 + 1)
     return np.interp(_edges(*BANDS)[1:-1], mel(hertz), hertz)
+
+
+GENERAL_FILTERS, GENERAL_CEPSTRA = 25, 13
+LOWEST_HZ, HIGHEST_HZ = 130.0, 6800.0  # of the filters of pocketsphinx's phone models
+
+
+def general_features(audio: Audio) -> NDArray[np.float32]:
+    """Return the features of the general models: c0–c12 less their mean, Δ over ±2 frames, Δ of Δ [shape=(T, 39)].
+
+    Frames are as in ``mfcc``.
+
+    Raises InputError: as ``mfcc``.
+    Source: the model's own feat.params and CMU Sphinx's ``1s_c_d_dd``. Deviations: windows of 25 instead of
+    25.6 ms, centred on their time; no noise removal.
+    """
+    cepstra = log_mel(check_samples(audio), _general_filters()) @ build_cosine(GENERAL_FILTERS, 0, GENERAL_CEPSTRA)
+    cepstra -= cepstra.mean(axis=0, dtype=np.float64).astype(np.float32)
+    features = np.empty((len(cepstra), 3 * GENERAL_CEPSTRA), np.float32)
+    features[:, :GENERAL_CEPSTRA] = cepstra
+    padded = np.pad(cepstra, ((3, 3), (0, 0)), mode="edge")
+    del cepstra
+
+    def shifted(frames: int) -> NDArray[np.float32]:
+        return padded[3 + frames : 3 + frames + len(features)]
+
+    delta, of_delta = (features[:, start : start + GENERAL_CEPSTRA] for start in (GENERAL_CEPSTRA, 2 * GENERAL_CEPSTRA))
+    np.subtract(shifted(2), shifted(-2), out=delta)
+    np.subtract(shifted(3), shifted(-1), out=of_delta)
+    of_delta -= shifted(1) - shifted(-3)
+    return features
+
+
+@cache
+def _general_filters() -> NDArray[np.float32]:
+    """Return triangular filters of equal area, equally spaced in mel, with corners on the bins [shape=(257, 25)]."""
+    bin_hz = SPEECH_RATE_HZ / FFT_SIZE
+    mel = np.linspace(2595 * np.log10(1 + LOWEST_HZ / 700), 2595 * np.log10(1 + HIGHEST_HZ / 700), GENERAL_FILTERS + 2)
+    edges = (np.round(700 * (10 ** (mel / 2595) - 1) / bin_hz) * bin_hz).astype(np.float64)
+    hertz = np.arange(FFT_SIZE // 2 + 1) * bin_hz
+    return (make_triangles(hertz, edges) * 2 / (edges[2:] - edges[:-2])).astype(np.float32)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.speech.features.mfcc import FEATURES
 from lipmotion.speech.recognition.general import STREAMS
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio
 from lipmotion.stats.constrained_mllr import identity, transformed
 from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 

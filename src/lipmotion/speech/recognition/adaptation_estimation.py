@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import FEATURES
-from lipmotion.speech.features.speaker_similarity import WARPS, find_warp
 from lipmotion.speech.recognition.adaptation import Adaptation, create_adaptation
 from lipmotion.speech.recognition.general import NOISES, STREAMS, load_general
 from lipmotion.speech.recognition.recogniser import Recogniser, weigh_own_model
+from lipmotion.speech.sound.analysed_audio import analysed
+from lipmotion.speech.sound.speaker_similarity import WARPS, find_warp
 from lipmotion.stats.constrained_mllr import (
     AffineStatistics,
     Array,

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.hmm.loudness import find_loud_frames, find_quiet_frames
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.general import STATES, find_density, load_general
 from lipmotion.speech.recognition.network.posteriors import POSTERIOR_STEP
 from lipmotion.speech.recognition.transcript_evidence import TranscriptEvidence, WordEvidence, label_evidence
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.types import FRAME_RATE_HZ, Audio, Span, Timeline, Unit
 from lipmotion.units import is_silent
 

@@ -14,9 +14,9 @@ from lipmotion.errors import AlignmentError
 from lipmotion.hmm.align import align_states, place_words
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import penalise, wrap_log_likelihoods
-from lipmotion.speech.features.analysed_audio import SILENT_ENERGY, Passage
-from lipmotion.speech.features.speaker_similarity import SpeakerSimilarity
 from lipmotion.speech.recognition.general import NOISES
+from lipmotion.speech.sound.analysed_audio import SILENT_ENERGY, Passage
+from lipmotion.speech.sound.speaker_similarity import SpeakerSimilarity
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, find_similar_phone, is_silent

@@ -16,13 +16,6 @@ from lipmotion.hmm.loudness import find_loud_frames, find_quiet_frames
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import LogLikelihoods, UnitLoop, build_unit_loop, compute_log_likelihoods, penalise
 from lipmotion.kernels.paths import Windows
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.features.speaker_similarity import (
-    OWN_SCORE,
-    STRANGER_SCORE,
-    SpeakerSimilarity,
-    speaker_similarity,
-)
 from lipmotion.speech.recognition.adaptation import Adaptation
 from lipmotion.speech.recognition.anchors import Anchors, align_within
 from lipmotion.speech.recognition.general import CombinedPhones, combine_likelihoods, combine_phones
@@ -49,6 +42,8 @@ from lipmotion.speech.recognition.word_search import (
     list_wordless,
     recognise_free,
 )
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.sound.speaker_similarity import OWN_SCORE, STRANGER_SCORE, SpeakerSimilarity, speaker_similarity
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, find_similar_phone, is_silent
 

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from lipmotion.errors import MissingDependencyError
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import LogLikelihoods, UnitLoop, decode_path, wrap_log_likelihoods
-from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.speech.recognition.general import NOISES
 from lipmotion.speech.recognition.network.beam_search import decode_words, load_english, score_stretch
 from lipmotion.speech.recognition.network.posteriors import (
@@ -35,9 +34,9 @@ from lipmotion.speech.recognition.recognised_speech import (
     splice,
     weigh_densities,
 )
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio
 from lipmotion.speech.sound.voice_activity import Stretch, find_sound, read_stretch
-from lipmotion.types import ParallelMap
+from lipmotion.types import SPEECH_RATE_HZ, ParallelMap
 from lipmotion.units import PHONES, SILENCE, Lexicon, Pronunciation, is_silent
 from lipmotion.units.lexicon import find_english_data
 from lipmotion.units.phones import count_phone_edits

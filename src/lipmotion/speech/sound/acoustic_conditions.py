@@ -13,18 +13,15 @@ from lipmotion.errors import InputError
 from lipmotion.hmm.loudness import find_loud_frames
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP, WINDOW, check_samples, log_energy, spectrum
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.sound.voice_activity import find_passages
-from lipmotion.types import Audio, ConditionSpectrum
+from lipmotion.types import SPEECH_RATE_HZ, Audio, ConditionSpectrum
 
 NOISE_KINDS = ("white", "babble")
-MIN_TALKERS = 2
-"""One other talker is an interruption, not a babble."""
+MIN_TALKERS = 2  # one other talker is an interruption, not a babble
 HEARD, FAINT, SPEECH_LIKE_DB = 1.01, 1e-4, 0.6
 """Energies beside that of a voice: of all channels, above which it is not alone, and of the faintest that may speak.
 Swings of the level in decibels, times the share of frames whose pitch moves: speech has 1 to 5, music up to 0.5."""
-SILENT_RMS = 1e-6
-"""Speech of a lower root mean square, full scale 1, is silence."""
+SILENT_RMS = 1e-6  # speech of a lower root mean square, full scale 1, is silence
 HUM, MIN_HUM, MAX_HUM_BLOCKS, HUM_RATIO, HUM_WIDTH = 16_000, 32_000, 200, 8.0, 61
 HUM_SHARE, HUM_REST = 0.03, 1e-5
 """Hum is looked for in blocks of a second, in sound of two and more: bins of a hertz of so much more amplitude than

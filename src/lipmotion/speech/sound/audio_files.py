@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import mmap
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,11 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.storage.sources import check_source, is_text, list_video, open_media, read_duration
-from lipmotion.types import Audio
+from lipmotion.types import SPEECH_RATE_HZ, Audio
 
 HOLE_S = 0.04
 """A frame this much later than the end of the one before leaves a hole; time stamps are rounded to 1 ms or better."""
-LONGEST_HOLE_S = 600.0
-"""A hole longer than this means that the time stamps are wrong."""
+LONGEST_HOLE_S = 600.0  # a hole longer than this means that the time stamps are wrong
 MAX_SILENCE_RATIO = 20.0
 """All holes together may last as long as the longest one allowed, and this many times the sound: a codec that sends
 nothing in pauses still sends 20 ms of every 400. More silence than that is no recording, but would fill the memory."""
@@ -29,8 +29,7 @@ LOWEST_HZ, HIGHEST_HZ = 4000, 1_000_000
 """Lowest and highest sampling rate: below, speech is not intelligible; no recorder samples at a higher one."""
 MAX_CHANNELS = 64
 AGAIN = "export the recording again"
-PIECE_BYTES = 1 << 20
-"""Sound is collected in pieces of this size, and without digital silence."""
+PIECE_BYTES = 1 << 20  # sound is collected in pieces of this size, and without digital silence
 
 
 def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
@@ -50,7 +49,7 @@ class _TrackDecoder:
     channel          : number of the channel to take; None: the mean of all channels
     samples, rate_hz : float32 array [shape=(N,)], and its sampling rate
     energies, centre : of every channel; the number of the centre of three and more, None where there is none
-    mean_energy      : energy of the channels' mean
+    mean_energy      : energy of the channels' mean; none of them counts what is constant
     packets, damaged : how many packets the track has, and how many of them could not be decoded
     silence_s        : duration of the silence that fills holes
     missing_s        : what the container states beyond the end
@@ -69,6 +68,8 @@ class _TrackDecoder:
         self._layout: Any = None
         self._clock_s: float | None = None
         self._energies: NDArray[np.float64] | float = 0.0
+        self._sums: NDArray[np.float64] | float = 0.0
+        self.note = ""
         self.mean_energy = self.silence_s = self._sound_s = 0.0
         self.packets = self.damaged = self._size = self._count = self._cut = 0
 
@@ -106,10 +107,15 @@ class _TrackDecoder:
         third = 2 if len(names) in (6, 8) and "NONE" in names else None  # names that a WAVE file may lack
         is_stated = self._stream.duration or not self._container.streams.video
         stated_s = read_duration(self._container, self._stream) if is_stated else 0.0
-        missing_s = stated_s - len(samples) / self.rate_hz
         rounded_s = ROUNDED_S if self._container.format.name in STATED else (1 - CUT_SHORT_SHARE) * stated_s
+        if self._container.format.name == "caf" and self._stream.codec_context.name.startswith("pcm"):
+            stated_s, rounded_s = self._stream.frames / self._stream.rate, 0.0  # its duration is that of the file
+        missing_s = stated_s - len(samples) / self.rate_hz
         self.samples = samples[self._cut :]
-        self.energies = np.atleast_1d(self._energies).tolist()
+        with np.errstate(all="ignore"):  # samples that are not finite are refused later
+            constant = np.square(self._sums) / max(self._count, 1)
+            self.energies = np.atleast_1d(np.maximum(self._energies - constant, 0)).tolist()
+            self.mean_energy -= float(np.mean(self._sums)) ** 2 / max(self._count, 1)
         self.missing_s = missing_s if missing_s > rounded_s else 0.0
         self.centre = names.index("FC") if "FC" in names[1:] else third
 
@@ -133,28 +139,22 @@ class _TrackDecoder:
     def _silence(self, duration_s: float) -> int:
         """Return the number of samples of a hole's silence. Raises InputError: the hole is too long."""
         if duration_s > LONGEST_HOLE_S:
-            raise InputError(
-                f"{self._name}: the time stamps of its sound jump by {duration_s:.0f} s, at most "
-                f"{LONGEST_HOLE_S:.0f} s are bridged; {AGAIN}"
-            )
+            what = f"{self._name}: the time stamps of its sound jump by {duration_s:.0f} s,"
+            raise InputError(f"{what} at most {LONGEST_HOLE_S:.0f} s are bridged; {AGAIN}")
         return round(duration_s * self.rate_hz)
 
     def _check_silence(self) -> None:
         max_s = LONGEST_HOLE_S + MAX_SILENCE_RATIO * self._sound_s
         if self.silence_s > max_s:
-            raise InputError(
-                f"{self._name}: the time stamps of its sound leave holes of {self.silence_s:.0f} s beside "
-                f"{self._sound_s:.1f} s of sound, at most {max_s:.0f} s are bridged; {AGAIN}"
-            )
+            what = f"{self._name}: the time stamps of its sound leave holes of {self.silence_s:.0f} s beside"
+            raise InputError(f"{what} {self._sound_s:.1f} s of sound, at most {max_s:.0f} s are bridged; {AGAIN}")
         self._check_length(self._sound_s + self.silence_s)
 
     def _check_length(self, length_s: float) -> None:
         max_s = LONGEST_HOLE_S + self._size / MIN_BYTES_PER_S
         if length_s > max_s:
-            raise InputError(
-                f"{self._name}: {self._size} bytes of sound last {length_s:.0f} s, required at most {max_s:.0f} s "
-                f"({MIN_BYTES_PER_S:.0f} bytes a second); {AGAIN}"
-            )
+            what = f"{self._name}: {self._size} bytes of sound last {length_s:.0f} s,"
+            raise InputError(f"{what} required at most {max_s:.0f} s ({MIN_BYTES_PER_S:.0f} bytes a second); {AGAIN}")
 
     def _flush(self) -> None:
         if self._resampler is not None:
@@ -168,6 +168,7 @@ class _TrackDecoder:
             with np.errstate(all="ignore"):  # samples that are not finite are refused when all is decoded
                 mean = channels.mean(axis=1)
                 self._energies = self._energies + np.square(channels, dtype=np.float64).sum(axis=0)
+                self._sums = self._sums + channels.sum(axis=0, dtype=np.float64)
                 self.mean_energy += float(np.square(mean, dtype=np.float64).sum())
             chosen = mean if self._channel is None else channels[:, self._channel]
             if chosen.any():
@@ -181,15 +182,11 @@ class _TrackDecoder:
 
 LOG = logging.getLogger("lipmotion")
 
-SPEECH_RATE_HZ = 16_000
-SHORTEST_S = 0.1
-"""Shorter recordings hold no sentence; the features need 25 ms around every frame."""
+SHORTEST_S = 0.1  # shorter recordings hold no sentence; the features need 25 ms around every frame
 CANCELLED_SHARE = 0.2
 """The mean of channels must have this share of the energy of unlike ones; else they cancel one another."""
-USABLE_SHARE = 0.5
-"""A damaged recording is refused when less than this share of its sound can be decoded."""
-MIN_HOLES_S = 0.005
-"""Holes that last less together are not mentioned: they would be rounded to 0."""
+USABLE_SHARE = 0.5  # a damaged recording is refused when less than this share of its sound can be decoded
+MIN_HOLES_S = 0.005  # holes that last less together are not mentioned: they would be rounded to 0
 CUT_SHORT_SHARE, ROUNDED_S, STATED = 0.9, 0.5, ("flac", "aiff", "mov,mp4,m4a,3gp,3g2,mj2")
 """A recording is called cut short when it holds less than this share of the duration that it states, or so many seconds
 less in a format that states it exactly."""
@@ -227,6 +224,8 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
             what = "%s: of its %d channels, channel %d alone holds speech and is used; mix them down if others speak"
             LOG.log(level, what, path, count, sound.centre + 1)
             sound = _decode(path, rate_hz, sound.centre)
+    if sound.note:
+        LOG.log(level, "%s: %s", path, sound.note)
     damage = f"{sound.damaged} of {sound.packets} packets of sound cannot be decoded"
     if sound.damaged > (1 - USABLE_SHARE) * sound.packets:
         raise InputError(f"{path}: damaged: {damage}; required: at least half of them; {AGAIN}")
@@ -248,7 +247,7 @@ def _decode(path: Path, rate_hz: int, channel: int | None) -> _TrackDecoder:
     import av
 
     try:
-        content, missing_s = _correct_wave(path)
+        content, missing_s, note = _correct_wave(path)
         with open_media(path, content=content) as container:
             if not container.streams.audio:
                 raise InputError(f"{path}: has no sound track; give a recording with sound")
@@ -262,15 +261,14 @@ def _decode(path: Path, rate_hz: int, channel: int | None) -> _TrackDecoder:
                 LOG.warning("%s: its last page is not marked as the last: it may be cut short", path)
             sound = _TrackDecoder(container, rate_hz, channel)
             sound.decode()
-            sound.missing_s = max(missing_s, sound.missing_s)
+            sound.missing_s, sound.note = max(missing_s, sound.missing_s), note
             return sound
     except (av.FFmpegError, ValueError) as error:
         if isinstance(error, InputError):
             raise
         if is_text(path):
-            raise InputError(
-                f"{path}: is text, required a recording; give the recording first, its words with --transcript {path}"
-            ) from error
+            what = f"{path}: is text, required a recording; give the recording first,"
+            raise InputError(f"{what} its words with --transcript {path}") from error
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: not a readable recording ({reason}); give an audio or video file") from error
 
@@ -289,12 +287,14 @@ class _Wave(mmap.mmap):
         return super().tell() - self.start
 
 
-def _correct_wave(path: Path) -> tuple[_Wave | None, float]:
-    """Return a WAVE file under a header that FFmpeg understands, and how many seconds its own states beyond its end.
+def _correct_wave(path: Path) -> tuple[_Wave | None, float, str]:
+    """Return a WAVE file under a header that FFmpeg understands, how many seconds its own states beyond its end, and
+    what else is wrong with it.
 
     None: its own is one, or it is no WAVE file. 0 seconds: also of streams, which do not know their size.
     FFmpeg reads samples of as many bits as are valid, without the zeros that fill their container: 24 bits in 32 as 24,
-    20 as another format, 17 as 24. It also loses its way at a chunk of odd length that no byte follows.
+    20 as another format, 17 as 24. It also loses its way at a chunk of odd length that no byte follows, and reads one
+    of several pieces of sound.
     Raises ValueError: numbers with the high byte first, which FFmpeg would read as the other ones.
     """
     with path.open("rb") as file:
@@ -302,11 +302,11 @@ def _correct_wave(path: Path) -> tuple[_Wave | None, float]:
         if kind == b"RIFX":
             raise ValueError("a WAVE file with the high byte first (RIFX); export it as .wav or .flac")
         if kind not in {b"RIFF", b"RF64", b"BW64", b"riff"}:
-            return None, 0.0
+            return None, 0.0, ""
         content = _Wave(file.fileno(), 0, access=mmap.ACCESS_COPY)
-    form, body, size, unpadded = _find_wave_chunks(content)
+    form, body, size, rewritten, note = _find_wave_sound(content)
     if len(form) < 16:
-        return None, 0.0
+        return None, 0.0, ""
     coding, channels, rate_hz, per_second, block, bits = struct.unpack_from("<HHIIHH", form)
     valid, missing = bits, 0 if size in UNKNOWN_SIZES else max(body + size - len(content), 0)
     missing_s = missing / max(per_second, 1)
@@ -315,10 +315,10 @@ def _correct_wave(path: Path) -> tuple[_Wave | None, float]:
     min_frame = -(-bits // 8) * channels
     frame = block if block * rate_hz == per_second and block >= min_frame else min_frame
     if coding not in {PCM, FLOAT} or not channels or frame % channels:
-        return None, missing_s
+        return None, missing_s, note
     container = 8 * frame // channels
-    if not unpadded and bits == container and valid in {0, container}:
-        return None, missing_s
+    if not rewritten and bits == container and valid in {0, container}:
+        return None, missing_s, note
     size = min(size or len(content), len(content) - body)
     header = struct.pack("<HHIIHH", coding, channels, rate_hz, frame * rate_hz, frame, container)
     lengths = [min(length, 0xFFFFFFFF) for length in (36 + size, size)]
@@ -326,26 +326,56 @@ def _correct_wave(path: Path) -> tuple[_Wave | None, float]:
     content.start, content.name = body - len(header), str(path)
     content[content.start : body] = header
     content.seek(0)
-    return content, missing_s
+    return content, missing_s, note
 
 
-def _find_wave_chunks(content: _Wave) -> tuple[bytes, int, int, bool]:
-    """Return the content of the chunk of the form, where the samples are, how many bytes of them, and whether a chunk
-    of odd length lacks the byte after it. The form is empty where there is none, or there are no samples."""
+def _find_wave_sound(content: _Wave) -> tuple[bytes, int, int, bool, str]:
+    """Return the content of the chunk of the form, where the samples are, how many bytes of them, whether FFmpeg would
+    not find them, and what is wrong. The form is empty where there is none, or there are no samples.
+
+    Several pieces of sound, of which FFmpeg reads the last one, are joined in their place.
+    """
+    form, body, size, reached, pieces, rewritten = b"", 0, 0, 0, 0, False
+    for name, place, length, unpadded in _iterate_wave_chunks(content):
+        if name == b"fmt " and form not in (b"", content[place : place + length]):
+            break  # another recording behind this one
+        if name == b"fmt ":
+            form = content[place : place + length]
+        elif name == b"ds64":
+            size = int.from_bytes(content[place + 8 : place + 16], "little")
+            rewritten = not size  # what was recorded was not finished
+        elif name == b"data" and not pieces:
+            body, size, pieces, rewritten = place, size or length, 1, rewritten or unpadded
+        elif name == b"data":
+            length = min(length, len(content) - place)  # noqa: PLW2901
+            content.move(body + size, place, length)
+            size, pieces, rewritten = size + length, pieces + 1, True
+        reached = place + length
+    per_second = max(int.from_bytes(form[8:12], "little"), 1)
+    more = len(content[reached : reached + PIECE_BYTES].strip(b"\0")) if size else 0
+    note = f"its sound is in {pieces} pieces, which are joined" if pieces > 1 else ""
+    if more > max(size * (1 - CUT_SHORT_SHARE), SHORTEST_S * per_second):
+        what = f"its header states {size / per_second:.1f} s of sound, and more bytes follow than it names"
+        note = f"{what}: they are not read; {AGAIN} if its end is missing"
+    return form if pieces else b"", body, size, rewritten, note
+
+
+def _iterate_wave_chunks(content: _Wave) -> Iterator[tuple[bytes, int, int, bool]]:
+    """Yield the name of each chunk, where its content is, how long, and whether a chunk of odd length so far lacks the
+    byte after it. What follows a piece of sound whose length is not stated has no chunks."""
     long = content[:4] == b"riff"  # Sony's Wave64: 16 bytes of a name, 8 of a length that counts itself
-    head, body, name, size = (24 if long else 8), (40 if long else 12), b"", 0
-    form, stated, unpadded = b"", 0, False
-    while name != b"data":
+    head, body, size, unpadded = (24 if long else 8), (40 if long else 12), 0, False
+    while True:
         place = body + size + (-size % 8 if long else size % 2)
         if not long and size % 2 and content[body + size : body + size + 4] in {b"fmt ", b"data", b"LIST", b"fact"}:
             place, unpadded = body + size, True
         if size < 0 or place + head > len(content):
-            return b"", 0, 0, False
+            return
         body, name = place + head, content[place : place + 4]
         (size,) = struct.unpack_from("<16xQ" if long else "<4xI", content, place)
-        size -= 24 if long else 0
-        if name == b"fmt ":
-            form = content[body : body + size]
-        elif name == b"ds64":
-            stated = int.from_bytes(content[body + 8 : body + 16], "little")
-    return form, body, stated or size, unpadded
+        size = 4 if name == b"RIFF" else size - (24 if long else 0)  # another file at the end
+        if not all(31 < letter < 127 for letter in name):
+            return
+        yield name, body, size, unpadded
+        if name == b"data" and not size:
+            return

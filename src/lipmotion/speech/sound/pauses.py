@@ -10,8 +10,7 @@ from lipmotion.types import Audio
 Array = NDArray[np.float64]
 
 STEP_S = 0.01
-SMOOTHING_FRAMES = 5
-"""Levels are means of this many frames: shorter dips, as in plosives, are none."""
+SMOOTHING_FRAMES = 5  # levels are means of this many frames: shorter dips, as in plosives, are none
 BLOCK_S = 30.0
 """The quiet and the loud level are measured around every such block, as rooms and voices change in an hour."""
 QUIET_PERCENTILE, LOUD_PERCENTILE = 10, 95
@@ -19,10 +18,8 @@ SPEECH_SHARE = 0.35
 """Speech is louder than the quiet level by this share of the distance between the quiet and the loud one, in dB."""
 MIN_RANGE_DB = 10.0
 """Where loud and quiet differ by less (music, noise), there are no pauses: all of it counts as speech."""
-MIN_PAUSE_S = 0.2
-"""A shorter silence is part of a word, or of no use to divide at."""
-MIN_SPEECH_S = 0.1
-"""Shorter sounds are clicks."""
+MIN_PAUSE_S = 0.2  # a shorter silence is part of a word, or of no use to divide at
+MIN_SPEECH_S = 0.1  # shorter sounds are clicks
 QUIETEST_DB = -100.0
 
 

@@ -14,11 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.types import Audio, to_sixteen_bits
+from lipmotion.types import SPEECH_RATE_HZ, Audio, to_sixteen_bits
 
-BLOCK = 1 << 16
-"""Samples that are resampled at a time."""
+BLOCK = 1 << 16  # samples that are resampled at a time
 
 
 def resample_speech(sound: Audio) -> Audio:
@@ -38,10 +36,8 @@ def resample_speech(sound: Audio) -> Audio:
 
 Samples = NDArray[np.float32]
 
-REACH = 10
-"""The filter reaches this many samples of the lower rate to either side."""
-DECIMATED_BLOCK = 1 << 18
-"""Samples of the lower rate that are computed at a time: memory stays bounded for any length."""
+REACH = 10  # the filter reaches this many samples of the lower rate to either side
+DECIMATED_BLOCK = 1 << 18  # samples of the lower rate that are computed at a time: memory stays bounded for any length
 KAISER_BETA = 5.0
 
 
@@ -73,10 +69,8 @@ def decimate(samples: Samples, factor: int) -> Samples:
     return result
 
 
-OVERLAP_S = 0.012
-"""Duration over which two pieces overlap; about one period of a low voice."""
-REACH_S = 0.008
-"""The next piece begins so much earlier or later, at most."""
+OVERLAP_S = 0.012  # duration over which two pieces overlap; about one period of a low voice
+REACH_S = 0.008  # the next piece begins so much earlier or later, at most
 
 
 class JoinedPieces(NamedTuple):

@@ -18,21 +18,17 @@ from lipmotion.speech.features.mfcc import DYNAMIC_RANGE, HOP, WINDOW
 from lipmotion.types import Audio
 from lipmotion.types.audio import to_sixteen_bits
 
-PAUSE_FRAMES = 40
-"""Sound with shorter pauses is one stretch."""
-MARGIN_FRAMES = 40
-"""Frames before and after the sound that belong to its stretch: recognisers expect a little silence."""
+PAUSE_FRAMES = 40  # sound with shorter pauses is one stretch
+MARGIN_FRAMES = 40  # frames before and after the sound that belong to its stretch: recognisers expect a little silence
 JOINED_FRAMES = 60
 """Stretches nearer than this, with their margins, are joined: words say more of one another than of nothing."""
 LONGEST_FRAMES = 1000
 """Longer stretches are cut where they are quietest: the time of phone networks grows faster than the length."""
 
-SEPARATE_FRAMES = 50
-"""A longer pause separates passages."""
+SEPARATE_FRAMES = 50  # a longer pause separates passages
 SHORT_FRAMES, NEAR_FRAMES = 150, 150
 """A passage shorter than the first belongs to a neighbour nearer than the second: one word says little of a voice."""
-LEVEL_STEP = 15 * DECIBEL
-"""Voices with a dip between them are passages of their own where their levels differ by more."""
+LEVEL_STEP = 15 * DECIBEL  # voices with a dip between them are passages of their own where their levels differ by more
 PASSAGE_MARGIN = 75
 """Frames before and after the sound of a passage that belong to it, where they are not digital silence."""
 CUT_FROM, CUT_FRAMES, CUT_STEP = 6, 6, 6 * DECIBEL

@@ -4,19 +4,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from engines.coupled.tiny import (
-    COUPLED,
-    FACTORIAL,
-    HMM,
-    KINDS,
-    MULTISTREAM,
-    THREE,
-    TWO,
-    chains,
-    grammar,
-    observations,
-    structure,
-)
+from engines.coupled import tiny
+from engines.coupled.tiny import grammar, structure
 from lipmotion.engines import create_engine
 from lipmotion.engines.coupled.chains import densities, model
 from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
@@ -133,22 +122,22 @@ def test_the_next_unit_has_the_probability_of_the_bigram():
                 assert reached.unit_probability[after] == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("kind", [COUPLED, FACTORIAL])
+@pytest.mark.parametrize("kind", [tiny.COUPLED, tiny.FACTORIAL])
 def test_probabilities_out_of_every_state_sum_to_one(kind):
     transitions = create_transitions(even(structure(kind)))
     left = np.bincount(transitions.product.arc_from, np.exp(transitions.arc_log))
     np.testing.assert_allclose(left, 1, rtol=1e-12)
-    one_chain = even(structure(HMM, (THREE,), states=3, limit=1))  # the HMM of its units
+    one_chain = even(structure(tiny.HMM, (tiny.THREE,), states=3, limit=1))  # the HMM of its units
     assert len(one_chain.joint_states) == 9
     assert len(one_chain.arc_from) == 9 + 6 + 9  # stay, move within, enter
 
 
 def test_structures_that_do_not_fit_together():
     for kind, sets, limit, message in (
-        (MULTISTREAM, (THREE, TWO), 1, "2 chains"),
-        (COUPLED, (THREE,), 1, "1 chains"),
-        (COUPLED, (THREE, TWO), 2, "required 0 to 1"),
-        (COUPLED, (THREE, TWO), None, "no limit"),
+        (tiny.MULTISTREAM, (tiny.THREE, tiny.TWO), 1, "2 chains"),
+        (tiny.COUPLED, (tiny.THREE,), 1, "1 chains"),
+        (tiny.COUPLED, (tiny.THREE, tiny.TWO), 2, "required 0 to 1"),
+        (tiny.COUPLED, (tiny.THREE, tiny.TWO), None, "no limit"),
     ):
         with pytest.raises(InputError, match=message):
             structure(kind, sets, states=2, limit=limit)
@@ -166,10 +155,15 @@ def random_counts(transitions, seed=0):
 
 
 @pytest.mark.parametrize(
-    ("kind", "sets", "limit"), [(COUPLED, (THREE, TWO), 1), (FACTORIAL, (THREE, TWO), 1), (HMM, (THREE,), 1)]
+    ("kind", "sets", "limit"),
+    [
+        (tiny.COUPLED, (tiny.THREE, tiny.TWO), 1),
+        (tiny.FACTORIAL, (tiny.THREE, tiny.TWO), 1),
+        (tiny.HMM, (tiny.THREE,), 1),
+    ],
 )
 def test_no_other_tables_have_a_higher_expected_likelihood(kind, sets, limit):
-    transitions = chains(structure(kind, sets, limit=limit)).transitions
+    transitions = tiny.chains(structure(kind, sets, limit=limit)).transitions
     counts = random_counts(transitions)
     best = transitions.reestimated(counts)
     value = expected_log_likelihood(best, counts)
@@ -183,7 +177,7 @@ def test_no_other_tables_have_a_higher_expected_likelihood(kind, sets, limit):
 
 
 def test_rows_without_data_stay():
-    transitions = chains().transitions
+    transitions = tiny.chains().transitions
     counts = random_counts(transitions)
     without_data = transitions.product.arc_from == 3
     counts[without_data] = 0
@@ -193,7 +187,7 @@ def test_rows_without_data_stay():
 
 
 def test_rare_joint_states_share_the_rows_of_their_own_state_and_lead():
-    transitions = chains().transitions
+    transitions = tiny.chains().transitions
     product, frames = transitions.product, np.zeros(len(transitions.product.joint_states))
     frames[:4] = 1000
     tied = transitions.tied(frames)
@@ -210,17 +204,17 @@ def test_rare_joint_states_share_the_rows_of_their_own_state_and_lead():
     np.testing.assert_allclose(even_tables.tied(0 * frames).arc_log, even_tables.arc_log)
 
 
-every = pytest.mark.parametrize(("kind", "sets", "limit"), KINDS)
+every = pytest.mark.parametrize(("kind", "sets", "limit"), tiny.KINDS)
 
 
 def made(kind, sets, limit, **other):
-    return chains(structure(kind, sets, limit=limit), **other)
+    return tiny.chains(structure(kind, sets, limit=limit), **other)
 
 
 @every
 @pytest.mark.parametrize("seen", [True, False, 0.5])
 def test_posteriors_are_those_of_all_paths(kind, sets, limit, seen):
-    model, data = made(kind, sets, limit), observations(seen=seen)
+    model, data = made(kind, sets, limit), tiny.observations(seen=seen)
     lattice = model.full_lattice
     result = model.infer(data, lattice).posteriors
     joint, counts, log_likelihood = oracle.posteriors(model, data)
@@ -241,7 +235,7 @@ def test_posteriors_are_those_of_all_paths(kind, sets, limit, seen):
 
 @every
 def test_the_best_path_is_the_best_of_all(kind, sets, limit):
-    model, data = made(kind, sets, limit), observations()
+    model, data = made(kind, sets, limit), tiny.observations()
     path, score = model.best_path(data, model.full_lattice)
     best, value = max(oracle.paths(model, data), key=lambda pair: pair[1])
     assert tuple(path) == best
@@ -250,9 +244,9 @@ def test_the_best_path_is_the_best_of_all(kind, sets, limit):
 
 @every
 def test_expected_precisions_and_means(kind, sets, limit):
-    model, data = made(kind, sets, limit), observations()
+    model, data = made(kind, sets, limit), tiny.observations()
     precision, weighted = sum_precisions(model, model.infer(data, model.full_lattice), 1)
-    number = 0 if kind == HMM else 1
+    number = 0 if kind == tiny.HMM else 1
     expected = oracle.component_statistics(model, data, number, 1)
     np.testing.assert_allclose(precision, expected[0], rtol=1e-4)
     np.testing.assert_allclose(weighted, expected[1], rtol=1e-3, atol=1e-4)
@@ -260,13 +254,13 @@ def test_expected_precisions_and_means(kind, sets, limit):
 
 def test_decoupled_tables_without_a_limit_are_the_product_of_hmms():
     """γ of each chain, and the likelihood, are those of the chains alone."""
-    model = made(FACTORIAL, (THREE, TWO), None)
+    model = made(tiny.FACTORIAL, (tiny.THREE, tiny.TWO), None)
     product = model.transitions.product
     draw = np.random.default_rng(5)
     own = [draw.uniform(0.2, 0.8, count) for count in product.structure.state_counts]
     decoupled = Transitions(product, model.transitions.rows, tuple(own))
     coupled = type(model)(model.streams, decoupled, model.groups)
-    data = observations(6)
+    data = tiny.observations(6)
     result = coupled.infer(data, coupled.full_lattice).posteriors
     total = 0.0
     for chain in range(2):
@@ -297,7 +291,7 @@ def single_chain(model, chain, advance, data):
 
 def test_a_factorial_hmm_of_one_chain_is_the_hmm():
     """With equal densities of all states of the second chain, the posteriors are those of the first chain alone."""
-    model = made(FACTORIAL, (THREE, TWO), None)
+    model = made(tiny.FACTORIAL, (tiny.THREE, tiny.TWO), None)
     group = model.groups[1]
     same = group.mixtures.select(np.zeros(group.mixtures.size[0], np.intp))
     blind = type(model)(
@@ -305,28 +299,31 @@ def test_a_factorial_hmm_of_one_chain_is_the_hmm():
         model.transitions,
         (model.groups[0], type(group)(group.streams, group.columns, same, group.weights, group.tie)),
     )
-    data = observations(6)
+    data = tiny.observations(6)
     result = blind.infer(data, blind.full_lattice).posteriors
     posterior, _ = single_chain(blind, 0, blind.transitions.advance[0], data)
     np.testing.assert_allclose(result.densities[0], posterior, atol=2e-5)
 
 
 def test_one_gaussian_each_makes_hmm_and_multistream_hmm_the_same():
-    joint, apart = made(HMM, (THREE,), 1, components=(1,)), made(MULTISTREAM, (THREE,), 1, components=(1, 1))
+    joint, apart = (
+        made(tiny.HMM, (tiny.THREE,), 1, components=(1,)),
+        made(tiny.MULTISTREAM, (tiny.THREE,), 1, components=(1, 1)),
+    )
     whole = joint.groups[0].mixtures
     groups = []
     for group, columns in zip(apart.groups, (slice(0, 2), slice(2, 3)), strict=True):
         cut = type(whole)(whole.log_weights, whole.means[:, :, columns], whole.variances[:, :, columns])
         groups.append(type(group)(group.streams, group.columns, cut, group.weights, group.tie))
     apart = type(apart)(apart.streams, joint.transitions, tuple(groups))
-    data = observations(6)
+    data = tiny.observations(6)
     one, other = (x.infer(data, x.full_lattice).posteriors for x in (joint, apart))
     np.testing.assert_allclose(one.chains[0], other.chains[0], atol=1e-6)
     assert one.log_likelihood == pytest.approx(other.log_likelihood, rel=1e-6)
 
 
 def test_a_lattice_of_all_units_is_the_full_one_and_a_smaller_one_excludes_paths():
-    model, data = made(COUPLED, (THREE, TWO), 1), observations(5)
+    model, data = made(tiny.COUPLED, (tiny.THREE, tiny.TWO), 1), tiny.observations(5)
     product = model.transitions.product
     allowed = np.ones((5, 3), bool)
     result = model.infer(data, model.full_lattice).posteriors
@@ -348,7 +345,7 @@ def test_a_lattice_of_all_units_is_the_full_one_and_a_smaller_one_excludes_paths
 
 def both(seed=0) -> tuple[model.Chains, model.Chains]:
     """The same factorial HMM with a listed product and without; three joint states have densities of their own."""
-    listed = chains(structure(FACTORIAL, (THREE, TWO), limit=None), seed=seed)
+    listed = tiny.chains(structure(tiny.FACTORIAL, (tiny.THREE, tiny.TWO), limit=None), seed=seed)
     product = listed.transitions.product
     visits = np.zeros(len(product.joint_states))
     visits[[0, 5, 17]] = 100
@@ -375,7 +372,7 @@ def penalised(listed: model.Chains, groups) -> model.Chains:
 def test_posteriors_and_paths_are_those_of_the_listed_product():
     for seed, seen in ((0, True), (1, False)):
         listed, free = both(seed)
-        data = observations(9, seed=seed, seen=seen)
+        data = tiny.observations(9, seed=seed, seen=seen)
         one, other = (x.infer(data, x.full_lattice).posteriors for x in (listed, free))
         assert other.log_likelihood == pytest.approx(one.log_likelihood, rel=1e-5)
         for chain in range(2):
@@ -392,7 +389,7 @@ def test_posteriors_and_paths_are_those_of_the_listed_product():
 
 def test_conversion_is_the_same():
     listed, free = both()
-    data = observations(8)
+    data = tiny.observations(8)
     for update in ("exact", "printed"):
         results = [convert(x, data, x.full_lattice, "soft", update, 3)[0] for x in (listed, free)]
         np.testing.assert_allclose(results[0][0], results[1][0], rtol=1e-3, atol=1e-4)
@@ -401,8 +398,8 @@ def test_conversion_is_the_same():
 @pytest.mark.parametrize("loss", [0.0, UNSEEN_LOSS])
 def test_densities_integrate_to_1_without_a_loss(loss):
     """As printed, those of every joint state; with the option, rare ones lose that share, and frequent ones nothing."""
-    of = replace(structure(FACTORIAL, (THREE, TWO), limit=None), unseen_loss=loss)
-    listed = chains(of, sizes=(1, 1))
+    of = replace(structure(tiny.FACTORIAL, (tiny.THREE, tiny.TWO), limit=None), unseen_loss=loss)
+    listed = tiny.chains(of, sizes=(1, 1))
     visits = np.where(np.arange(len(listed.transitions.product.joint_states)) < 4, MIN_FRAMES, MIN_FRAMES - 1)
     free = with_joint_state_densities(listed, listed.transitions, visits, of)
     assert len(free.transitions.own_density_states) == 4
@@ -416,7 +413,7 @@ def test_densities_integrate_to_1_without_a_loss(loss):
 
 def test_counts_are_of_moving_on_and_staying():
     listed, free = both()
-    data = observations(9)
+    data = tiny.observations(9)
     one, other = (x.infer(data, x.full_lattice).posteriors for x in (listed, free))
     counts = np.zeros(free.transitions.statistic_count)
     counts[free.full_lattice.transition_index] = other.transition_counts
@@ -432,7 +429,7 @@ def test_only_allowed_units_are_in_the_lattice_and_visual_ones_a_little_before_a
     allowed[:20, first] = True
     allowed[20:, second] = True
     lattice = free.lattice(allowed)
-    found = free.infer(observations(40), lattice).posteriors
+    found = free.infer(tiny.observations(40), lattice).posteriors
     states = free.structure.states
     assert found.chains[0][:20].reshape(20, -1, states)[:, second].max() == 0
     seen = found.chains[1].reshape(40, -1, states)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property, partial
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -218,13 +218,19 @@ def find_reachable(structure: Structure, grammar: Grammar) -> Product:
     for unit, probability in enumerate(grammar.initial[0].tolist()):
         units = tuple(structure.corresponding_units[c][unit] for c in chains)
         initial_states[JointState(units, (0,) * len(chains), (False,) * len(chains))] = probability
-    reached: dict[JointState, list[_Successor]] = {}
+    list_moves = cache(lambda *joint: [*_list_moves(structure, *joint)])
+    enter_units = cache(partial(_enter_units, structure.corresponding_units, grammar.bigrams[0]))
+    reached: dict[JointState, list[tuple[JointState, tuple[bool, ...], float]]] = {}
     waiting = deque(initial_states)
     while waiting:
         joint = waiting.popleft()
         if joint in reached:
             continue
-        reached[joint] = list(_list_successors(structure, grammar.bigrams[0], joint))
+        reached[joint] = [
+            (JointState(units, states, ahead), moved, probability)
+            for moved, leaving, states, ahead in list_moves(joint.states, joint.ahead)
+            for units, probability in enter_units(joint.units, leaving, joint.ahead).items()
+        ]
         waiting.extend(target for target, _, _ in reached[joint] if target not in reached)
     joint_states = tuple(sorted(reached, key=lambda j: (j.ahead, j.states, j.units[1:], j.units[0])))
     number = {joint: index for index, joint in enumerate(joint_states)}
@@ -233,57 +239,52 @@ def find_reachable(structure: Structure, grammar: Grammar) -> Product:
         for source, targets in reached.items()
         for target, moves, probability in targets
     ]
-    initial = np.zeros(len(joint_states))
-    for joint, probability in initial_states.items():
-        initial[number[joint]] = probability
+    initial = np.array([initial_states.get(joint, 0.0) for joint in joint_states])
     targets, sources, moved, unit_probability = zip(*sorted(arcs, key=lambda arc: arc[:2]), strict=True)
-    return Product(
-        structure,
-        grammar,
-        joint_states,
-        arc_from=np.array(sources, np.intp),
-        arc_to=np.array(targets, np.intp),
-        moves=np.array(moved, bool).T,
-        unit_probability=np.array(unit_probability, float),
-        initial=initial / initial.sum(),
-    )
+    arrays = np.array(sources, np.intp), np.array(targets, np.intp), np.array(moved, bool).T, np.array(unit_probability)
+    return Product(structure, grammar, joint_states, *arrays, initial / initial.sum())
 
 
-_Successor = tuple[JointState, tuple[bool, ...], float]
-"""A joint state that may follow, which chains move on, and the probability of the units entered."""
+_Flags = tuple[bool, ...]
 
 
-def _list_successors(structure: Structure, bigram: NDArray[np.float64], joint: JointState) -> Iterator[_Successor]:
-    """Yield what may follow a joint state, by the limit of asynchrony and the first chain's bigram."""
-    corresponding = structure.corresponding_units
-    for moved in product((False, True), repeat=len(joint.units)):
-        leaving = tuple(move and state == structure.states - 1 for move, state in zip(moved, joint.states, strict=True))
-        if any(out and ahead for out, ahead in zip(leaving, joint.ahead, strict=True)):
+def _list_moves(
+    structure: Structure, states: tuple[int, ...], ahead: _Flags
+) -> Iterator[tuple[_Flags, _Flags, tuple[int, ...], _Flags]]:
+    """Yield which chains may move on, which leave a unit, and their states and who is ahead then, within the limit."""
+    for moved in product((False, True), repeat=len(states)):
+        leaving = tuple(move and state == structure.states - 1 for move, state in zip(moved, states, strict=True))
+        if any(out and was for out, was in zip(leaving, ahead, strict=True)):
             continue  # the chain would be a second unit ahead
         if any(leaving) and not (structure.cross_units or all(leaving)):
             continue
-        states = tuple(
-            0 if out else state + move for out, state, move in zip(leaving, joint.states, moved, strict=True)
+        after = tuple(0 if out else state + move for out, state, move in zip(leaving, states, moved, strict=True))
+        now_ahead = tuple(out or was for out, was in zip(leaving, ahead, strict=True))
+        positions = [state + structure.states * out for state, out in zip(after, now_ahead, strict=True)]
+        if structure.limit is None or max(positions) - min(positions) <= structure.limit:
+            yield moved, leaving, after, (False,) * len(ahead) if all(now_ahead) else now_ahead
+
+
+def _enter_units(
+    corresponding: Sequence[Sequence[int]],
+    bigram: NDArray[np.float64],
+    units: tuple[int, ...],
+    leaving: _Flags,
+    ahead: _Flags,
+) -> dict[tuple[int, ...], float]:
+    """Return the units of all chains after some leave theirs, with probabilities, by the first chain's bigram."""
+    entered = {units[0]: 1.0}  # of the first chain, if it enters one or is in it already
+    if any(leaving) and not ahead[0]:
+        row, chains_ahead = bigram[units[0]], [c for c, is_ahead in enumerate(ahead) if is_ahead]
+        candidates = [u for u in range(len(row)) if all(corresponding[c][u] == units[c] for c in chains_ahead)]
+        total = sum(row[unit] for unit in candidates)
+        entered = {unit: float(row[unit] / total) for unit in candidates}
+    probabilities: dict[tuple[int, ...], float] = defaultdict(float)
+    for unit, probability in entered.items():
+        probabilities[tuple(corresponding[c][unit] if out else units[c] for c, out in enumerate(leaving))] += (
+            probability
         )
-        ahead = tuple(out or was for out, was in zip(leaving, joint.ahead, strict=True))
-        positions = [state + structure.states * out for state, out in zip(states, ahead, strict=True)]
-        if not (structure.limit is None or max(positions) - min(positions) <= structure.limit):
-            continue
-        relative_ahead = (False,) * len(ahead) if all(ahead) else ahead
-        entered = {joint.units[0]: 1.0}  # of the first chain, if it enters one or is in it already
-        if any(leaving) and not joint.ahead[0]:
-            row, chains_ahead = bigram[joint.units[0]], [c for c, is_ahead in enumerate(joint.ahead) if is_ahead]
-            candidates = [
-                unit for unit in range(len(row)) if all(corresponding[c][unit] == joint.units[c] for c in chains_ahead)
-            ]
-            total = sum(row[unit] for unit in candidates)
-            entered = {unit: float(row[unit] / total) for unit in candidates}
-        probabilities: dict[tuple[int, ...], float] = defaultdict(float)
-        for unit, probability in entered.items():
-            units = (corresponding[c][unit] if out else joint.units[c] for c, out in enumerate(leaving))
-            probabilities[tuple(units)] += probability
-        for units_of_chains, probability in probabilities.items():
-            yield JointState(units_of_chains, states, relative_ahead), moved, probability
+    return probabilities
 
 
 Array = NDArray[np.float64]

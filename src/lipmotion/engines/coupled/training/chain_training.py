@@ -391,7 +391,7 @@ MAX_STEPS = 6
 """Greatest number of EM steps between one splitting and the next."""
 
 
-def grow_chains(
+def grow_chains(  # noqa: PLR0913
     structure: Structure,
     streams: tuple[str, ...],
     data: Sequence[AlignedUtterance],
@@ -399,6 +399,7 @@ def grow_chains(
     weights: Sequence[float],
     report: Report = no_report,
     work: Checkpoint = NO_CHECKPOINT,
+    start: Chains | None = None,
 ) -> Iterator[EmResult[Chains, ChainStatistics]]:
     """Yield results of EM, started by Viterbi training: chains with 1, 2, 4, … Gaussians, each to convergence.
 
@@ -406,17 +407,19 @@ def grow_chains(
     mixtures : Gaussians per density of each stream group in the end, powers of two
     weights  : the exponent of each stream's density
     report   : while the number of components stays, the log likelihood never falls
+    start    : chains that were yielded for the same data, from whose Gaussians others are split; None: begin
     Source: Xie & Liu 2007, §3.4 and Appendix A, with scaled recursions.
     """
     floors = compute_variance_floors([utterance.observations for utterance in data])
-    chains = create_chains(structure, streams, data, weights, floors)
+    chains, steps = start or create_chains(structure, streams, data, weights, floors), 1 if start else MAX_STEPS
     utterances = [build_lattice_utterance(chains, utterance) for utterance in data]
     while True:
-        result = train_to_convergence(chains, utterances, floors, MAX_STEPS, report, work)
-        yield result
+        result = train_to_convergence(chains, utterances, floors, steps, report, work)
+        if steps == MAX_STEPS:
+            yield result
         if all(count >= most for count, most in zip(count_components(result.model), mixtures, strict=True)):
             return
-        chains = with_split_components(result.model, mixtures, result.statistics)
+        chains, steps = with_split_components(result.model, mixtures, result.statistics), MAX_STEPS
 
 
 def train_to_convergence(

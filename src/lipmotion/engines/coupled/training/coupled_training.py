@@ -105,10 +105,15 @@ THREADS = Checkpoint(parallel_map=_run_threaded)
 
 
 def grow_models(
-    examples: Sequence[Example], config: CoupledConfig, monitor: Monitor, work: Checkpoint = THREADS
+    examples: Sequence[Example],
+    config: CoupledConfig,
+    monitor: Monitor,
+    work: Checkpoint = THREADS,
+    start: CoupledModel | None = None,
 ) -> Iterator[Callable[[], Fit[CoupledModel]]]:
     """Yield functions that return models of 1, 2, 4, … Gaussians, and figures of the training; the last is the result.
 
+    start : a model of them, of the same examples, from which to go on: those of more Gaussians follow
     Figures are ``frames``, ``joint_states``, and ``converged``: whether EM with the greatest number of Gaussians
     ended for want of gain (1), not after the greatest number of steps (0).
     Examples without observed motion are for the second stage of training, which re-estimates the densities of speech
@@ -172,7 +177,7 @@ def grow_models(
     names, weights = (SPEECH, *(s.name for s in visual)), (config.audio_weight, *(weight_of[s.name] for s in visual))
     mixtures = (config.mixtures, *(config.visual_mixtures for _ in visual if structure.kind != HMM))
     report = _reporter("chains", MAX_STEPS * max(mixtures).bit_length(), sub_monitor(monitor, 0, first_share))
-    for grown in grow_chains(structure, names, data, mixtures, weights, report, work):
+    for grown in grow_chains(structure, names, data, mixtures, weights, report, work, start.chains if start else None):
         yield partial(finish, grown)
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.speech.features.encoding import COMPONENTS, read_background
+from lipmotion.speech.sound.analysed_audio import AnalysedAudio
 from lipmotion.stats.mixture import QuadraticForm
 
 WARPS = (0.88, 0.94, 1.0, 1.06, 1.12)

@@ -34,8 +34,9 @@ def test_units_alone_without_names_of_units(tmp_path: Path) -> None:
     assert [span.label.again for span in read_units(tmp_path / "b.json")] == [n == 1 for n in range(len(rows))]
 
 
-def test_labels_of_audacity_with_a_gap(write: Any) -> None:
-    assert phones(read_units(write("0.0\t0.4\tsil\n0.5\t0.7\taa\n", "a.txt"))) == [ROWS[0], ROWS[2]]
+def test_labels_of_audacity_with_a_gap(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("0.0\t0.4\tsil\n0.5\t0.7\taa\n", encoding="utf-8")
+    assert phones(read_units(tmp_path / "a.txt")) == [ROWS[0], ROWS[2]]
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,17 @@ from numpy.typing import NDArray
 
 from lipmotion.hmm.loudness import average_power, find_sound_runs, find_spoken_frames, smooth_level
 from lipmotion.speech.features.encoding import WindowedEncoding
-from lipmotion.speech.features.mfcc import HOP, WINDOW, check_samples, frame_count, log_energy, mfcc_of_warps, spectrum
-from lipmotion.speech.recognition.general import CEPSTRA, general_features
+from lipmotion.speech.features.mfcc import (
+    GENERAL_CEPSTRA,
+    HOP,
+    WINDOW,
+    check_samples,
+    frame_count,
+    general_features,
+    log_energy,
+    mfcc_of_warps,
+    spectrum,
+)
 from lipmotion.speech.sound.voice_activity import (
     SEPARATE_FRAMES,
     SOFTEST_DROP,
@@ -203,7 +212,7 @@ class AnalysedAudio(Audio):
 
     @cached_property
     def general_features(self) -> NDArray[np.float32]:
-        """The features of the general models [shape=(T, 39)], as of ``speech.recognition.general``."""
+        """The features of the general models [shape=(T, 39)], as of ``features.mfcc``."""
         return self.joined(lambda audio: audio.general_features)
 
     @cached_property
@@ -333,7 +342,7 @@ class _PassageAudio(AnalysedAudio):
     @property  # not kept: recognition alone takes them, mostly once
     def general_features(self) -> NDArray[np.float32]:
         rows = self._with_silence(general_features(self.sound))
-        rows[:, :CEPSTRA] -= rows[:, :CEPSTRA].mean(axis=0, dtype=np.float64).astype(np.float32)
+        rows[:, :GENERAL_CEPSTRA] -= rows[:, :GENERAL_CEPSTRA].mean(axis=0, dtype=np.float64).astype(np.float32)
         return rows  # its models were trained on sentences with silence
 
     @cached_property

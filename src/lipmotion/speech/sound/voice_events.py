@@ -20,9 +20,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from lipmotion.speech.features.analysed_audio import SILENT_ENERGY, AnalysedAudio, analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP, find_centres, log_bands
+from lipmotion.speech.sound.analysed_audio import SILENT_ENERGY, AnalysedAudio, analysed
 from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Unit, VoiceEvent
 from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
 from lipmotion.units import VOWELS, is_silent
