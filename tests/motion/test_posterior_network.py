@@ -56,9 +56,9 @@ def example(number: int, *, known: bool = True, heard: bool = True) -> Example:
 def trained(examples: list[Example], steps: float = 1.0) -> PosteriorNetwork:
     values = [np.asarray(each.motion.values) for each in examples]
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(posterior_network, "STEPS", 2 * steps)
-        patched.setattr(posterior_network, "RECURRENT_STEPS", steps)
-        patched.setattr(posterior_network, "_train_recurrent", TRAINED_RECURRENT)
+        less = {"STEPS": 2 * steps, "RECURRENT_STEPS": steps, "_train_recurrent": TRAINED_RECURRENT}
+        for name, value in less.items():
+            patched.setattr(posterior_network, name, value)
         return PosteriorNetwork.fit(PredictorTraining(examples, values, 2)).predictor  # type: ignore[return-value]
 
 

@@ -248,7 +248,5 @@ def _filtered(samples: Array, sections: Array, hop: int) -> Array:
     """Return filtered samples: ``hop`` at a time with the sections of their frame; the filter state is carried over."""
     filtered, state = samples[None].copy(), np.zeros((1, sections.shape[1], 2))
     for start, frame_sections in zip(range(0, len(samples), hop), sections, strict=False):
-        _sosfilt(
-            frame_sections, filtered[:, start : start + hop], state
-        )  # ``sosfilt`` itself checks longer than it works
+        _sosfilt(frame_sections, filtered[:, start : start + hop], state)  # ``sosfilt`` checks longer than it works
     return filtered[0]
