@@ -83,6 +83,16 @@ def test_a_phrase_that_begins_with_closed_lips_takes_no_breath():
     assert rest_in_pauses(generation(units, 0.01), REST).motion["opening"][80:110].max() <= 0.0101
 
 
+def test_before_a_phrase_that_begins_with_closed_lips_they_stay_closed():
+    units = said((0, 1, "sil"), (1, 1.2, "m"), (1.2, 2.5, "aa"), (2.5, 3.0, "sil"))
+    given = generation(units)
+    given.motion.values[110, 0] = 0
+    opening = rest_in_pauses(given, REST).motion["opening"]
+    assert opening[30:111].max() <= CLOSED_OPENING
+    assert opening[111] == pytest.approx(0.1)
+    assert rest_in_pauses(given, REST, [0.95]).motion["opening"][95] == pytest.approx(0.1)
+
+
 def test_natural_pauses_and_motion_without_pauses_stay_as_they_are():
     assert rest_in_pauses(generation(LINE), rest.NATURAL).motion is not None
     for units, style in ((LINE, rest.NATURAL), (said((0, 3, "aa")), REST), (Timeline(()), REST)):

@@ -141,16 +141,18 @@ def rest_in_pauses(
     style    : ``rest``; or ``natural``, which leaves the motion as it is
     pinned_s : times of pins, around which the motion stays as it is
     events   : breaths and laughter that are detected: the mouth opens for them, where it rests else
-    Before phrases after a longer pause the lips part for a breath. The motion may have any channels; without phones it
+    Before phrases after a longer pause the lips part for a breath, but where p, b or m is first they stay closed: they
+    would part and shut again within a few pictures. The motion may have any channels; without phones it
     stays as it is.
     """
     motion, units = generation.motion, generation.units
     if style == NATURAL or not find_pauses(units) or not len(motion.values):
         return generation
     time_s = motion.time_s
-    weight = weigh_pauses(units, time_s)
+    free = np.ones(len(time_s))
     for pin_s in pinned_s:
-        weight *= np.clip(np.abs(time_s - pin_s) / PINNED_S - 1, 0, 1)
+        free *= np.clip(np.abs(time_s - pin_s) / PINNED_S - 1, 0, 1)
+    weight = weigh_pauses(units, time_s) * free
     values, resting = motion.values.copy(), np.flatnonzero(weight)
     pose = np.median(values[find_rest_frames(motion, units)].astype(np.float64), axis=0)
     if "opening" in motion.names:
@@ -158,6 +160,7 @@ def rest_in_pauses(
     values[resting] += weight[resting, None] * (pose - values[resting])
     if "opening" in motion.names and motion.channels[motion.column("opening")].unit == EYE_DISTANCE:
         column = motion.column("opening")
+        values[:, column] -= free * _find_early_opening(units, time_s, values[:, column], weight)
         values[:, column] = np.maximum(values[:, column], _open_for_breaths(units, time_s) * (weight < 1))
         if events:
             lacking = np.maximum(_open_for_events(events, time_s) * weight - values[:, column], 0)
@@ -172,15 +175,38 @@ def rest_in_pauses(
     return replace(generation, motion=Motion(values, motion.rate_hz, motion.channels))
 
 
+def _find_beginnings(units: Timeline[Unit]) -> list[tuple[float, float, float, bool]]:
+    """Return the pauses before phrases: start and end, the end of the phone after it, and whether this is p, b or m."""
+    phones = zip(units, mark_closing_phones(units), strict=True)
+    spoken = [(span, closing) for span, closing in phones if not is_silent(span.label.phone)]
+    firsts = np.searchsorted(
+        [span.start_s for span, _ in spoken], [end_s - 1e-6 for _, end_s, *_ in find_pauses(units)]
+    )
+    return [
+        (start_s, end_s, spoken[first][0].end_s, spoken[first][1])
+        for (start_s, end_s, *_), first in zip(find_pauses(units), firsts.tolist(), strict=True)
+        if first < len(spoken)
+    ]
+
+
+def _find_early_opening(units: Timeline[Unit], time_s: Curve, opening: Curve, weight: Curve) -> Curve:
+    """Return how much too far lips part before a phrase with p, b or m, from their rest to its closure [shape=(T,)]."""
+    early = np.zeros(len(time_s))
+    for *pause_s, phone_end_s, closing in _find_beginnings(units):
+        start, middle, stop = np.searchsorted(time_s, (*pause_s, phone_end_s)).tolist()
+        if closing and start < middle < stop:
+            rests = middle - 1 - int(weight[start:middle][::-1].argmax())
+            closed = middle + int(opening[middle:stop].argmin())
+            least = np.interp(np.arange(rests, closed), (rests, closed), opening[[rests, closed]])
+            early[rests:closed] = np.maximum(opening[rests:closed] - least, 0)
+    return early
+
+
 def _open_for_breaths(units: Timeline[Unit], time_s: Curve) -> Curve:
     """Return the least opening of lips that part for a breath, in eye distances [shape=(T,)]."""
     gap = np.zeros(len(time_s))
-    phones = zip(units, mark_closing_phones(units), strict=True)
-    spoken = [(span, closing) for span, closing in phones if not is_silent(span.label.phone)]
-    begins_s = np.array([span.start_s for span, _ in spoken])
-    for start_s, end_s, _, before_speech in find_pauses(units):
-        following = int(np.searchsorted(begins_s, end_s - 1e-6))
-        if before_speech and end_s - start_s >= MIN_BREATH_S and following < len(spoken) and not spoken[following][1]:
+    for start_s, end_s, _, closing in _find_beginnings(units):
+        if end_s - start_s >= MIN_BREATH_S and not closing:
             near = slice(*np.searchsorted(time_s, (end_s - OPENING_S, end_s + OPENING_S)))
             share = 1 - np.abs(time_s[near] - end_s + BREATH_S) / (OPENING_S - BREATH_S)
             gap[near] = np.maximum(gap[near], BREATH_GAP * smooth_step(share))
