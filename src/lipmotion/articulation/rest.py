@@ -160,7 +160,7 @@ def rest_in_pauses(
     values[resting] += weight[resting, None] * (pose - values[resting])
     if "opening" in motion.names and motion.channels[motion.column("opening")].unit == EYE_DISTANCE:
         column = motion.column("opening")
-        values[:, column] -= free * _find_early_opening(units, time_s, values[:, column], weight)
+        values[:, column] -= free * _find_early_opening(units, time_s, values[:, column].astype(np.float64), weight)
         values[:, column] = np.maximum(values[:, column], _open_for_breaths(units, time_s) * (weight < 1))
         if events:
             lacking = np.maximum(_open_for_events(events, time_s) * weight - values[:, column], 0)
