@@ -156,8 +156,8 @@ def test_posteriors_of_another_version_or_of_none_are_refused(network: Posterior
         (1, 0.95, 0.9, POSTERIOR_SHARES[0]),
         (1, 0.5, 0.9, 0),
         (1, 0.5, 0.1, POSTERIOR_SHARES[0]),
-        (0, 0.95, 0.9, POSTERIOR_SHARES[1]),
-        (0, 0.5, 0.1, 0),
+        (0, 0.75, 0.9, POSTERIOR_SHARES[1]),
+        (0, 0.6, 0.1, 0),
     ],
 )
 def test_its_share_depends_on_voice_recogniser_and_noise(network, voice, mean, distortion, share):

@@ -40,9 +40,9 @@ MIN_MOTION_S = 120.0  # seconds of measured motion from which on a network is tr
 POSTERIOR_SHARES = (0.85, 1.0)
 """Share of the network that knows posteriors, for a voice that training knows and for one that it does not. It is
 trained on clean speech, the other one in noise and rooms."""
-SURE_POSTERIORS = (0.75, 0.9)
-"""For an unknown voice it has no share at the first mean posterior, all of its share at the second one. A known voice
-has all of it in a clear recording, too."""
+SURE_POSTERIORS, LESS_SURE = (0.75, 0.9), 0.15
+"""For an unknown voice it has no share at the first mean posterior, all of its share at the second; where nothing is
+known of the voice, at so much less: the other network knows one voice alone. A known one has it where all is clear."""
 ENCODING_SHARE = 0.5
 """Share of the regression on the encoding for a voice that training knows half or less; one that it knows has none. As
 it is trained in quiet, it has it where the posteriors are sure."""
@@ -114,7 +114,7 @@ class AcousticNetwork(Predictor):
         network, posteriors, strange = self.posterior_network, speech.posteriors, count_unseen(speech.voice)
         if network is not None and posteriors is not None:
             known, unknown = POSTERIOR_SHARES
-            sure = _rate_sureness(speech)
+            sure = _rate_sureness(speech, LESS_SURE * (1 - speech.voice) ** 2)
             fitting = sure + (1 - strange) * np.maximum(rate_clearness(distortion) - sure, 0)
             share = (fitting * (known + strange * (unknown - known)))[:, None]
             motion = motion + share * (network.predict(speech)[0] - motion)
@@ -166,10 +166,10 @@ class AcousticNetwork(Predictor):
         return cls(network, mean, scale, stored["network_variances"], *inner)
 
 
-def _rate_sureness(speech: Speech) -> float:
-    """Return how sure the posteriors are, 0 to 1; 1 without posteriors."""
+def _rate_sureness(speech: Speech, less: float = 0.0) -> float:
+    """Return how sure the posteriors are, 0 to 1, where so much less is enough; 1 without posteriors."""
     mean = SURE_POSTERIORS[1] if speech.posteriors is None else speech.posteriors.mean
-    return float(np.interp(mean, SURE_POSTERIORS, (0, 1)))
+    return float(np.interp(mean + less, SURE_POSTERIORS, (0, 1)))
 
 
 def _train(training: PredictorTraining, mean: Array, scale: Array) -> ConvolutionalNetwork:
