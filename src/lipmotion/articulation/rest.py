@@ -160,8 +160,7 @@ def rest_in_pauses(
     values[resting] += weight[resting, None] * (pose - values[resting])
     if "opening" in motion.names and motion.channels[motion.column("opening")].unit == EYE_DISTANCE:
         column = motion.column("opening")
-        values[:, column] -= free * _find_early_opening(units, time_s, values[:, column].astype(np.float64), weight)
-        values[:, column] = np.maximum(values[:, column], _open_for_breaths(units, time_s) * (weight < 1))
+        values[:, column] = _begin_phrases(units, time_s, values[:, column].astype(np.float64), weight, free)
         if events:
             lacking = np.maximum(_open_for_events(events, time_s) * weight - values[:, column], 0)
             # by how much each channel changes with the opening, on average; motion that hardly opens the mouth says
@@ -175,42 +174,25 @@ def rest_in_pauses(
     return replace(generation, motion=Motion(values, motion.rate_hz, motion.channels))
 
 
-def _find_beginnings(units: Timeline[Unit]) -> list[tuple[float, float, float, bool]]:
-    """Return the pauses before phrases: start and end, the end of the phone after it, and whether this is p, b or m."""
+def _begin_phrases(units: Timeline[Unit], time_s: Curve, opening: Curve, weight: Curve, free: Curve) -> Curve:
+    """Return an opening that parts for a breath before phrases; where p, b or m is first it stays closed until then."""
+    opening = opening.copy()
     phones = zip(units, mark_closing_phones(units), strict=True)
     spoken = [(span, closing) for span, closing in phones if not is_silent(span.label.phone)]
-    firsts = np.searchsorted(
-        [span.start_s for span, _ in spoken], [end_s - 1e-6 for _, end_s, *_ in find_pauses(units)]
-    )
-    return [
-        (start_s, end_s, spoken[first][0].end_s, spoken[first][1])
-        for (start_s, end_s, *_), first in zip(find_pauses(units), firsts.tolist(), strict=True)
-        if first < len(spoken)
-    ]
-
-
-def _find_early_opening(units: Timeline[Unit], time_s: Curve, opening: Curve, weight: Curve) -> Curve:
-    """Return how much too far lips part before a phrase with p, b or m, from their rest to its closure [shape=(T,)]."""
-    early = np.zeros(len(time_s))
-    for *pause_s, phone_end_s, closing in _find_beginnings(units):
-        start, middle, stop = np.searchsorted(time_s, (*pause_s, phone_end_s)).tolist()
-        if closing and start < middle < stop:
-            rests = middle - 1 - int(weight[start:middle][::-1].argmax())
-            closed = middle + int(opening[middle:stop].argmin())
-            least = np.interp(np.arange(rests, closed), (rests, closed), opening[[rests, closed]])
-            early[rests:closed] = np.maximum(opening[rests:closed] - least, 0)
-    return early
-
-
-def _open_for_breaths(units: Timeline[Unit], time_s: Curve) -> Curve:
-    """Return the least opening of lips that part for a breath, in eye distances [shape=(T,)]."""
-    gap = np.zeros(len(time_s))
-    for start_s, end_s, _, closing in _find_beginnings(units):
-        if end_s - start_s >= MIN_BREATH_S and not closing:
-            near = slice(*np.searchsorted(time_s, (end_s - OPENING_S, end_s + OPENING_S)))
-            share = 1 - np.abs(time_s[near] - end_s + BREATH_S) / (OPENING_S - BREATH_S)
-            gap[near] = np.maximum(gap[near], BREATH_GAP * smooth_step(share))
-    return gap
+    begins_s = np.array([span.start_s for span, _ in spoken])
+    for start_s, end_s, *_ in find_pauses(units):
+        for span, closing in spoken[(first := int(np.searchsorted(begins_s, end_s - 1e-6))) : first + 1]:
+            start, middle, stop = np.searchsorted(time_s, (start_s, end_s, span.end_s)).tolist()
+            if closing and start < middle < stop:
+                rests = middle - 1 - int(weight[start:middle][::-1].argmax())
+                closed = middle + int(opening[middle:stop].argmin())
+                least = np.interp(np.arange(rests, closed), (rests, closed), opening[[rests, closed]])
+                opening[rests:closed] -= free[rests:closed] * np.maximum(opening[rests:closed] - least, 0)
+            elif not closing and end_s - start_s >= MIN_BREATH_S:
+                near = slice(*np.searchsorted(time_s, (end_s - OPENING_S, end_s + OPENING_S)))
+                share = 1 - np.abs(time_s[near] - end_s + BREATH_S) / (OPENING_S - BREATH_S)
+                opening[near] = np.maximum(opening[near], BREATH_GAP * smooth_step(share) * (weight[near] < 1))
+    return opening
 
 
 def _open_for_events(events: Sequence[VoiceEvent], time_s: Curve) -> Curve:
