@@ -33,6 +33,11 @@ def make_face(name: str = "portrait") -> Face:
         from lipmotion_faces.portrait.layered import LayeredFace
 
         return LayeredFace(Path(name))
+    if name not in FACES.names:
+        raise InputError(
+            f"no face {name!r}; there are: {', '.join(FACES.names)}; or give a FILE.svg, a FILE.face, or a folder of "
+            "drawings that is there; a 3D character: --character FILE"
+        )
     return FACES.load(name)()
 
 

@@ -298,6 +298,8 @@ class ProjectFolder:
             taken = {file_key(each.name) for each in self.project.lines.values()}
             added: list[ProjectRecording] = []
             for sound, name, transcript in sources or [(source, files.make_portable(source.stem), "")]:
+                if not sound.is_file():
+                    raise InputError(f"{source}: names {sound}, no such file; required a recording, or a list of paths")
                 if os.path.realpath(sound) not in known:
                     number = self.project.next_number + len(added)
                     reference = files.sound_reference(sound.absolute(), self.path.absolute() / PROJECT)

@@ -78,9 +78,13 @@ def test_nothing_moves_earlier_than_the_opening_time_before_a_phrase():
     assert not mouth.contact[200:289].any()
 
 
-def test_a_phrase_that_begins_with_closed_lips_takes_no_breath():
+def test_before_a_phrase_that_begins_with_closed_lips_they_stay_closed():
     units = said((0, 1, "sil"), (1, 1.2, "m"), (1.2, 2.5, "aa"), (2.5, 3.0, "sil"))
-    assert rest_in_pauses(generation(units, 0.01), REST).motion["opening"][80:110].max() <= 0.0101
+    given = generation(units)
+    given.motion.values[110, 0] = 0
+    opening = rest_in_pauses(given, REST).motion["opening"]
+    assert opening[30:111].max() <= CLOSED_OPENING < opening[111] - 0.08
+    assert rest_in_pauses(given, REST, [0.95]).motion["opening"][95] == pytest.approx(0.1)
 
 
 def test_natural_pauses_and_motion_without_pauses_stay_as_they_are():

@@ -47,6 +47,15 @@ def test_a_format_whatever_the_suffix(run, basics, here):
         assert (here / "mouth.txt").read_text().startswith(begin)
 
 
+def test_words_beside_a_recording_are_kept(run, basics, here, toy_speech):
+    (here / "take.wav").write_bytes(toy_speech.read_bytes())
+    (here / "take.txt").write_text("see bob")
+    line = ("cues", "take.wav", *basics[2:], "-o", "take.txt")
+    check_refused(run(*line), 7, "is the transcript itself; give another name, or add --force")
+    assert (here / "take.txt").read_text() == "see bob"
+    assert run(*line, "--force") == run(*line) == (0, ["take.txt"], [])
+
+
 def test_a_folder(run, basics, here, toy_speech):
     (here / "made").mkdir()
     new, made = f"new/deep/{toy_speech.stem}.dat", f"made/{toy_speech.stem}.dat"

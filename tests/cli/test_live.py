@@ -72,7 +72,7 @@ def test_what_is_wrong_is_said(run: RunCommand) -> None:
         (("-i", WELCOME, "--look-ahead", "-5"), "-5"),
         (("-i", WELCOME, "--character", "nothing.glb"), "no such file"),
         (("-i", "no such microphone"), "sounddevice|microphone"),
-        (("no such file.wav",), "no such file.wav"),
+        (("no such file.wav",), "no such file.wav: no such file; give a recording"),
     ):
         ran = run("live", *arguments)
         assert ran.code in (3, 8)

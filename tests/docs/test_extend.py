@@ -97,5 +97,5 @@ def test_an_installed_face_format_and_output_work_from_the_command_line(toy_spee
     code = f"import lipmotion; print(lipmotion.read_motion({str(tmp_path / 'a.tab')!r})[0].names)"
     assert table.run("-c", code).stdout.strip() == "('opening', 'width')"
     unknown = face.run("-m", "lipmotion.cli.main", "animate", toy_speech, "-o", tmp_path / "b.mp4", "--face", "rab")
-    assert "no face 'rab'; there are: portrait, woman, man, cartoon, head, bar" in unknown.stderr
+    assert "no face 'rab'; there are: portrait, woman, man, cartoon, head, bar; or give" in unknown.stderr
     assert not (tmp_path / "b.mp4").exists()

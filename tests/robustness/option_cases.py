@@ -63,7 +63,7 @@ def _output(name: str, output: str, *messages: str) -> None:
 
 
 _output("a folder that does not exist", "none/a.json", "the folder none does not exist; create it first")
-_output("an unknown format", "a.gif", "unknown format '.gif'; required one of: .json .csv .npz ")
+_output("an unknown format", "a.avi", "unknown format '.avi'; required a.mp4, or one of: .json .csv .npz ")
 _output("/dev/full", "/dev/full", "unknown format ''; required one of:")
 _output("a folder where nothing can be written", "/proc/a.json", "/proc/a.json: cannot be written")
 _output("a name that is too long", "x" * 300 + ".json", "cannot be written: File name too long")

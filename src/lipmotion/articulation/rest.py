@@ -141,16 +141,18 @@ def rest_in_pauses(
     style    : ``rest``; or ``natural``, which leaves the motion as it is
     pinned_s : times of pins, around which the motion stays as it is
     events   : breaths and laughter that are detected: the mouth opens for them, where it rests else
-    Before phrases after a longer pause the lips part for a breath. The motion may have any channels; without phones it
+    Before phrases after a longer pause the lips part for a breath, but where p, b or m is first they stay closed: they
+    would part and shut again within a few pictures. The motion may have any channels; without phones it
     stays as it is.
     """
     motion, units = generation.motion, generation.units
     if style == NATURAL or not find_pauses(units) or not len(motion.values):
         return generation
     time_s = motion.time_s
-    weight = weigh_pauses(units, time_s)
+    free = np.ones(len(time_s))
     for pin_s in pinned_s:
-        weight *= np.clip(np.abs(time_s - pin_s) / PINNED_S - 1, 0, 1)
+        free *= np.clip(np.abs(time_s - pin_s) / PINNED_S - 1, 0, 1)
+    weight = weigh_pauses(units, time_s) * free
     values, resting = motion.values.copy(), np.flatnonzero(weight)
     pose = np.median(values[find_rest_frames(motion, units)].astype(np.float64), axis=0)
     if "opening" in motion.names:
@@ -158,7 +160,7 @@ def rest_in_pauses(
     values[resting] += weight[resting, None] * (pose - values[resting])
     if "opening" in motion.names and motion.channels[motion.column("opening")].unit == EYE_DISTANCE:
         column = motion.column("opening")
-        values[:, column] = np.maximum(values[:, column], _open_for_breaths(units, time_s) * (weight < 1))
+        values[:, column] = _begin_phrases(units, time_s, values[:, column].astype(np.float64), weight, free)
         if events:
             lacking = np.maximum(_open_for_events(events, time_s) * weight - values[:, column], 0)
             # by how much each channel changes with the opening, on average; motion that hardly opens the mouth says
@@ -172,19 +174,25 @@ def rest_in_pauses(
     return replace(generation, motion=Motion(values, motion.rate_hz, motion.channels))
 
 
-def _open_for_breaths(units: Timeline[Unit], time_s: Curve) -> Curve:
-    """Return the least opening of lips that part for a breath, in eye distances [shape=(T,)]."""
-    gap = np.zeros(len(time_s))
+def _begin_phrases(units: Timeline[Unit], time_s: Curve, opening: Curve, weight: Curve, free: Curve) -> Curve:
+    """Return an opening that parts for a breath before phrases; where p, b or m is first it stays closed until then."""
+    opening = opening.copy()
     phones = zip(units, mark_closing_phones(units), strict=True)
     spoken = [(span, closing) for span, closing in phones if not is_silent(span.label.phone)]
     begins_s = np.array([span.start_s for span, _ in spoken])
-    for start_s, end_s, _, before_speech in find_pauses(units):
-        following = int(np.searchsorted(begins_s, end_s - 1e-6))
-        if before_speech and end_s - start_s >= MIN_BREATH_S and following < len(spoken) and not spoken[following][1]:
-            near = slice(*np.searchsorted(time_s, (end_s - OPENING_S, end_s + OPENING_S)))
-            share = 1 - np.abs(time_s[near] - end_s + BREATH_S) / (OPENING_S - BREATH_S)
-            gap[near] = np.maximum(gap[near], BREATH_GAP * smooth_step(share))
-    return gap
+    for start_s, end_s, *_ in find_pauses(units):
+        for span, closing in spoken[(first := int(np.searchsorted(begins_s, end_s - 1e-6))) : first + 1]:
+            start, middle, stop = np.searchsorted(time_s, (start_s, end_s, span.end_s)).tolist()
+            if closing and start < middle < stop:
+                rests = middle - 1 - int(weight[start:middle][::-1].argmax())
+                closed = middle + int(opening[middle:stop].argmin())
+                least = np.interp(np.arange(rests, closed), (rests, closed), opening[[rests, closed]])
+                opening[rests:closed] -= free[rests:closed] * np.maximum(opening[rests:closed] - least, 0)
+            elif not closing and end_s - start_s >= MIN_BREATH_S:
+                near = slice(*np.searchsorted(time_s, (end_s - OPENING_S, end_s + OPENING_S)))
+                share = 1 - np.abs(time_s[near] - end_s + BREATH_S) / (OPENING_S - BREATH_S)
+                opening[near] = np.maximum(opening[near], BREATH_GAP * smooth_step(share) * (weight[near] < 1))
+    return opening
 
 
 def _open_for_events(events: Sequence[VoiceEvent], time_s: Curve) -> Curve:

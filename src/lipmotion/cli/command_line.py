@@ -204,6 +204,8 @@ class _Parser(argparse.ArgumentParser):
         self.register("type", float, partial(parse_number, finite=False))
 
     def error(self, message: str) -> NoReturn:
+        for kind, required in (("float", "a number, such as 1.5"), ("int", "a whole number")):
+            message = message.replace(f": invalid {kind} value: ", f": required {required}, not ")
         raise WrongCommandLineError(f"{message}{'' if message.endswith('?') else ';'} see: {self.prog} --help")
 
     def _print_message(self, message: str, file: Any = None) -> None:

@@ -235,8 +235,8 @@ class Staging(Configuration):
             raise InputError(f"the size is {self.size} pixels, required an even number, {SMALLEST_PX} to {LARGEST_PX}")
         if self.background not in (SCENE, TRANSPARENT) and not re.fullmatch("#[0-9a-fA-F]{6}", self.background):
             raise InputError(
-                f"the background is {shorten(self.background)!r}, required scene, transparent, or a colour as "
-                "#40a0ff; a video is for filmed faces; give one: --face FILE.face"
+                f"the background is {shorten(self.background)!r}, required scene, transparent, or a colour as #40a0ff"
+                f"{'; a video is for filmed faces; give one: --face FILE.face' * ('.' in self.background)}"
             )
 
     @property

@@ -61,8 +61,8 @@ class Outlook:
     range_db   : decibels between loud and quiet moments; under 20 the recording is noisy
     advice     : what would help, the most helpful first
 
-    >>> Outlook("words", 0.66, 0.0, 31.2, ("the words that are spoken",)).text
-    'words recognised, confidence 0.66; voice 0.00; levels 31 dB apart; would help most: the words that are spoken'
+    >>> Outlook("words", 0.66, 0.0, 31.2, ("the words",)).text
+    'words recognised, confidence 0.66; voice 0.00 (1: as in training); levels 31 dB apart; would help most: the words'
     """
 
     words: str
@@ -83,7 +83,7 @@ class Outlook:
         elif self.words in ("transcript", "given units") and self.confidence < FULL_FIT_SHARE:
             parts[0] += f", which fits {self.confidence:.0%} of the speech"
         if self.voice is not None:
-            parts.append(f"voice {self.voice:.2f}")
+            parts.append(f"voice {self.voice:.2f} (1: as in training)")
         parts.append(f"levels {self.range_db:.0f} dB apart")
         if self.advice:
             parts.append(f"would help most: {self.advice[0]}")

@@ -15,7 +15,7 @@ from lipmotion.cli.terminal.progress import LEVELS, print_status_lines
 from lipmotion.errors import shorten
 from lipmotion.pipeline.request import Request
 from lipmotion.storage.files import as_text
-from lipmotion.storage.sources import is_file
+from lipmotion.storage.sources import Source, check_apart, is_file
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.values import parse_whole
 
@@ -26,6 +26,8 @@ VERSION = "; takes the options of Rhubarb Lip Sync version 1.14.0"
 BLANK = b" \t\r\n\0\xef\xbb\xbf\xfe\xff"
 NO_WORDS = re.compile(rb"\[[^\[\]]*\]|[^\w\x80-\xff]")
 """Sounds in brackets, and what is no letter."""
+SHEET = re.compile(rb"\s*(\d+\.\d+\t|MohoSwitch1|lipsync version|<\?xml|{|\Z)")
+"""How a file of cues begins, or an empty one."""
 
 
 class _DatFrameRate(argparse.Action):
@@ -41,6 +43,15 @@ def _dialogue(path: str) -> str | None:
         raise argparse.ArgumentTypeError(f"no such file: {shorten(path)!r}; the words themselves: --transcript TEXT")
     with Path(path).open("rb") as file:
         return path if NO_WORDS.sub(b"", file.read(1 << 16).strip(BLANK)) else None
+
+
+def _find_words(recording: Path) -> list[Source]:
+    """Return the words beside a recording, which are read where its folder is; none where they are cues made of it."""
+    beside = recording.parent / f"{recording.stem}.txt"
+    if not is_file(beside):
+        return []
+    with beside.open("rb") as file:
+        return [] if SHEET.match(file.read(64)) else [Source(beside, "transcript", replaceable=True)]
 
 
 def _threads(text: str) -> int:
@@ -105,6 +116,7 @@ def run(options: argparse.Namespace) -> None:
     with print_status_lines(options) as set_progress, placed as options.output, read_pipe(options.speech) as speech:
         if [path.suffix.lower() in {"", ".txt"} for path in options.output] == [True]:
             options.format = options.format or "tsv"  # as Rhubarb writes whatever the name is
+        check_apart(options.output, _find_words(Path(options.speech)), force=options.force)
         check_paths(options)  # in a folder it may be a file that is read
         delivery, requested = pick_part(options, Delivery()), pick_part(options, Request(), recording=speech)
         check_cue_options(options.fps, options.hold, options.shapes)

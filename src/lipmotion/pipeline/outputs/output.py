@@ -30,6 +30,7 @@ from lipmotion.speech.sound.analysed_audio import AnalysedAudio
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.resampling import decimate
 from lipmotion.storage.files import check_distinct, check_target
+from lipmotion.storage.sources import VIDEO_SUFFIXES
 from lipmotion.types import SPEECH_RATE_HZ, Audio, Generation, Monitor, Prosody, silent_monitor
 from lipmotion.types.delivery import Staging
 
@@ -191,7 +192,8 @@ def plan(path: str | Path, settings: OutputSettings) -> Output:
     taking = [kind for kind in map(OUTPUTS.load, OUTPUTS.names) if kind.takes(file, settings)]
     if taking:
         return max(taking, key=length)(file, settings)
-    meant = [f"{file.stem}.{end.removeprefix('.')}, or " for end in ends if end.endswith(file.suffix.lower() or "\0")]
+    likely = ".mp4" if file.suffix.lower() in VIDEO_SUFFIXES else file.suffix.lower() or "\0"
+    meant = [f"{file.stem}.{end.removeprefix('.')}, or " for end in ends if end.endswith(likely)]
     raise ExportError(f"{path}: unknown format {file.suffix!r}; required {''.join(meant)}one of: {' '.join(ends)}")
 
 
