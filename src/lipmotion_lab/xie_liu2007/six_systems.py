@@ -16,7 +16,7 @@ from lipmotion.engines.coupled.chains.model import speech_observations
 from lipmotion.engines.coupled.conversion import convert
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledModel
-from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.errors import ExportError, InputError, MissingDependencyError
 from lipmotion.extensions import install_command
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.measures import curves
@@ -53,7 +53,10 @@ def check_plot_folder(folder: Path) -> None:
         raise MissingDependencyError(
             f"pictures need matplotlib, which cannot be imported ({error}); {install_command('plots')}"
         ) from error
-    make_folder(folder)
+    if not folder.parent.is_dir():
+        raise ExportError(f"{folder}: the folder {folder.parent} does not exist; create it first")
+    if folder.exists() and not folder.is_dir():
+        raise ExportError(f"{folder}: is a file; give a folder for the pictures")
 
 
 def draw_plots(chains: systems.TrainedSystem, recordings: HeldOutRecordings, folder: Path) -> None:
@@ -64,6 +67,7 @@ def draw_plots(chains: systems.TrainedSystem, recordings: HeldOutRecordings, fol
     by_em = generate_clips(some, AUDIO_ONLY, chains.engine, chains.model)
     path_engine = CoupledEngine(replace(chains.engine.config, conversion="viterbi"))
     by_path = generate_clips(some, AUDIO_ONLY, path_engine, chains.model)
+    make_folder(folder)
 
     picture = Figure(figsize=(10, 4.2), layout="constrained")
     axes, clip = picture.subplots(), by_em[0]
