@@ -20,13 +20,13 @@ from typing import Any
 from uuid import uuid4
 
 from lipmotion.errors import ExportError, InputError, LipMotionError
-from lipmotion.pipeline.batch.lines import file_key, is_recording, read_lines
+from lipmotion.pipeline.batch.lines import file_key, read_lines
 from lipmotion.pipeline.edit_files import EditFile, check_sound, read_edits, write_edits
 from lipmotion.speech.voices.espeak import LanguageLexicon
 from lipmotion.storage import files
 from lipmotion.storage.json_text import as_json, as_json_rows, from_json
 from lipmotion.storage.locks import lock_folder, remove_unfinished
-from lipmotion.storage.sources import hash_file, read_text_file
+from lipmotion.storage.sources import hash_file, is_recording, read_text_file
 from lipmotion.types.languages import AUTO, ENGLISH
 from lipmotion.units import Lexicon
 from lipmotion_studio.project import (

@@ -141,9 +141,8 @@ def rest_in_pauses(
     style    : ``rest``; or ``natural``, which leaves the motion as it is
     pinned_s : times of pins, around which the motion stays as it is
     events   : breaths and laughter that are detected: the mouth opens for them, where it rests else
-    Before phrases after a longer pause the lips part for a breath, but where p, b or m is first they stay closed: they
-    would part and shut again within a few pictures. The motion may have any channels; without phones it
-    stays as it is.
+    Before phrases after a longer pause the lips part for a breath; where p, b or m is first they stay closed, for they
+    would shut again within a few pictures. The motion may have any channels; without phones it stays as it is.
     """
     motion, units = generation.motion, generation.units
     if style == NATURAL or not find_pauses(units) or not len(motion.values):
@@ -181,17 +180,20 @@ def _begin_phrases(units: Timeline[Unit], time_s: Curve, opening: Curve, weight:
     spoken = [(span, closing) for span, closing in phones if not is_silent(span.label.phone)]
     begins_s = np.array([span.start_s for span, _ in spoken])
     for start_s, end_s, *_ in find_pauses(units):
-        for span, closing in spoken[(first := int(np.searchsorted(begins_s, end_s - 1e-6))) : first + 1]:
-            start, middle, stop = np.searchsorted(time_s, (start_s, end_s, span.end_s)).tolist()
-            if closing and start < middle < stop:
-                rests = middle - 1 - int(weight[start:middle][::-1].argmax())
-                closed = middle + int(opening[middle:stop].argmin())
-                least = np.interp(np.arange(rests, closed), (rests, closed), opening[[rests, closed]])
-                opening[rests:closed] -= free[rests:closed] * np.maximum(opening[rests:closed] - least, 0)
-            elif not closing and end_s - start_s >= MIN_BREATH_S:
-                near = slice(*np.searchsorted(time_s, (end_s - OPENING_S, end_s + OPENING_S)))
-                share = 1 - np.abs(time_s[near] - end_s + BREATH_S) / (OPENING_S - BREATH_S)
-                opening[near] = np.maximum(opening[near], BREATH_GAP * smooth_step(share) * (weight[near] < 1))
+        following = int(np.searchsorted(begins_s, end_s - 1e-6))
+        if following == len(spoken):
+            continue
+        span, closing = spoken[following]
+        start, middle, stop = np.searchsorted(time_s, (start_s, end_s, span.end_s)).tolist()
+        if closing and start < middle < stop:
+            rests = middle - 1 - int(weight[start:middle][::-1].argmax())
+            closed = middle + int(opening[middle:stop].argmin())
+            least = np.interp(np.arange(rests, closed), (rests, closed), opening[[rests, closed]])
+            opening[rests:closed] -= free[rests:closed] * np.maximum(opening[rests:closed] - least, 0)
+        elif not closing and end_s - start_s >= MIN_BREATH_S:
+            near = slice(*np.searchsorted(time_s, (end_s - OPENING_S, end_s + OPENING_S)))
+            share = 1 - np.abs(time_s[near] - end_s + BREATH_S) / (OPENING_S - BREATH_S)
+            opening[near] = np.maximum(opening[near], BREATH_GAP * smooth_step(share) * (weight[near] < 1))
     return opening
 
 

@@ -17,7 +17,7 @@ from lipmotion.extensions import load_provided
 from lipmotion.pipeline.request import Outputs, Request, locate_paths
 from lipmotion.storage.files import atomic_file, check_target, make_portable
 from lipmotion.storage.json_text import read_toml
-from lipmotion.storage.sources import check_listable
+from lipmotion.storage.sources import check_listable, is_recording
 from lipmotion.types.configuration import Configuration, option
 from lipmotion.types.delivery import Delivery, Staging
 from lipmotion.types.progress import Monitor, silent_monitor, sub_monitor
@@ -246,14 +246,12 @@ def list_recordings(paths: Sequence[Path]) -> list[Path]:
 
     Raises InputError: a folder without recordings, or one that cannot be read.
     """
-    from lipmotion.storage.sources import AUDIO_SUFFIXES, VIDEO_SUFFIXES
-
     recordings: list[Path] = []
     for path in paths:
         inside = [path]
         if path.is_dir():
             check_listable(path)
-            inside = sorted(each for each in path.iterdir() if each.suffix.lower() in AUDIO_SUFFIXES | VIDEO_SUFFIXES)
+            inside = sorted(filter(is_recording, path.iterdir()))
             if not inside:
                 raise InputError(f"{path}: no sounds and no videos in it; give a folder of recordings")
         recordings += inside

@@ -88,6 +88,11 @@ def is_file(path: Path) -> bool:
     return status is not None and stat.S_ISREG(status.st_mode)
 
 
+def is_recording(path: Path) -> bool:
+    """Return whether a file is a recording, by its name."""
+    return path.suffix.lower() in AUDIO_SUFFIXES | VIDEO_SUFFIXES
+
+
 def is_same(path: str | Path, other: str | Path) -> bool:
     """Return whether two names, links followed, are of one existing file or folder."""
     one, two = _status(path), _status(other)

@@ -14,10 +14,9 @@ from typing import Any
 from lipmotion.cli.arguments.declared import add_input
 from lipmotion.cli.terminal.printing import flush_output, print_line
 from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.storage.sources import AUDIO_SUFFIXES, VIDEO_SUFFIXES
+from lipmotion.storage.sources import is_recording
 
-CHUNK_S = 0.02
-"""Sound is taken in pieces of so many seconds."""
+CHUNK_S = 0.02  # sound is taken in pieces of so many seconds
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -104,7 +103,7 @@ def _listen(device: str, rate_hz: int) -> Iterator[Any]:
 
     Raises MissingDependencyError: sounddevice is not installed. InputError: there is no such microphone.
     """
-    if Path(device).suffix.lower() in AUDIO_SUFFIXES | VIDEO_SUFFIXES:
+    if is_recording(Path(device)):
         raise InputError(f"{device}: no such file; give a recording, the name of a microphone, or -")
     try:
         import sounddevice

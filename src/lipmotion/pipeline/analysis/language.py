@@ -31,10 +31,8 @@ LOG = logging.getLogger("lipmotion")
 MIN_CONFIDENCE = 0.4
 """English words are recognised with at least this confidence in clear English (0.8 to 0.9 there), and with less in
 other languages and in English played backwards (0.18 to 0.25), and in noise."""
-MIN_TOLD_S = 1.0
-"""Speech that lasts less says nothing of its language."""
-PART_S = 28.0
-"""So many seconds from the beginning of a recording tell its language."""
+MIN_TOLD_S = 1.0  # speech that lasts less says nothing of its language
+PART_S = 28.0  # so many seconds from the beginning of a recording tell its language
 
 
 def resolve_language(request: Request) -> Request:

@@ -73,20 +73,15 @@ ResultT = TypeVar("ResultT")
 
 UNHEARD_S = 0.05
 """Phones may last so long outside of all passages, and half of their time: alignment is no surer."""
-LATE_S = 0.1
-"""Seconds by which given units may end after the sound; editing programs round times."""
+LATE_S = 0.1  # seconds by which given units may end after the sound; editing programs round times
 TIME_UNITS = {"milliseconds": 1e3, "samples": 16e3, "samples of 48 kHz": 48e3, "ticks of 100 ns": 1e7}
 """How many of them a second has: given times that end near so many times the recording are in this unit."""
 SHORTEST_PHONE_S, MIN_TIMED = 0.02, 5
 """Given phones, of which half are shorter, are faster than speech; so many are needed to tell."""
-REACH_S = 0.1
-"""Phones are recognised so far around the first and the last one that is heard."""
-LATEST_S = 1e15
-"""Later units are refused: frames of such times cannot be counted."""
-MIN_SPEECH_S = 0.2
-"""A shorter time of recognised speech is none: the edge of a tone or of noise, taken as a consonant."""
-WORDS = (0.2, 0.9)
-"""Shares of the work at which the recognition of words begins and ends, in reports."""
+REACH_S = 0.1  # phones are recognised so far around the first and the last one that is heard
+LATEST_S = 1e15  # later units are refused: frames of such times cannot be counted
+MIN_SPEECH_S = 0.2  # a shorter time of recognised speech is none: the edge of a tone or of noise, taken as a consonant
+WORDS = (0.2, 0.9)  # shares of the work at which the recognition of words begins and ends, in reports
 LOG = logging.getLogger("lipmotion")
 
 

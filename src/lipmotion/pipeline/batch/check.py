@@ -15,13 +15,14 @@ from lipmotion.errors import CorpusError, LipMotionError
 from lipmotion.pipeline.analysis.language import detect_english
 from lipmotion.pipeline.analysis.read_request import read_request
 from lipmotion.pipeline.batch.ledger import LEDGER
-from lipmotion.pipeline.batch.lines import BatchLine, is_recording, read_lines
+from lipmotion.pipeline.batch.lines import BatchLine, read_lines
 from lipmotion.pipeline.batch.run import open_local_pool
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.workers import WorkerDiedError, process_count
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import list_spans, measure_levels_db
+from lipmotion.storage.sources import is_recording
 from lipmotion.types import Monitor, Progress, TimedTranscript, silent_monitor
 from lipmotion.types.audio import to_sixteen_bits
 from lipmotion.types.languages import AUTO, ENGLISH, find_script

@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import list_suffixes
 from lipmotion.storage.files import make_portable
-from lipmotion.storage.sources import AUDIO_SUFFIXES, VIDEO_SUFFIXES, check_listable, read_text_file
+from lipmotion.storage.sources import check_listable, is_recording, read_text_file
 from lipmotion.storage.text_table import read_table
 
 LOG = logging.getLogger("lipmotion")
@@ -139,11 +139,6 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
 def file_key(name: str) -> str:
     """Return a name without differences of case and of the form of accents: equal keys are one file on some systems."""
     return unicodedata.normalize("NFD", unicodedata.normalize("NFD", name).casefold())
-
-
-def is_recording(path: Path) -> bool:
-    """Return whether a file is a recording, by its name."""
-    return path.suffix.lower() in AUDIO_SUFFIXES | VIDEO_SUFFIXES
 
 
 def _read_list(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
