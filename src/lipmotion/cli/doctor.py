@@ -87,8 +87,6 @@ EXTRAS = {
     "video": "face tracking: corpora, faces and measures from videos",
     "text": "espeak-ng: text to speech, and other languages than English",
     "plots": "pictures of 'experiment xieliu2007'",
-    "whisper": "words recognised by faster-whisper, with a model of yours",
-    "vosk": "words recognised by Vosk, with a model of yours",
     "cluster": "'batch --cluster'",
     "study": "the page of 'study serve'",
     "studio": "the page of 'studio'",

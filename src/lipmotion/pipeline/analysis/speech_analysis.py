@@ -22,7 +22,6 @@ from lipmotion.pipeline.model import Model, with_prior
 from lipmotion.pipeline.request import DETECTED, Request
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP
-from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recognition.network.beam_search import load_english
 from lipmotion.speech.recognition.network.posteriors import infer_posteriors
 from lipmotion.speech.recognition.recognised_speech import (
@@ -33,7 +32,7 @@ from lipmotion.speech.recognition.recognised_speech import (
     place_units,
     select_reliable,
 )
-from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, Recogniser, find_network, open_recogniser
+from lipmotion.speech.recognition.recogniser import Recogniser, find_network, open_recogniser
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.speaker_similarity import rate_knowledge
 from lipmotion.speech.sound.voice_events import find_voice_events, silence_units
@@ -214,8 +213,7 @@ def align_between(
 
 
 def _open_recogniser(model: Model, request: Request) -> Recogniser:
-    kind = "auto" if request.recogniser in INSTALLED_RECOGNISERS else request.recogniser
-    return open_recogniser(model.phones, kind, model.adaptation)
+    return open_recogniser(model.phones, request.recogniser, model.adaptation)
 
 
 def _report_progress(each: ParallelMap, duration_s: float, monitor: Monitor) -> ParallelMap:
@@ -240,9 +238,6 @@ def _report_progress(each: ParallelMap, duration_s: float, monitor: Monitor) -> 
 
 
 def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: ParallelMap) -> SpeechAnalysis:
-    kinds = (*RECOGNISER_KINDS, *INSTALLED_RECOGNISERS)
-    if request.recogniser not in kinds:
-        raise InputError(f"unknown recogniser {request.recogniser!r}; required one of: {', '.join(kinds)}")
     range_db = measure_level_range(audio.log_energy)
     phones, features, fit = _open_recogniser(model, request), audio.joined_mfcc(), None
     results: list[Recognition] = []
@@ -262,8 +257,6 @@ def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: Par
         speech = build_speech(model.engine, audio, features, units, phones.kind, each)
         return SpeechAnalysis(replace(speech, times_given=True), None, range_db, fit)
     words = _read_words(cast("str | TimedTranscript | None", request.transcript), audio.duration_s)
-    if words is None and request.recogniser in INSTALLED_RECOGNISERS:
-        words = recognise_words(audio, request.recogniser)
     if words is not None:
         from lipmotion.pipeline.analysis.transcribe import transcribe
 
@@ -373,7 +366,7 @@ def recognise_speech(
     units, spoken, recognition = list[Timeline[Unit]](), list[SpeechPart](), None
     for part, (_, _, sound) in zip(passages, audio.passages, strict=True):
         within = None
-        if phones.kind not in ("general", "words") and rate_knowledge(phones.own, sound):
+        if phones.kind != "general" and rate_knowledge(phones.own, sound):
             within = engine.recognise(learned, part.speech)
         if within is not None:
             try:
