@@ -203,10 +203,9 @@ def _voices() -> str:
 def _phone_recogniser() -> str:
     from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser, load_phone_recogniser
 
-    name = find_installed_recogniser()
-    if name is None:
+    if find_installed_recogniser() is None:
         raise _AbsentError("none for this machine: voices that the model does not know are recognised less well")
-    return load_phone_recogniser(name).source
+    return load_phone_recogniser().source
 
 
 def _microphone() -> str:

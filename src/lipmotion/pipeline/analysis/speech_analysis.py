@@ -32,7 +32,7 @@ from lipmotion.speech.recognition.recognised_speech import (
     place_units,
     select_reliable,
 )
-from lipmotion.speech.recognition.recogniser import Recogniser, find_network, open_recogniser
+from lipmotion.speech.recognition.recogniser import Recogniser, open_recogniser, uses_network
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.speaker_similarity import rate_knowledge
 from lipmotion.speech.sound.voice_events import find_voice_events, silence_units
@@ -176,7 +176,7 @@ def with_voice(
 def prepare_search(request: Request) -> None:
     """Load the words that are searched where a phone recogniser decides; they are then there when it is done."""
     is_searched = request.transcript is None and request.units is None and request.language == ENGLISH
-    if is_searched and find_network(request.recogniser) is not None:
+    if is_searched and uses_network(request.recogniser):
         with suppress(MissingDependencyError):  # whoever needs them says so
             load_english()
 
@@ -289,8 +289,8 @@ def build_speech(
     f0 = audio.joined(log_f0, np.nan) if inputs.f0 else None
     spectrum = rows(lambda sound: sound.spectrum) if inputs.conditions else None
     encoding = rows(lambda sound: sound.encoding) if inputs.encoding else None
-    network = find_network(kind) if inputs.posteriors else None
-    posteriors = infer_posteriors(network, audio, each, dense=audio.is_passage) if network is not None else None
+    is_heard = inputs.posteriors and uses_network(kind)
+    posteriors = infer_posteriors(audio, each, dense=audio.is_passage) if is_heard else None
     parts = None
     if not audio.is_passage:
         parts = tuple(
@@ -414,8 +414,8 @@ def _follow_units(
     units = close_gaps(Timeline(tuple(spans)), audio.duration_s)
     if kind == "own" or request.spoken_so or not all(span.label.phone for span in units):
         return units, None
-    name = find_network(kind) if request.language == ENGLISH else None
-    posteriors, sure = compute_phone_posteriors(name, audio) if name is not None else (None, 0.0)
+    is_heard = request.language == ENGLISH and uses_network(kind)
+    posteriors, sure = compute_phone_posteriors(audio) if is_heard else (None, 0.0)
     is_sure = sure >= WORD_POSTERIORS[0]
     fit = label_fit(audio, units, posteriors if is_sure else None)
     filling = _fill_open(spans, fit.missing if is_sure else (), audio.duration_s, recognised)

@@ -110,8 +110,8 @@ class Recogniser:
         if not features.values.any() or not audio.passages:
             return build_recognition([LabelledFrames(0, SILENCE)], (), len(features.values), features.duration_s, None)
         if not audio.is_passage:
-            if (network := find_network(self.kind)) is not None:
-                find_stretches(network, audio, each)  # of all passages at once: several processes work on them
+            if uses_network(self.kind):
+                find_stretches(audio, each)  # of all passages at once: several processes work on them
             sounds = (passage.audio for passage in audio.passages)
             recognitions = [self.recognition(sound, sound.mfcc(), each, english=english) for sound in sounds]
             return join_recognition(list(zip(audio.passages, recognitions, strict=True)), features.duration_s)
@@ -123,9 +123,8 @@ class Recogniser:
             and similarity.score > OWN_SCORE
             and self.own.bigram.perplexity < SMALL_PERPLEXITY
         )
-        network = None if known else find_network(self.kind)
-        if network is not None:
-            stretches = find_stretches(network, audio, each)
+        if uses_network(self.kind) and not known:
+            stretches = find_stretches(audio, each)
             if mean_posterior(stretches) >= WORD_POSTERIORS[0] or not english:
                 return self._network_recognition(audio, similarity, stretches, english=english)
         spoken = begin_decoding(audio, each) if self.kind == "auto" and not known else None
@@ -290,9 +289,9 @@ def _aligned(
     return spoken, align_units(hmm, log_likelihoods, [unit for item in spoken for unit in item.units], of_units)
 
 
-def find_network(kind: str) -> str | None:
-    """Return the name of the phone recogniser that a kind of recogniser uses; None: none, or none is installed."""
-    return find_installed_recogniser() if kind == "auto" else None
+def uses_network(kind: str) -> bool:
+    """Return whether a kind of recogniser uses the phone recogniser, and it is installed."""
+    return kind == "auto" and find_installed_recogniser() is not None
 
 
 open_recogniser = lru_cache(maxsize=4)(Recogniser)
