@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, shorten
-from lipmotion.hmm.loudness import find_loud_frames
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, measure_fit
-from lipmotion.speech.recognition.anchors import find_anchors, fit_transcript
+from lipmotion.speech.recognition.anchors import find_anchors, leave_out_late_lines
 from lipmotion.speech.recognition.network.posteriors import (
     POSTERIOR_STEP,
     WORD_BOUNDARY,
@@ -88,7 +87,7 @@ def transcribe(
     Raises AlignmentError: the words cannot be aligned with the recording.
     """
     if isinstance(words, TimedTranscript):
-        words = fit_transcript(words, find_loud_frames(analysed(audio, features).log_energy), audio.duration_s)
+        words = leave_out_late_lines(words, audio.duration_s)
     spoken = words.words if isinstance(words, TimedTranscript) else words or ()
     if is_other_language(spoken, lexicon):
         LOG.warning(
