@@ -118,13 +118,6 @@ class AnalysedAudio(Audio):
             energy = log_energy(samples)
             tones = find_tones(samples, energy)
             passages = [] if tones else find_passages(energy)
-            if not passages:
-                from lipmotion.speech.sound.acoustic_conditions import remove_hum
-
-                if (clean := remove_hum(samples)) is not samples:
-                    samples, energy = clean, log_energy(clean)
-                    tones = find_tones(samples, energy)
-                    passages = [] if tones else find_passages(energy)
             cuts = _find_silences(passages, samples)
             if tones:
                 waiting.append((start, samples.copy()))

@@ -48,7 +48,7 @@ class _TrackDecoder:
 
     channel          : number of the channel to take; None: the mean of all channels
     samples, rate_hz : float32 array [shape=(N,)], and its sampling rate
-    energies, centre : of every channel; the number of the centre of three and more, None where there is none
+    energies         : of every channel
     mean_energy      : energy of the channels' mean; none of them counts what is constant
     packets, damaged : how many packets the track has, and how many of them could not be decoded
     silence_s        : duration of the silence that fills holes
@@ -103,8 +103,6 @@ class _TrackDecoder:
         while self._pieces:  # each is freed when it is copied
             first, piece = self._pieces.pop()
             samples[first : first + len(piece) // 4] = np.frombuffer(piece, np.float32)
-        names = [channel.name for channel in self._stream.layout.channels]
-        third = 2 if len(names) in (6, 8) and "NONE" in names else None  # names that a WAVE file may lack
         is_stated = self._stream.duration or not self._container.streams.video
         stated_s = read_duration(self._container, self._stream) if is_stated else 0.0
         rounded_s = ROUNDED_S if self._container.format.name in STATED else (1 - CUT_SHORT_SHARE) * stated_s
@@ -117,7 +115,6 @@ class _TrackDecoder:
             self.energies = np.atleast_1d(np.maximum(self._energies - constant, 0)).tolist()
             self.mean_energy -= float(np.mean(self._sums)) ** 2 / max(self._count, 1)
         self.missing_s = missing_s if missing_s > rounded_s else 0.0
-        self.centre = names.index("FC") if "FC" in names[1:] else third
 
     def _place(self, frame: Any) -> None:
         """Note a hole before a frame that starts later than the one before it ended."""
@@ -217,13 +214,6 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
         what = "%s: its %d channels cancel one another in their mean; channel %d, the loudest, is used"
         LOG.log(level, what, path, count, loudest + 1)
         sound = _decode(path, rate_hz, loudest)
-    elif sound.centre is not None:
-        from lipmotion.speech.sound.acoustic_conditions import speaks_alone
-
-        if speaks_alone(sound.centre, sound.energies, lambda number: _decode(path, SPEECH_RATE_HZ, number).samples):
-            what = "%s: of its %d channels, channel %d alone holds speech and is used; mix them down if others speak"
-            LOG.log(level, what, path, count, sound.centre + 1)
-            sound = _decode(path, rate_hz, sound.centre)
     if sound.note:
         LOG.log(level, "%s: %s", path, sound.note)
     damage = f"{sound.damaged} of {sound.packets} packets of sound cannot be decoded"
