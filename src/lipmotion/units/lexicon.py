@@ -21,7 +21,7 @@ from lipmotion.storage.sources import read_text_file
 from lipmotion.types.languages import ENGLISH, LANGUAGES, find_script
 from lipmotion.units.ipa_phones import read_tokens
 from lipmotion.units.phones import OTHER_NAMES, PAUSE, PHONES, REDUCED_VOWELS, is_silent
-from lipmotion.units.spelling import guess_pronunciation, normalise_text, remove_accents
+from lipmotion.units.spelling import guess_pronunciation, normalise_text, read_table, remove_accents
 from lipmotion.units.written_forms import list_readings
 
 LONGEST_WORD = 30  # letters of the longest word that is read by the network: longer ones are web addresses and noise
@@ -257,15 +257,7 @@ def reduce_vowels(word: str, phones: Pronunciation) -> Pronunciation:
     return tuple(REDUCED_VOWELS.get(p, p) if i != stressed else p for i, p in enumerate(phones))
 
 
-COMMON_WORDS = {
-    "en": "the and of to is that it was you for with this",
-    "es": "el los las que y en es por con para una del",
-    "fr": "le les et est des je vous une dans pas il du",
-    "de": "der die und das ist nicht ich ein den zu mit es",
-    "it": "il che di è non un per sono con gli della una",
-    "pt": "o os que não um uma do da em com para é",
-    "nl": "de het een en van is ik niet dat op zijn te",
-}
+COMMON_WORDS = read_table("common_words")
 """The commonest words of languages in Latin letters, as any frequency list has them."""
 MIN_COMMON, AHEAD = 3, 1.5
 """A text is in a language with so many of its common words in it, and so many times as many as of any other one."""

@@ -19,6 +19,7 @@ from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.types import Audio, Timeline
 from lipmotion.units import PHONES, SILENCE
 from lipmotion.units.ipa_phones import read_ipa
+from lipmotion.units.spelling import read_table
 
 PhoneMap = Mapping[str, tuple[str, ...]]
 """A synthesiser's label to phones of the inventory."""
@@ -26,24 +27,9 @@ PhoneMap = Mapping[str, tuple[str, ...]]
 ARPABET_PHONES: PhoneMap = {phone: (phone,) for phone in PHONES} | {"pau": (SILENCE,)}
 """Flite and Festival (phone set ``radio``). They have their own ax; their er and ih are stressed and unstressed."""
 
-_ESPEAK: dict[str, str] = {
-    # silences
-    "_ _: _| _^_ |": SILENCE,
-    # vowels, by their sounds in American English
-    "0 A: A": "aa", "a aa": "ae", "V": "ah", "O O: O2": "ao", "aU": "aw", "@ @2 @5 a#": "ax", "3": "axr", "aI": "ay",
-    "E": "eh", "3:": "er", "eI": "ey", "I": "ih", "I# I2": "ix", "i i:": "iy", "oU": "ow", "OI": "oy", "U": "uh",
-    "u u:": "uw",
-    # vowels with the r that follows, or with another vowel
-    "A@": "aa r", "O@ o@": "ao r", "e@": "eh r", "U@": "uh r", "i@3": "ih r", "i@": "iy ax", "aI@": "ay ax",
-    "aI3": "ay axr", "aU@": "aw axr", "@L": "el", "n-": "en", "m-": "em",
-    # consonants; ? is a t that stays in the throat, t# one that the tongue only touches
-    "b": "b", "d d#": "d", "D": "dh", "dZ": "jh", "f": "f", "g": "g", "h": "hh", "j": "y", "k": "k", "l": "l", "m": "m",
-    "n": "n", "N": "ng", "p": "p", "r r-": "r", "s": "s", "S": "sh", "t t# t2 ?": "t", "tS": "ch", "T": "th", "v": "v",
-    "w": "w", "z": "z", "Z": "zh",
-    # parts of what is before: the glide from a vowel to the next, the beginning of an unstressed vowel
-    "; @-": "",
-}  # fmt: skip
-ESPEAK_PHONES: PhoneMap = {name: tuple(phones.split()) for names, phones in _ESPEAK.items() for name in names.split()}
+ESPEAK_PHONES: PhoneMap = {
+    name: tuple(phones.split()) for names, phones in read_table("espeak").items() for name in names.split()
+}
 """espeak-ng's mnemonics (as ``espeak-ng -x`` writes them), voice en-us."""
 
 
