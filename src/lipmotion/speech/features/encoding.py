@@ -17,7 +17,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from lipmotion.speech.features.mfcc import HOP, WINDOW
+from lipmotion.speech.features.mfcc import HOP, WINDOW, make_triangles
 from lipmotion.types import SPEECH_RATE_HZ
 
 Array = NDArray[np.float32]
@@ -199,8 +199,6 @@ def _filters() -> Array:
     top = 15 + np.log(SPEECH_RATE_HZ / 2 / 1000) * 27 / np.log(6.4)
     mel = np.linspace(0, top, BANDS + 2)
     edges = np.where(mel < 15, mel * 200 / 3, 1000 * 6.4 ** ((mel - 15) / 27))
-    hertz = np.linspace(0, SPEECH_RATE_HZ / 2, WINDOW // 2 + 1)[:, None]
-    rising = (hertz - edges[:-2]) / (edges[1:-1] - edges[:-2])
-    falling = (edges[2:] - hertz) / (edges[2:] - edges[1:-1])
-    filters = np.maximum(0, np.minimum(rising, falling)) * 2 / (edges[2:] - edges[:-2])
+    hertz = np.linspace(0, SPEECH_RATE_HZ / 2, WINDOW // 2 + 1)
+    filters = make_triangles(hertz, edges) * 2 / (edges[2:] - edges[:-2])
     return filters.astype(np.float32)

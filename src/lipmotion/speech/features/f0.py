@@ -167,21 +167,14 @@ def lags() -> NDArray[np.float64]:
 
 
 class _Tables(NamedTuple):
-    """Matrices that signals are multiplied by.
+    """Matrices that signals are multiplied by; x is the low-passed signal, w the window, k the lag."""
 
-    low_pass    : 10 ms → what they add to the same 10 ms at 4 kHz, and to the two before [shape=(160, 3 · 40)]
-    fourier     : a frame → its windowed spectrum, real parts and then imaginary ones [shape=(_WINDOW, 2 · bins)]
-    inverse     : powers of the spectrum → Σ w(t) x(t) w(t+k) x(t+k) [shape=(bins, L)]
-    early, late : squares of a frame → Σ w(t) w(t+k) x²(t), and of x²(t+k) [shape=(_WINDOW, L)]
-    mass        : Σ w(t) w(t+k) [shape=(L,)]
-    """
-
-    low_pass: Floats
-    fourier: Floats
-    inverse: Floats
-    early: Floats
-    late: Floats
-    mass: Floats
+    low_pass: Floats  # 10 ms → what they add to the same 10 ms at 4 kHz, and to the two before [shape=(160, 3 · 40)]
+    fourier: Floats  # a frame → its windowed spectrum, real parts and then imaginary ones [shape=(_WINDOW, 2 · bins)]
+    inverse: Floats  # powers of the spectrum → Σ w(t) x(t) w(t+k) x(t+k) [shape=(bins, L)]
+    early: Floats  # squares of a frame → Σ w(t) w(t+k) x²(t) [shape=(_WINDOW, L)]
+    late: Floats  # and of x²(t+k)
+    mass: Floats  # Σ w(t) w(t+k) [shape=(L,)]
 
 
 @cache

@@ -288,10 +288,9 @@ def _find_silences(passages: Sequence[Stretch], samples: NDArray[np.float32]) ->
 
 @dataclass(frozen=True, eq=False)
 class _PassageAudio(AnalysedAudio):
-    """The sound of one passage, of which features are computed.
+    """The sound of one passage, with ``lead`` and ``tail`` frames of silence that have features of its quietest moment.
 
-    encodings, first : of the sound between digital silences that it is part of, and the frame there in which it begins
-    lead, tail : frames of silence before and after what is recorded, with the features of the quietest moment
+    ``first`` is its frame in ``encodings``, of the sound between digital silences that it is part of.
     """
 
     encodings: WindowedEncoding | None = None

@@ -44,15 +44,8 @@ def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
 
 
 class _TrackDecoder:
-    """Decodes one track: its sound, and what is known of it.
+    """Decodes one track; ``channel`` None: to the mean of its channels. Energies do not count what is constant.
 
-    channel          : number of the channel to take; None: the mean of all channels
-    samples, rate_hz : float32 array [shape=(N,)], and its sampling rate
-    energies         : of every channel
-    mean_energy      : energy of the channels' mean; none of them counts what is constant
-    packets, damaged : how many packets the track has, and how many of them could not be decoded
-    silence_s        : duration of the silence that fills holes
-    missing_s        : what the container states beyond the end
     The sound so far is in ``_pieces``, each with the number of samples before it. Digital silence, and that which fills
     holes, is left out until the end: memory that nobody writes to costs nothing.
     """
@@ -278,14 +271,11 @@ class _Wave(mmap.mmap):
 
 
 def _correct_wave(path: Path) -> tuple[_Wave | None, float, str]:
-    """Return a WAVE file under a header that FFmpeg understands, how many seconds its own states beyond its end, and
-    what else is wrong with it.
+    """Return a WAVE file under a header that FFmpeg understands, the seconds that its own states beyond its end, and
+    what else is wrong; None: its own header will do. Raises ValueError: the high byte comes first.
 
-    None: its own is one, or it is no WAVE file. 0 seconds: also of streams, which do not know their size.
-    FFmpeg reads samples of as many bits as are valid, without the zeros that fill their container: 24 bits in 32 as 24,
-    20 as another format, 17 as 24. It also loses its way at a chunk of odd length that no byte follows, and reads one
-    of several pieces of sound.
-    Raises ValueError: numbers with the high byte first, which FFmpeg would read as the other ones.
+    FFmpeg reads samples of as many bits as are valid, without the zeros that fill their container; it loses its way at
+    a chunk of odd length that no byte follows, and reads one of several pieces of sound.
     """
     with path.open("rb") as file:
         kind = file.read(4)
@@ -320,11 +310,7 @@ def _correct_wave(path: Path) -> tuple[_Wave | None, float, str]:
 
 
 def _find_wave_sound(content: _Wave) -> tuple[bytes, int, int, bool, str]:
-    """Return the content of the chunk of the form, where the samples are, how many bytes of them, whether FFmpeg would
-    not find them, and what is wrong. The form is empty where there is none, or there are no samples.
-
-    Several pieces of sound, of which FFmpeg reads the last one, are joined in their place.
-    """
+    """Return the form (empty: no sound), where the samples are, how many bytes, if FFmpeg misses some, and a note."""
     form, body, size, reached, pieces, rewritten = b"", 0, 0, 0, 0, False
     for name, place, length, unpadded in _iterate_wave_chunks(content):
         if name == b"fmt " and form not in (b"", content[place : place + length]):

@@ -241,12 +241,10 @@ def score_stretch(posteriors: PhonePosteriors) -> Scored:
 
 @dataclass
 class _Paths:
-    """The paths that are followed, P of them: the best one for each node and each two last words.
+    """The P paths that are followed: the best one for each node and each two last words [each shape=(P,)].
 
-    node    : of the tree [shape=(P,)]
-    context : number of the two last words [shape=(P,)]
-    blank, sound : score of the path whose last row said nothing, and whose last row said the phone of the node
-    origin  : the last word that ended, by number in the history; -1: none
+    ``blank`` and ``sound`` score the path whose last row said nothing, and said the phone of the node; ``origin`` is
+    the last word that ended, by number in the history, or -1.
     """
 
     node: Indices
@@ -279,11 +277,7 @@ class _Paths:
 
 @dataclass
 class _BeamSearch:
-    """The search through one stretch.
-
-    history  : words that ended: the number of the word before in this list, the word, the row after it
-    contexts : the two last words of a path, the last one first, with their numbers
-    """
+    """The search through one stretch: words that ended (the one before, the word, the row after it), and contexts."""
 
     english: EnglishWords
     history: list[tuple[int, int, int]] = field(default_factory=list)
