@@ -221,7 +221,7 @@ def choose_voice() -> SyntheticVoice:
 
 def explain_missing() -> MissingDependencyError:
     """Return the error that says how to install a synthesiser."""
-    debian = " ".join(synthesiser.package for synthesiser in SYNTHESISERS.values())
+    debian = " ".join(filter(None, (synthesiser.package for synthesiser in SYNTHESISERS.values())))
     return MissingDependencyError(
         f"no speech synthesiser is installed; install one: {install_command(ESPEAK_NG.extra)}, or: apt install {debian}"
     )
@@ -266,6 +266,5 @@ def _is_other(name: str, synthesiser: Synthesiser) -> bool:
 
 
 def explain_install(synthesiser: Synthesiser) -> str:
-    """Return the commands that install a synthesiser, for a message."""
-    package = f"apt install {synthesiser.package}"
-    return f"{package}, or {install_command(synthesiser.extra)}" if synthesiser.extra else package
+    """Return the command that installs a synthesiser, for a message."""
+    return install_command(synthesiser.extra) if synthesiser.extra else f"apt install {synthesiser.package}"

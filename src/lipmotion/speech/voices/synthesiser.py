@@ -96,12 +96,12 @@ class SynthesisedSentence:
 class Synthesiser:
     """A speech synthesis program.
 
-    package    : the Debian package with it
+    package    : the Debian package with it; empty: it is a Python package
     voices     : returns its installed American English voices; none where it is not installed
     synthesise : yields the sentences of some texts in a voice (name, texts, a folder for temporary files), in order
     phone_map  : its phones to those of the inventory (``phone_maps``)
     others     : returns its voices of other languages and kinds of English
-    extra      : of lipmotion, that installs it; empty: it is no Python package
+    extra      : of lipmotion, that installs that
     """
 
     name: str
