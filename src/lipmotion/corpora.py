@@ -40,8 +40,7 @@ from lipmotion.types.values import any_members, items, members, number, one_of, 
 
 SPLITS = ("train", "val", "test")
 ENTRY = "entry.json"
-LARGEST_FEATURE = 1e3
-"""No feature has a larger magnitude; features are standardised."""
+LARGEST_FEATURE = 1e3  # no feature has a larger magnitude; features are standardised
 UTTERANCE_ARRAYS = {
     "audio": ArraySpec(np.int16, "N"),
     "features": ArraySpec(np.float32, "T D", -LARGEST_FEATURE, LARGEST_FEATURE),
@@ -50,10 +49,8 @@ UTTERANCE_ARRAYS = {
     "crops": ArraySpec(np.uint8, "F H W 3", optional=True),
 }
 """The arrays of an utterance: N samples, T frames of sound, F frames of motion."""
-BLOCK = 1 << 20
-"""Samples that are quantised at a time."""
-LARGEST_NUMBER = 1e9
-"""No utterance has more seconds or frames, nor more frames a second."""
+BLOCK = 1 << 20  # samples that are quantised at a time
+LARGEST_NUMBER = 1e9  # no utterance has more seconds or frames, nor more frames a second
 
 
 def quantise(audio: Audio) -> Audio:
@@ -159,8 +156,7 @@ def _damaged(folder: Path, error: Exception) -> CorpusError:
 
 
 FORMAT = "lipmotion.corpus"
-VERSION = 2
-"""Version 2 has speakers, labelled phones and motion of any kind."""
+VERSION = 2  # version 2 has speakers, labelled phones and motion of any kind
 MANIFEST = "corpus.json"
 UTTERANCES = "utterances"
 

@@ -58,9 +58,8 @@ OWNED = dict.fromkeys("p t k f th".split(), ("s",)) | dict.fromkeys("s z sh zh c
 """The phones of an ``'s`` after some phones; ``z`` after all others."""
 WEAK_WORDS = frozenset("a an the of and from was but than that's her were your for if in is it its".split())
 """Monosyllables that are unstressed in running speech."""
-LARGEST_LEXICON_BYTES, MAX_LINES = 1 << 25, 1 << 20
-"""Most bytes and lines of a user's file; the dictionary of 134,000 words has 3.3 million bytes."""
-LONGEST_LINE = 2000  # most characters of a line: a word, its phones and a comment
+LARGEST_LEXICON_BYTES = 1 << 25  # of a user's file; the dictionary of 134,000 words has 3.3 million
+LONGEST_PRONUNCIATION = 1000  # most phones of a word
 OFTEN_LENGTHENED = frozenset("no so go do to who hello yo bro ho he me we she be the long stop".split())
 """Words that are meant rather than those with their vowel twice (``noo``, ``loong``, ``stoop``)."""
 LENGTHENED, REPEATED = re.compile(r"(.)\1\1|^(..+?)\2"), re.compile(r"([a-z]{2,4}?)\1+h?")
@@ -102,24 +101,19 @@ class Lexicon:
         """Return the lexicon of a file: a pronunciation ``word PHONE PHONE ...`` a line; ``#`` starts a comment.
 
         Phones are ARPAbet in either case, with or without stress digits, or names of the inventory.
-        Raises InputError: no such file, not UTF-8, larger than allowed (``LARGEST_LEXICON_BYTES``, ``MAX_LINES``,
-        ``LONGEST_LINE``, ``MAX_VARIANTS``), no phones after a word, or an unknown phone (with its line).
+        Raises InputError: no such file, not UTF-8, larger than allowed (``LARGEST_LEXICON_BYTES``), or with its line:
+        no phones after a word, more than ``LONGEST_PRONUNCIATION`` or ``MAX_VARIANTS``, or an unknown phone.
         """
         text = read_text_file(Path(path), "lexicon", LARGEST_LEXICON_BYTES)
-        count = text.count("\n") + 1
-        if count > MAX_LINES:
-            raise InputError(f"{path}: {count} lines, required at most {MAX_LINES}; keep the words that are said")
         user: dict[str, list[Pronunciation]] = {}
         for number, line in enumerate(StringIO(text), start=1):
-            where, length = f"{path}, line {number}", len(line.rstrip("\n"))
-            if length > LONGEST_LINE:
-                what = f"{where}: {length} characters, required at most {LONGEST_LINE};"
-                raise InputError(f"{what} write one pronunciation of a word a line")
+            where = f"{path}, line {number}"
             word, *labels = line.split("#", maxsplit=1)[0].split() or [""]
             if not word:
                 continue
-            if not labels:
-                raise InputError(f"{where}: a word without phones; write the word, then its phones")
+            if not 0 < len(labels) <= LONGEST_PRONUNCIATION:
+                what = f"{len(labels)} phones after a word, required 1 to {LONGEST_PRONUNCIATION}"
+                raise InputError(f"{where}: {what}; write a pronunciation of a word a line")
             word = VARIANT_NUMBER.sub("", normalise_text(word)).strip("'")  # as in ``split_words``
             phones = tuple([find_phone(label) or "" for label in labels])
             for label, phone in zip(labels, phones, strict=True):

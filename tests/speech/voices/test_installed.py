@@ -188,7 +188,7 @@ needs_scripts = pytest.mark.skipif(os.name != "posix", reason="the programs are 
 def small(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Small bounds."""
     bounds = {"LARGEST_OUTPUT_BYTES": 1000, "LARGEST_SOUND_BYTES": 1000, "POLL_S": 0.01}
-    bounds |= {"STILL_S": 0.15} if "sleep" in request.node.name else {}
+    bounds |= {"START_S": 0.15, "EACH_S": 0.0} if "sleep" in request.node.name else {}
     for name, value in bounds.items():
         monkeypatch.setattr(synthesiser, name, value)
 

@@ -26,8 +26,7 @@ FREE_FRAMES = 60_000
 """Recordings of up to ten minutes are aligned without times where these belong to something else."""
 NEIGHBOURS = 3
 """Words on each side of one without room whose windows are widened too, with all that share its time."""
-MAX_WIDENINGS = 40
-"""Doublings of windows without room; then every word may lie anywhere."""
+MAX_WIDENINGS = 40  # doublings of windows without room; then every word may lie anywhere
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,13 +48,11 @@ class FoundWord(NamedTuple):
     posterior: float
 
 
-VARIANT = re.compile(r"\(\d+\)$")
-"""The number of a pronunciation behind a word."""
+VARIANT = re.compile(r"\(\d+\)$")  # the number of a pronunciation behind a word
 OPTIONS = {"fwdflat": False, "maxhmmpf": 10_000}
 """One pass over the tree of all words finds more phones, and faster, than with a second one over the words that it
 found (docs/decisions/recognition.md)."""
-_LOCK = threading.Lock()
-"""A decoder works on one recording at a time."""
+_LOCK = threading.Lock()  # a decoder works on one recording at a time
 
 
 def spot_words(samples: bytes) -> tuple[FoundWord, ...]:
@@ -117,13 +115,11 @@ WORD_FIT, STRETCH_FIT = -2.0, -1.5
 WORD_BONUS, WORD_REACH_FRAMES = 2.0, 2
 """Where words are not believed, their phones are still more probable than others, by so many nats a frame, and so many
 frames earlier or later than in their alignment, linearly less."""
-FIT_WEIGHT, POSTERIOR_WEIGHT, CONSTANT = 0.62, 3.4, -1.9
-MIN_FIT, MAX_FIT = -4.0, 1.0
-"""Coefficients of the confidence; fits count within these limits."""
+FIT_WEIGHT, POSTERIOR_WEIGHT, CONSTANT = 0.62, 3.4, -1.9  # coefficients of the confidence
+MIN_FIT, MAX_FIT = -4.0, 1.0  # fits count within these limits
 SHORT_FRAMES = 3000
 """The words of so little sound are recognised in this process: to start another one would take as long."""
-DICTIONARY = Lexicon()
-"""Words that were recognised are in the dictionary."""
+DICTIONARY = Lexicon()  # words that were recognised are in the dictionary
 
 
 def begin_decoding(audio: AnalysedAudio, each: ParallelMap = map) -> Iterable[tuple[Stretch, Sequence[FoundWord]]]:

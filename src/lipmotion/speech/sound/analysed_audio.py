@@ -39,12 +39,9 @@ from lipmotion.types import Audio, Features, JoinedRows
 MadeT = TypeVar("MadeT")
 SILENT_FRAMES = 50
 """Frames of silence before and after the sound of each passage, recorded or not: the mouth opens before the sound."""
-QUIETEST = 0.1
-"""So large a share of a passage, its most silent frames, say what silence is like in it."""
-OFFSET_SHARE = 0.02
-"""An offset of so small a share of the level of the sound hides no pause."""
-SILENT_ENERGY = -17.0
-"""The log energy between passages: 80 dB beneath their loudest moments."""
+QUIETEST = 0.1  # so large a share of a passage, its most silent frames, say what silence is like in it
+OFFSET_SHARE = 0.02  # an offset of so small a share of the level of the sound hides no pause
+SILENT_ENERGY = -17.0  # the log energy between passages: 80 dB beneath their loudest moments
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,30 +26,21 @@ Curve = NDArray[np.float64]
 Voiced = NDArray[np.bool_]
 
 
-SMOOTHING_FRAMES = 2.0
-"""Standard deviation of the window that levels are smoothed with."""
+SMOOTHING_FRAMES = 2.0  # standard deviation of the window that levels are smoothed with
 BREATH_S, BREATH_PAUSE_S = (0.16, 1.2), 0.25
 """Least and most duration of a breath, and the least one of the pause that it is in."""
-BREATH_RISE_DB = 7.0
-"""A breath is so much louder from 1 to 7.6 kHz than the quiet around it."""
-BREATH_EDGE_DB, BREATH_EDGE_FRAMES = 6.0, 12
-"""It rises and falls by so much within so many frames beside it."""
+BREATH_RISE_DB = 7.0  # a breath is so much louder from 1 to 7.6 kHz than the quiet around it
+BREATH_EDGE_DB, BREATH_EDGE_FRAMES = 6.0, 12  # it rises and falls by so much within so many frames beside it
 BREATH_FROM_SPEECH = (7, 4)
 """Frames from the last voiced one before a breath, and to the first one after it: nearer is the end of a phone."""
-BREATH_LEVEL_DB = -12.0
-"""The level of a breath beside the loud frames of the recording is at most this."""
-BREATH_TILT_DB = (-8.0, 6.0)
-"""Level from 3.5 to 7.6 kHz beside that from 1 to 3.5 kHz: s and sh are brighter."""
+BREATH_LEVEL_DB = -12.0  # the level of a breath beside the loud frames of the recording is at most this
+BREATH_TILT_DB = (-8.0, 6.0)  # level from 3.5 to 7.6 kHz beside that from 1 to 3.5 kHz: s and sh are brighter
 BREATH_LOW_DB = -4.0
 """Level under 1 kHz beside that from 1 to 3.5 kHz, at most: rumble and plosives have more."""
-PAUSE_PIECE_S = 600.0
-"""Longer pauses are searched in pieces: silence may last for hours."""
-QUIET_REACH_S = 2.0
-"""The quiet around a pause is looked for so far beside it."""
-QUIET_SHARE = 0.08
-"""Share of the frames around one that are at most as loud as the quiet there."""
-BLOCK_FRAMES = 2000
-"""Frames whose surroundings are in memory at once."""
+PAUSE_PIECE_S = 600.0  # longer pauses are searched in pieces: silence may last for hours
+QUIET_REACH_S = 2.0  # the quiet around a pause is looked for so far beside it
+QUIET_SHARE = 0.08  # share of the frames around one that are at most as loud as the quiet there
+BLOCK_FRAMES = 2000  # frames whose surroundings are in memory at once
 
 
 def find_breaths(audio: Audio, units: Timeline[Unit]) -> tuple[tuple[float, float], ...]:
@@ -67,8 +58,7 @@ def find_breaths(audio: Audio, units: Timeline[Unit]) -> tuple[tuple[float, floa
     return tuple(breaths)
 
 
-DB = 10 / np.log(10)
-"""Decibels of a natural logarithm of power."""
+DB = 10 / np.log(10)  # decibels of a natural logarithm of power
 
 
 def _list_breaths(

@@ -81,11 +81,9 @@ VARIANTS = ("f1", "f2", "f3", "f4", "m1", "m2", "m3", "m4", "m7", "m8")
 """The variants with the vocal tract, pitch and breath of a person; not the robots, whispers, echoes and growls."""
 PROGRAM = [sys.executable, "-I", str(Path(__file__).with_name("espeak_events.py"))]
 DATA = "espeak-ng-data"
-STRESS_MARKS = "',%="
-"""What it writes before the vowel of a stressed syllable."""
+STRESS_MARKS = "',%="  # what it writes before the vowel of a stressed syllable
 NO_IPA: PhoneMap = {NO_SOUND: ESPEAK_PHONES[NO_SOUND], PART: ESPEAK_PHONES[PART]}
-LARGEST_VOICE_BYTES = 1 << 16
-"""Most bytes of a file that describes a voice."""
+LARGEST_VOICE_BYTES = 1 << 16  # most bytes of a file that describes a voice
 
 
 def find_wheel() -> Path | None:

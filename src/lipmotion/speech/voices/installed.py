@@ -27,8 +27,7 @@ from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import Lexicon, split_words
 
 FLITE_PACKAGE = "flite"
-UNUSED = frozenset({"kal", "awb_time"})
-"""kal is kal16 at 8 kHz; awb_time can only say the time of day."""
+UNUSED = frozenset({"kal", "awb_time"})  # kal is kal16 at 8 kHz; awb_time can only say the time of day
 SPEAKERS = {"kal16": "kal"}
 
 

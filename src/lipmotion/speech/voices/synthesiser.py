@@ -115,15 +115,12 @@ class Synthesiser:
 
 START_S, EACH_S = 30.0, 5.0
 """The time limit of a program: to start, and for each sentence; both are a hundred times what it needs."""
-STILL_S = 30.0
-"""A program that prints and writes nothing for so long hangs."""
 POLL_S = 0.05
 LARGEST_OUTPUT_BYTES = 4 << 20
 """Most bytes that a program may print: many times the phones of twenty sentences."""
 LARGEST_SOUND_BYTES = 32 << 20
 """Most bytes that it may write for each sentence: many times the longest one (``units.text_normalisation``)."""
-SHOWN_CHARACTERS = 200
-"""Characters of a program's error message that ours repeats."""
+SHOWN_CHARACTERS = 200  # characters of a program's error message that ours repeats
 
 
 def run_program(
@@ -170,9 +167,7 @@ def _wait(
 ) -> None:
     """Wait until a program ends. Raises InputError: it takes too long, or prints or writes too much."""
     limit_s, max_written = START_S + EACH_S * sentences, LARGEST_SOUND_BYTES * sentences
-    start = changed = time.monotonic()
-    before = 0, 0
-    running = True
+    start, running = time.monotonic(), True
     while running:
         with suppress(subprocess.TimeoutExpired):
             process.wait(POLL_S)
@@ -181,11 +176,10 @@ def _wait(
         with suppress(OSError):  # the program removes what it wrote
             for path in folder.iterdir() if folder else ():
                 written += path.lstat().st_size
-        now = time.monotonic()
-        changed, before = (changed if before == (printed, written) else now), (printed, written)
+        taken_s = time.monotonic() - start
         if printed > LARGEST_OUTPUT_BYTES:
             raise InputError(f"{name} prints more than {LARGEST_OUTPUT_BYTES} bytes; try another text or voice")
         if written > max_written:
             raise InputError(f"{name} writes more than {max_written} bytes; try another text or voice")
-        if running and (now - start > limit_s or now - changed > STILL_S):
-            raise InputError(f"{name} did not end within {now - start:.0f} s; give shorter or fewer texts")
+        if running and taken_s > limit_s:
+            raise InputError(f"{name} did not end within {taken_s:.0f} s; give shorter or fewer texts")

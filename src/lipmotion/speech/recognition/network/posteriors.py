@@ -27,20 +27,16 @@ from lipmotion.types.audio import from_sixteen_bits
 from lipmotion.units import PHONES
 from lipmotion.units.ipa_phones import read_tokens
 
-POSTERIOR_STEP = 2
-"""Frames of 10 ms from one row of posteriors to the next."""
+POSTERIOR_STEP = 2  # frames of 10 ms from one row of posteriors to the next
 BLANK, WORD_BOUNDARY = "<blank>", "<wb>"
-MIN_LOG_POSTERIOR = -16.0
-"""The logarithm of what is taken to be impossible."""
-SHORT_FRAMES = 1500
-"""So little sound is recognised in this process: to start another one would take as long."""
+MIN_LOG_POSTERIOR = -16.0  # the logarithm of what is taken to be impossible
+SHORT_FRAMES = 1500  # so little sound is recognised in this process: to start another one would take as long
 
 
 LIBRARIES = {("linux", "x86_64"), ("linux", "aarch64"), ("darwin", "x86_64"), ("darwin", "arm64")}
 """Systems and processors that the package has a library for."""
 PACKAGE, WEIGHTS = "hama", "asr_waveform.hama"
-MIN_SAMPLES = 1600
-"""Shorter sound is filled up with silence: the network has no row for it."""
+MIN_SAMPLES = 1600  # shorter sound is filled up with silence: the network has no row for it
 
 
 class PhoneRecogniser:
