@@ -270,11 +270,6 @@ def test_coded(tmp_path: Path, original: Samples, kinds: list[tuple[str, str, in
         assert alike > (0.95 if delay else 0.99)  # a delay of a third of a sample is left in it
 
 
-def test_opus_made_from_16_khz_keeps_its_time(tmp_path: Path, original: Samples) -> None:
-    audio = read_audio(write_sound(tmp_path / "a.webm", babble(16_000), 16_000, "libopus"))
-    assert abs(late_by(audio.samples, original)[0]) <= MS
-
-
 def test_more_channels_than_have_a_name(tmp_path: Path, original: Samples) -> None:
     path = write_wave(tmp_path / "a.wav", np.round(np.tile(original[:, None], 12) * 32767).astype(np.int16))
     assert late_by(read_audio(path).samples, original)[1] > 0.999

@@ -243,15 +243,6 @@ def test_labels_are_those_of_the_words_that_are_believed() -> None:
     assert not list(label_words(ALIGNED, Stretch(100, 180), np.array([False, False]), 0))
 
 
-def test_fits_are_means_over_the_frames_of_each_word() -> None:
-    values = np.zeros((80, 2), np.float32)
-    values[:, 1] = 1.0
-    values[22:60, 1] = 3.0
-    fits, fit = ALIGNED.fits(values, np.ones(80, np.intp))
-    assert fits == pytest.approx([-1.0, -3.0])
-    assert fit == pytest.approx(-(42 + 38 * 3) / 80)
-
-
 def test_what_was_recognised() -> None:
     labels = [LabelledFrames(*each) for each in ((0, "sil"), (10, "b", 0), (20, "iy", 0), (40, "z"))]
     found, doubtful = (build_recognition(labels, [RecognisedWord("bee", sure)], 51, 0.5, None) for sure in (0.8, 0.3))

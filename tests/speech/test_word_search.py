@@ -16,7 +16,6 @@ from lipmotion.speech.sound.acoustic_conditions import mix_noise
 from lipmotion.speech.sound.voice_activity import Stretch, read_stretch
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent, lexicon
-from lipmotion.units.phones import count_phone_edits
 from pipeline.made import read_sound, read_welcome, recogniser_of
 
 SAID = "please speak and my lips will move five big blue boats float by".split()
@@ -69,15 +68,6 @@ def test_other_kinds_do_not_search_for_words(welcome: Audio, kind: str, monkeypa
     assert found.word_s == pytest.approx(0)
     assert found.confidence is None
     assert found.phone_s > 3
-
-
-def test_confidences_grow_with_fit_and_posterior() -> None:
-    by_fit = [word_search.score_words(fit, 0.5) for fit in np.linspace(-40, 5, 100)]
-    by_posterior = [word_search.score_words(-0.5, share) for share in np.linspace(0, 1, 100)]
-    assert by_fit == sorted(by_fit)
-    assert by_posterior == sorted(by_posterior)
-    assert 0 <= word_search.score_words(-99, 0) < 0.1
-    assert 0.7 < word_search.score_words(0, 1) <= 1
 
 
 def recognise_as(monkeypatch: pytest.MonkeyPatch, *words: str) -> None:
@@ -191,14 +181,6 @@ def vocabulary(**words: str) -> beam_search.EnglishWords:
 WORDS = vocabulary(be="b iy", blue="b l uw", bee="b iy", plea="p l iy", loop="l uw p")
 
 
-def test_words_that_begin_alike_share_nodes() -> None:
-    tree = WORDS.tree
-    assert len(tree.sound) == 1 + 10 + len(beam_search.SOUNDS)  # b-iy and b-l-uw share b; p-l-iy, l-uw-p
-    ends = {place: numbers for place, numbers in tree.ends.items() if place < tree.free}
-    assert sorted(ends.values()) == [[0, 2], [1], [3], [4]]
-    assert tree.arcs.sum() == len(tree.target)
-
-
 def decode(rows: posteriors.PhonePosteriors) -> list[beam_search.DecodedWord]:
     return beam_search.decode_words(WORDS, beam_search.score_stretch(rows))
 
@@ -238,11 +220,6 @@ def test_posteriors_draw_phones_that_models_do_not_tell_apart(frames: int) -> No
     assert labels[0].first == 10
     assert "b" in {label.phone for label in labels}
     assert list_wordless(hmm, recogniser._loop, same, [posteriors.PosteriorStretch(Stretch(0, 2), said())]) == []
-
-
-def test_forms_of_a_phone_are_the_same() -> None:
-    assert count_phone_edits(("ax", "b", "el"), ["ah", "b", "l"]) == 0
-    assert count_phone_edits(("b", "uw"), ["p", "uw", "t"]) == 2
 
 
 def test_posteriors_of_phones_sum_to_one() -> None:

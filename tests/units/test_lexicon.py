@@ -95,12 +95,9 @@ def test_a_users_file(lexicon_file: Path) -> None:
         assert said(word, mine) == [phones]
     assert mine.known("lipmotion")
     assert said("bin", mine) == said("bin")
-
-
-@pytest.mark.parametrize("text", ["bim B IH M\r\nbam B AE M\r\n", "\ufeffbim B IH M\nbam B AE M"])
-def test_files_of_other_systems(lexicon_file: Path, text: str) -> None:
-    lexicon_file.write_bytes(text.encode())
-    assert set(Lexicon.from_file(lexicon_file).user) == {"bim", "bam"}
+    for text in ("bim B IH M\r\nbam B AE M\r\n", "\ufeffbim B IH M\nbam B AE M"):  # as other systems write them
+        lexicon_file.write_bytes(text.encode())
+        assert set(Lexicon.from_file(lexicon_file).user) == {"bim", "bam"}
 
 
 @pytest.mark.parametrize(
@@ -214,14 +211,7 @@ def test_it_says_what_it_cannot_guess() -> None:
     for word, message in (
         ("日本", r"how '日本' is said \(日 本\): give the language of the words \(--language\), or add it"),
         ("éкран", r"\(а к н р\)"), ("한", r"\(한\)"), ("mp3", r"\(3\)"), ("''", r"\(no letters\)"),
-        ("", r"\(no letters\)"),
+        ("", r"\(no letters\)"), ("ж" * 1000, r"^.{,299}$"),
     ):  # fmt: skip
         with pytest.raises(errors.InputError, match=message):
             guess_pronunciation(word)
-
-
-def test_a_message_repeats_the_beginning_of_a_word() -> None:
-    for word in ("ж" * 1000, "".join(map(chr, range(0x3B1, 0x3C9))) * 100 + "日" * 90):
-        with pytest.raises(errors.InputError, match=r"\.\.\.' is said") as caught:
-            guess_pronunciation(word)
-        assert len(str(caught.value)) < 300

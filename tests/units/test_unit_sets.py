@@ -93,15 +93,6 @@ def test_classes_hold_whole_units(name: str) -> None:
     check_classes(load_unit_set(name))
 
 
-@named
-def test_a_table_says_the_same_as_the_set(name: str, tmp_path: Path) -> None:
-    wanted = load_unit_set(name)
-    text = "# mine\n\n" + table(dict(wanted.unit_of_phone)).replace("\n", " # why\n")
-    found = load_unit_set(written(tmp_path, text))
-    assert (found.name, found.unit_of_phone, found.units) == ("mine", wanted.unit_of_phone, wanted.units)
-    assert found.count == len(found.units)
-
-
 GOOD = table(dict(load_unit_set("eVis").unit_of_phone))
 WRONG = {
     "a phone is missing": (GOOD.replace(" zh", ""), r"mine\.txt.*missing zh"),

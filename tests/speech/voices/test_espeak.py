@@ -1,25 +1,20 @@
 import json
 import re
 import shutil
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from children import run_child
 from lipmotion import errors, types
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.speech.voices import espeak
-from lipmotion.speech.voices import inventory_phones as module
 from lipmotion.speech.voices.installed import find_voice, speak_sentences
-from lipmotion.speech.voices.inventory_phones import convert_phones, matches, with_words
+from lipmotion.speech.voices.inventory_phones import convert_phones, with_words
 from lipmotion.speech.voices.synthesiser import ARPABET_PHONES, ESPEAK_PHONES, complete_map
 from lipmotion.types import Audio, Span, Timeline, languages
 from lipmotion.units import PHONES, Lexicon, is_silent
-from oracles.edits import least_cost
 
 INSTALLED = espeak.find_wheel() is not None
 SENTENCES = {
@@ -171,26 +166,10 @@ class TestRules:
 
 
 LEXICON = Lexicon({"butter": (("b", "ah", "t", "axr"),), "is": (("ix", "z"),), "it": (("ih", "t"),)})
-SOUNDS = [phone for phone in PHONES if phone not in ("sil", "sp")]
 
 
 def timeline(*labels: tuple[str, float, float]) -> types.Timeline[str]:
     return types.Timeline(tuple(types.Span(start, end, label) for label, start, end in labels))
-
-
-def cost_of(found: Sequence[str], wanted: Sequence[str]) -> float:
-    matched = matches(found, wanted)
-    pairs = [(f, wanted[m]) for f, m in zip(found, matched, strict=True) if m >= 0]
-    gaps = len(found) + len(wanted) - 2 * len(pairs)
-    return sum(module._cost(*pair) for pair in pairs) + module.GAP_COST * gaps
-
-
-@settings(max_examples=40)
-@given(st.lists(st.sampled_from(SOUNDS), max_size=5), st.lists(st.sampled_from(SOUNDS), max_size=5))
-def test_matches_are_the_cheapest(found: list[str], wanted: list[str]) -> None:
-    matched = [match for match in matches(found, wanted) if match >= 0]
-    assert matched == sorted(set(matched))
-    assert cost_of(found, wanted) == pytest.approx(least_cost(found, wanted, module._cost, module.GAP_COST))
 
 
 def test_unstressed_vowels_are_reduced_and_words_known() -> None:
