@@ -112,7 +112,7 @@ def _others() -> tuple[SyntheticVoice, ...]:
 def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
     ipa = voice.partition("+")[0] != LANGUAGE
     task = {"voice": voice, "texts": list(texts), "folder": str(folder), "ipa": ipa}
-    sentences = _ask_library(task, len(texts), folder)
+    sentences = _ask_library(task, len(texts))
     labels = (label.lstrip(STRESS_MARKS) for starts_of_phones in sentences for label, _, _ in starts_of_phones)
     phone_map, unknown = complete_map(labels, NO_IPA if ipa else ESPEAK_PHONES, ipa=ipa)
     if unknown:
@@ -141,12 +141,12 @@ def _spell_words(phones: Timeline[str], places: Sequence[int], text: str) -> Tim
     return Timeline(tuple(spans))
 
 
-def _ask_library(task: dict[str, Any], count: int, folder: Path | None = None) -> list[Any]:
+def _ask_library(task: dict[str, Any], count: int) -> list[Any]:
     """Return the ``count`` answers of ``espeak_events`` to a task. Raises InputError: it answers something else."""
     wheel = find_wheel() or Path()
     names = ("libespeak-ng.so", "libespeak-ng.dylib", "espeak-ng.dll")
     path = next((wheel / name for name in names if (wheel / name).exists()), wheel / names[0])
-    printed = run_program(PROGRAM, NAME, count, json.dumps(task | {"library": str(path), "data": str(wheel)}), folder)
+    printed = run_program(PROGRAM, NAME, count, json.dumps(task | {"library": str(path), "data": str(wheel)}))
     try:
         answers = json.loads(printed)
     except ValueError:

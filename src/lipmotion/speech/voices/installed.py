@@ -42,7 +42,7 @@ def _say_with_flite(voice: str, texts: Sequence[str], folder: Path) -> Iterator[
     path = folder / "flite.wav"
     for text in texts:
         command = ["flite", "-voice", voice, "-psdur", "-o", str(path), "-t", text]
-        printed = run_program(command, FLITE_PACKAGE, folder=folder)
+        printed = run_program(command, FLITE_PACKAGE)
         yield SynthesisedSentence(read_audio(path), parse_phone_ends(printed), path)
 
 
@@ -99,7 +99,7 @@ def _say_with_festival(voice: str, texts: Sequence[str], folder: Path) -> Iterat
     script = folder / "say.scm"
     calls = [f"(say {_quote(text)} {_quote(str(path))})" for text, path in zip(texts, paths, strict=True)]
     script.write_text("\n".join([f"(voice_{voice})", SPEAKING, *calls, ""]), encoding="utf-8")
-    printed = run_program(["festival", "-b", str(script)], FESTIVAL_PACKAGE, len(texts), folder=folder)
+    printed = run_program(["festival", "-b", str(script)], FESTIVAL_PACKAGE, len(texts))
     parts = printed.split(f"{MARK}\n")[1:]
     if len(parts) != len(texts):
         raise InputError(f"festival said {len(parts)} of {len(texts)} sentences; try another text or voice")

@@ -1,4 +1,4 @@
-"""The interface to speech synthesisers, and their programs, run within bounds of time and of what they write."""
+"""The interface to speech synthesisers, and their programs, run within bounds of time."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.types import Audio, Timeline
@@ -115,21 +113,14 @@ class Synthesiser:
 
 START_S, EACH_S = 30.0, 5.0
 """The time limit of a program: to start, and for each sentence; both are a hundred times what it needs."""
-POLL_S = 0.05
-LARGEST_OUTPUT_BYTES = 4 << 20
-"""Most bytes that a program may print: many times the phones of twenty sentences."""
-LARGEST_SOUND_BYTES = 32 << 20
-"""Most bytes that it may write for each sentence: many times the longest one (``units.text_normalisation``)."""
 SHOWN_CHARACTERS = 200  # characters of a program's error message that ours repeats
 
 
-def run_program(
-    command: Sequence[str], package: str, sentences: int = 1, stdin: str = "", folder: Path | None = None
-) -> str:
+def run_program(command: Sequence[str], package: str, sentences: int = 1, stdin: str = "") -> str:
     """Return the standard output of a program. When it has ended, in whatever way, so have the programs it started.
 
-    sentences : how many it synthesises, which sets its limits
-    Raises MissingDependencyError: no such program. Raises InputError: it fails, takes too long, or writes too much.
+    sentences : how many it synthesises, which sets its limit of time
+    Raises MissingDependencyError: no such program. Raises InputError: it fails, or takes too long.
     """
     program = shutil.which(command[0])
     if program is None:
@@ -143,7 +134,9 @@ def run_program(
                 [program, *command[1:]], stdin=task, stdout=printed, stderr=errors, start_new_session=True
             )
             try:
-                _wait(process, name, sentences, (printed, errors), folder)
+                process.wait(limit_s := START_S + EACH_S * sentences)
+            except subprocess.TimeoutExpired as error:
+                raise InputError(f"{name} did not end within {limit_s:.0f} s; give shorter or fewer texts") from error
             finally:
                 if sys.platform == "win32":
                     process.kill()
@@ -160,26 +153,3 @@ def run_program(
             return printed.read().decode().replace("\r\n", "\n")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{name} cannot be run ({error}); install it again: apt install {package}") from error
-
-
-def _wait(
-    process: subprocess.Popen[bytes], name: str, sentences: int, outputs: Sequence[IO[bytes]], folder: Path | None
-) -> None:
-    """Wait until a program ends. Raises InputError: it takes too long, or prints or writes too much."""
-    limit_s, max_written = START_S + EACH_S * sentences, LARGEST_SOUND_BYTES * sentences
-    start, running = time.monotonic(), True
-    while running:
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(POLL_S)
-            running = False
-        printed, written = sum(os.fstat(file.fileno()).st_size for file in outputs), 0
-        with suppress(OSError):  # the program removes what it wrote
-            for path in folder.iterdir() if folder else ():
-                written += path.lstat().st_size
-        taken_s = time.monotonic() - start
-        if printed > LARGEST_OUTPUT_BYTES:
-            raise InputError(f"{name} prints more than {LARGEST_OUTPUT_BYTES} bytes; try another text or voice")
-        if written > max_written:
-            raise InputError(f"{name} writes more than {max_written} bytes; try another text or voice")
-        if running and taken_s > limit_s:
-            raise InputError(f"{name} did not end within {taken_s:.0f} s; give shorter or fewer texts")
