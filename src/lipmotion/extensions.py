@@ -22,8 +22,8 @@ from lipmotion.errors import InputError
 ExtensionT = TypeVar("ExtensionT")
 GROUPS = (
     *("lipmotion.engines", "lipmotion.faces", "lipmotion.exporters", "lipmotion.corpus_readers"),
-    *("lipmotion.outputs", "lipmotion.predictors", "lipmotion.trackers", "lipmotion.phone_recognisers"),
-    *("lipmotion.motion_readers", "lipmotion.live", "lipmotion.verbs", "lipmotion.names"),
+    *("lipmotion.outputs", "lipmotion.predictors", "lipmotion.trackers", "lipmotion.motion_readers"),
+    *("lipmotion.live", "lipmotion.verbs", "lipmotion.names"),
 )
 """Every group of entry points that is read."""
 PACKAGE = "lipmotion"

@@ -341,7 +341,7 @@ def test_from_videos_to_figures(some_of_grid, tmp_path):
     report = prepare(some_of_grid, tmp_path / "corpus")
     assert not report.failed
     corpus = lipmotion.Corpus.open(tmp_path / "corpus")
-    assert (corpus.splits["train"], corpus.splits["test"]) == (TRAIN, TEST)
+    assert (len(corpus.names("train")), len(corpus.names("test"))) == (TRAIN, TEST)
 
     model, trained = lipmotion.train(corpus)
     assert not trained.skipped

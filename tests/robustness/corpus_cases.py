@@ -66,7 +66,7 @@ def _(corpus: Path) -> None:
 _damaged("a manifest of 100,000 brackets", 4, "not a corpus (no readable corpus.json); give a prepared corpus")(
     lambda corpus: (corpus / "corpus.json").write_text("[" * 100_000)
 )
-_damaged("a newer version", 4, "corpus version 9, this lipmotion reads versions up to 2; upgrade lipmotion")(
+_damaged("a newer version", 4, "corpus version 9, this lipmotion reads version 2; upgrade lipmotion")(
     lambda corpus: _change_manifest(corpus, version=9)
 )
 _damaged("a list of utterances that is a list", 4, "the list of utterances is damaged", "prepare the corpus again")(
@@ -76,7 +76,7 @@ _damaged("a list of utterances that is a list", 4, "the list of utterances is da
 
 @_damaged("an utterance that leads elsewhere", 4, "is not listed as one; prepare the corpus again")
 def _(corpus: Path) -> None:
-    entry = {"split": "train", "duration_s": 1, "frames": 1, "unseen_frames": 0}
+    entry = {"split": "train", "speaker": "", "duration_s": 1, "frames": 1, "unseen_frames": 0}
     _change_manifest(corpus, utterances={"../../elsewhere": entry})
 
 

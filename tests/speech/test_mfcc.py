@@ -1,5 +1,4 @@
 import itertools
-import runpy
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
@@ -136,23 +135,6 @@ def test_it_says_what_is_wrong(measure: Callable[[types.Audio], object]) -> None
 
 def drawn_features(seed: int, frames: int = 200) -> types.Features:
     return types.Features(np.random.default_rng(seed).normal(size=(frames, 39)).astype(np.float32), frames / 100)
-
-
-def around(values: np.ndarray, frame: int) -> np.ndarray:
-    """Return what the map sees of a frame, slowly."""
-    places = [min(max(frame + step, 0), len(values) - 1) for step in sound_offset.FRAME_OFFSETS]
-    return np.concatenate([values[place, : sound_offset.STATIC_FEATURES] for place in places])
-
-
-def test_the_fit_finds_the_map_behind_the_data() -> None:
-    weights = np.random.default_rng(9).normal(size=sound_offset.STATIC_FEATURES * len(sound_offset.FRAME_OFFSETS))
-    examples = []
-    for seed in range(6):
-        given = drawn_features(seed)
-        examples.append((given, np.array([around(given.values, n) @ weights for n in range(200)])))
-    script = Path(__file__).parents[2] / "scripts" / "lip_speed.py"
-    found = runpy.run_path(str(script))["fit_opening_speed"](examples)
-    assert np.corrcoef(found, weights)[0, 1] > 0.995
 
 
 def test_the_map_that_ships_is_linear_and_local() -> None:

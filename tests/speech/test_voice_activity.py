@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lipmotion.hmm.loudness import DECIBEL, MIN_FRAMES, average_power, find_spoken_frames
 from lipmotion.speech.features import mfcc
-from lipmotion.speech.sound import acoustic_conditions, analysed_audio, pauses, voice_activity
+from lipmotion.speech.sound import analysed_audio, pauses, voice_activity
 from lipmotion.types import Audio
 from speech.made_voices import RATE_HZ, hiss, spoken
 from testing.toy import toy_sentences
@@ -211,24 +211,6 @@ def test_a_tone_that_covers_a_word_is_found_and_no_voice_is_one() -> None:
     assert 120 < end <= 142
     level = audio.log_energy
     assert level[110:120].max() < level[:100].max() - 5  # as silent as a room, in what recognisers get
-
-
-@pytest.mark.parametrize("hertz", [(50, 150, 250), (120,), (200.4,)])
-def test_a_voice_is_found_beneath_hum(hertz: tuple[float, ...]) -> None:
-    samples = np.concatenate([spoken(0), hiss(1, 25), spoken(1)])
-    hum = samples.std() * sum(np.sin(2 * np.pi * each * np.arange(len(samples)) / RATE_HZ) for each in hertz)
-    clean, found = (
-        [passage.first for passage in analysed_audio.AnalysedAudio(sound.astype(np.float32), RATE_HZ).passages]
-        for sound in (samples, samples + hum)
-    )
-    assert found == pytest.approx(clean, abs=30)
-
-
-def test_a_voice_on_one_note_is_no_hum() -> None:
-    time_s = np.arange(6 * RATE_HZ) / RATE_HZ
-    sung = sum(np.sin(2 * np.pi * 150 * n * time_s) / n for n in range(1, 20)) * np.where(time_s % 1 < 0.85, 0.1, 1e-3)
-    samples = sung.astype(np.float32)
-    assert acoustic_conditions.remove_hum(samples) is samples
 
 
 def test_noise_stands_in_the_gaps_of_a_noise_gate() -> None:

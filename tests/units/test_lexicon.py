@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from lipmotion import errors, units
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.units import PHONES, Lexicon, lexicon
-from lipmotion.units.lexicon import LARGEST_LEXICON_BYTES, LONGEST_LINE, MAX_LINES, MAX_VARIANTS, pronounce_by_network
+from lipmotion.units.lexicon import LARGEST_LEXICON_BYTES, LONGEST_PRONUNCIATION, MAX_VARIANTS, pronounce_by_network
 from lipmotion.units.spelling import guess_pronunciation, remove_accents
 
 
@@ -95,30 +95,26 @@ def test_a_users_file(lexicon_file: Path) -> None:
         assert said(word, mine) == [phones]
     assert mine.known("lipmotion")
     assert said("bin", mine) == said("bin")
-
-
-@pytest.mark.parametrize("text", ["bim B IH M\r\nbam B AE M\r\n", "\ufeffbim B IH M\nbam B AE M"])
-def test_files_of_other_systems(lexicon_file: Path, text: str) -> None:
-    lexicon_file.write_bytes(text.encode())
-    assert set(Lexicon.from_file(lexicon_file).user) == {"bim", "bam"}
+    for text in ("bim B IH M\r\nbam B AE M\r\n", "\ufeffbim B IH M\nbam B AE M"):  # as other systems write them
+        lexicon_file.write_bytes(text.encode())
+        assert set(Lexicon.from_file(lexicon_file).user) == {"bim", "bam"}
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("bim B IH M\nbam B AE Q", r"words é.txt, line 2: unknown phone 'Q'; the phones are: aa ae"),
-        ("# a\n\nbam", r"line 3: a word without phones"),
+        ("# a\n\nbam", r"line 3: 0 phones after a word, required 1 to 1000"),
         ("bim B sil", r"line 1: unknown phone 'sil'"),
         ("bim B IH12 M", r"line 1: unknown phone 'IH12'"),
         ("bim " + "Q" * 500, r"unknown phone 'Q{80}\.\.\.'; the phones"),
-        ("bim B IH M\n" + "bim B" + " B" * LONGEST_LINE, "line 2: 4005 characters, required at most 2000"),
+        ("bim B IH M\n" + "bim B" + " B" * LONGEST_PRONUNCIATION, "line 2: 1001 phones"),
         ("bim B IH M\n" * (MAX_VARIANTS + 1), "line 33: more than 32 pronunciations of 'bim'"),
-        ("\n", "1048577 lines, required at most 1048576"),
         ("#", "33554433 bytes, required at most 33554432"),
     ],
 )
 def test_it_says_which_line_is_wrong(lexicon_file: Path, text: str, message: str) -> None:
-    lexicon_file.write_text(text * {"\n": MAX_LINES, "#": LARGEST_LEXICON_BYTES + 1}.get(text, 1))
+    lexicon_file.write_text(text * (LARGEST_LEXICON_BYTES + 1 if text == "#" else 1))
     with pytest.raises(InputError, match=message):
         Lexicon.from_file(lexicon_file)
 
@@ -215,14 +211,7 @@ def test_it_says_what_it_cannot_guess() -> None:
     for word, message in (
         ("日本", r"how '日本' is said \(日 本\): give the language of the words \(--language\), or add it"),
         ("éкран", r"\(а к н р\)"), ("한", r"\(한\)"), ("mp3", r"\(3\)"), ("''", r"\(no letters\)"),
-        ("", r"\(no letters\)"),
+        ("", r"\(no letters\)"), ("ж" * 1000, r"^.{,299}$"),
     ):  # fmt: skip
         with pytest.raises(errors.InputError, match=message):
             guess_pronunciation(word)
-
-
-def test_a_message_repeats_the_beginning_of_a_word() -> None:
-    for word in ("ж" * 1000, "".join(map(chr, range(0x3B1, 0x3C9))) * 100 + "日" * 90):
-        with pytest.raises(errors.InputError, match=r"\.\.\.' is said") as caught:
-            guess_pronunciation(word)
-        assert len(str(caught.value)) < 300

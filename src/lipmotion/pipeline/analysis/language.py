@@ -16,7 +16,7 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Request, SpeechInput, as_request
 from lipmotion.speech.recognition.network.posteriors import WORD_BOUNDARY, find_installed_recogniser, find_stretches
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
-from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, USING_WORDS, open_recogniser
+from lipmotion.speech.recognition.recogniser import open_recogniser
 from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.storage.files import atomic_file, check_distinct, check_target
 from lipmotion.storage.json_text import as_json
@@ -91,13 +91,12 @@ def detect_english(audio: Audio) -> bool | None:
     audio : at 16 kHz
     The network writes every language with the phones of English: it cannot say which other one it is.
     """
-    name = find_installed_recogniser()
-    if name is None:
+    if find_installed_recogniser() is None:
         return None
     part = analysed(Audio(audio.samples[: int(PART_S * audio.rate_hz)], audio.rate_hz))
     tokens = [
         token
-        for _, posteriors in find_stretches(name, part)
+        for _, posteriors in find_stretches(part)
         for token in (*(each.token for each in posteriors.best_tokens), WORD_BOUNDARY)
     ]
     words = (list(group) for ends, group in groupby(tokens, WORD_BOUNDARY.__eq__) if not ends)
@@ -121,7 +120,6 @@ def warn_of_another_language(recognition: Recognition) -> None:
 
 
 TEXT, JSON = ".txt", ".json"
-WITHOUT_WORDS = tuple(kind for kind in RECOGNISER_KINDS if kind not in USING_WORDS)
 LINE_PAUSE_S = 0.5
 """A longer pause between words ends a line of text."""
 
@@ -143,11 +141,8 @@ def recognise_words(speech: SpeechInput, *, model: Model | str | Path | None = N
     """
     request = as_request(speech)
     chosen = model if isinstance(model, Model) else load_model(model or request.model)
-    if request.recogniser in WITHOUT_WORDS:
-        raise InputError(
-            f"the recogniser {request.recogniser!r} recognises phones, not words; required one of: "
-            f"{', '.join(USING_WORDS)}"
-        )
+    if request.recogniser != "auto":
+        raise InputError(f"the recogniser {request.recogniser!r} recognises phones, not words; required 'auto'")
     audio = analysed(read_recording(request))
     recogniser = open_recogniser(chosen.phones, request.recogniser, chosen.adaptation)
     if workers == 1:

@@ -120,8 +120,7 @@ def find_form(name: str) -> str:
     return COMPARED_FORMS.get(phone, phone)
 
 
-FORMS = tuple(sorted({find_form(phone) for phone in PHONES}))
-"""The phones that are compared."""
+FORMS = tuple(sorted({find_form(phone) for phone in PHONES}))  # the phones that are compared
 
 
 LabelT = TypeVar("LabelT")
@@ -136,8 +135,7 @@ noise of 20 dB 0.70 to 0.95, other languages 0.58 to 0.64."""
 RANGE_PERCENTILES = (5, 95)
 NOISY_DB = 20.0
 """A recording with a smaller range of levels is noisy: 25 to 34 dB in these pieces, 16 to 19 dB in babble of 10 dB."""
-GAP_S = 1e-6
-"""Shorter gaps between phones are of rounding."""
+GAP_S = 1e-6  # shorter gaps between phones are of rounding
 SLIVER_FRAMES = 3
 """Phones without words of which fewer frames are left beside a word are not made: no phone model is shorter."""
 
@@ -319,6 +317,19 @@ def select_reliable(units: Timeline[Unit], confidence: float) -> Timeline[Unit]:
         return replace(span, label=replace(span.label, confidence=confidence)) if unrated else span
 
     return Timeline(tuple(map(rate, units)))
+
+
+def silence_units(units: Timeline[Unit], others: Sequence[tuple[float, float]]) -> Timeline[Unit]:
+    """Return recognised phones in time which are silence where something else is heard; known phones stay.
+
+    others : from when to when, in seconds
+    """
+    spans = []
+    for span in units:
+        inside_s = sum(max(min(span.end_s, end_s) - max(span.start_s, start_s), 0.0) for start_s, end_s in others)
+        is_word = span.label.confidence is None or inside_s < span.duration_s / 2
+        spans.append(span if is_word else replace(span, label=Unit(SILENCE, confidence=span.label.confidence)))
+    return Timeline(tuple(spans))
 
 
 def label_words(
