@@ -109,34 +109,31 @@ def run(  # noqa: PLR0913
     """
     from lipmotion.pipeline.analysis.read_request import read_request
     from lipmotion.pipeline.edit_files import edit_file
+    from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.model import load_model
     from lipmotion.pipeline.outputs.curve_sets import list_curve_names
 
-    # What cannot be written is refused before the long work.
     edits, recording = edit_file(job.request.edits), job.request.recording
     job = replace(job, delivery=edits.edits.delivery(job.delivery), staging=edits.edits.staging(job.staging))
     face = face or open_face(job.outputs)
-    draws = any(output.draws for output in check_outputs(job, face, recording))
+    draws = any(output.draws for output in check_outputs(job, face, recording))  # refused before the long work
 
     request = read_request(job.request, words_beside=words_beside, is_typed=is_typed)
-    model = model or load_model(job.request.model)
+    model = model or load_model(request.model)
     if request.onto is None:
         request = replace(request, onto=face.find_other_person(model, job.request.speaker))
-
     curves = choose_curves(job.outputs, face)
-    session = edits.session(
+    generation = animate(
         request,
         model=model,
+        edits=edits,
         workers=workers,
         monitor=sub_monitor(monitor, 0.0, RECOGNITION if draws else 1.0),
         background=face.load if draws else None,
         curves=list_curve_names(curves) if curves else (),
     )
-    generation = session.generate(edits.edits)
-    del session  # sound and features of an hour, which outputs do not need
-
-    of_writing = sub_monitor(monitor, RECOGNITION, 1.0)
-    write_outputs(job, face, generation, recording, model=model, temporary=temporary, monitor=of_writing)
+    drawing = sub_monitor(monitor, RECOGNITION, 1.0)
+    write_outputs(job, face, generation, recording, model=model, temporary=temporary, monitor=drawing)
     return generation
 
 
