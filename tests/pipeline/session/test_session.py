@@ -137,7 +137,7 @@ def test_a_phone_is_split_and_words_are_said_otherwise(session):
     split = session.units(edited(f"split phone 3 at {middle_s}", "phone 4 is m"))
     assert phones(split) == [*phones(plain)[:3], "m", *phones(plain)[3:]]
     assert split[2].end_s == split[3].start_s == middle_s
-    with pytest.raises(InputError, match="required .* between the phones beside it"):
+    with pytest.raises(InputError, match=r"required .* between the phones beside it"):
         session.units(edited(f"split phone 3 at {third.start_s}"))
     word = next(span.label.word for span in plain if span.label.word)
     said = session.units(edited(f"word 1 is {word} said m aa m"))

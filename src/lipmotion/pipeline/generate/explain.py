@@ -170,7 +170,7 @@ class StateRun:
     """Consecutive frames of generated motion behind which stands one state of the model.
 
     start_s, end_s : seconds; the frames are centred at times from ``start_s`` (included) to ``end_s`` (excluded)
-    phone, word    : in the middle of the run; empty: none, or not known
+    phone, word    : of the frame in the middle of the run; empty: none, or not known
     state          : as in ``Generation.trace``; of the engine ``selection`` it names a recording and the times in it
     """
 
@@ -204,7 +204,7 @@ def list_runs(generation: Generation) -> tuple[StateRun, ...]:
     starts_s, runs = [span.start_s for span in spans], []
     firsts = np.flatnonzero(np.diff(frames, prepend=-1)).tolist()
     for first, end in pairwise([*firsts, len(frames)]):
-        place = bisect_right(starts_s, (first + end) / 2 / rate_hz) - 1
+        place = bisect_right(starts_s, (first + end - 1) // 2 / rate_hz) - 1
         phone, word = (spans[place].label.phone, spans[place].label.word) if place >= 0 else ("", "")
         runs.append(StateRun(first / rate_hz, end / rate_hz, phone, word, generation.trace.states[frames[first]]))
     return tuple(runs)
