@@ -125,7 +125,7 @@ def test_only_files_that_are_read_are_declared_as_inputs():
     options = command_line.parse_words(LINE.split(), argparse.Namespace())
     read = {one.name for one in options.reads}
     assert {"speech", "transcript", "lexicon", "units", "model", "onto", "face", "background", "job"} <= read
-    assert {one.name for one in options.writes} == {"output", "posteriors"}
+    assert {one.name for one in options.writes} == {"output"}
 
 
 @needs_toml
@@ -383,20 +383,3 @@ def test_a_line_that_fails_is_told_by_the_exit_code(run, takes, toy_model_file, 
     assert events[-1]["type"] == "failure"
     assert "2 lines: 1 done, 0 kept, 1 failed; the reasons are in" in events[-1]["reason"]
     assert (here / "out" / "a.json").is_file()
-
-
-def test_a_check_writes_nothing(run, takes, here):
-    done = run("batch", "--check", takes, "--jobs", "1")
-    assert done.code == 3
-    assert done.out == ["problem\tline\tfound", "same sound\tb\tas of a"]
-    assert done.err == ["lipmotion: error: 2 lines: 1 same sound"]
-    (takes / "b.wav").unlink()
-    done = run("batch", "--check", takes, "--jobs", "1")
-    assert (done.code, done.out) == (0, ["1 lines: nothing found"])
-    (takes / "b.wav").touch()
-    done = run("batch", "--check", takes, "--jobs", "1", "--machine-readable")
-    events = [json.loads(line) for line in done.out]
-    assert [(each["name"], each["outcome"]) for each in events if each["type"] == "item"] == [("b", "unreadable")]
-    assert events[-1]["exit_code"] == done.code == 3
-    assert {path.name for path in here.iterdir()} == {"takes"}
-    assert "add --out DIR" in run("batch", takes).err[0]

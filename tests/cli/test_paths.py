@@ -21,7 +21,7 @@ REFUSED = [
     ("the recording itself", f"animate {TALKING} -o a.wav"),
     ("the transcript itself", f"animate {TALKING} -o b.json t.txt"),
     ("the lexicon itself", f"animate {TALKING} -o b.json -o l.txt"),
-    ("the units file itself", f"animate {TALKING} -o b.json --posteriors u.json"),
+    ("the units file itself", f"animate {TALKING} -o b.json u.json"),
     ("the model itself", f"animate {TALKING} -o m.lipmotion"),
     ("the transcript itself", f"cues {TALKING} -f tsv -o t.txt"),
     ("the recording itself", "adapt b.wav a.wav --model m.lipmotion -o a.wav"),

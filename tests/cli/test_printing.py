@@ -99,7 +99,6 @@ animate a.wav --model m.lipmotion -o a.json --transcript words.txt
 animate a.wav --model m.lipmotion -o a.json --lexicon lexicon.txt
 animate a.wav --model m.lipmotion -o a.json --units none-EVIL.json
 animate a.wav --model m.lipmotion -o a.json --rate EVIL
-animate a.wav --model m.lipmotion -o a.json --posteriors EVIL
 explain EVIL.mp4 --model m.lipmotion --at 0
 cues EVIL.wav --model m.lipmotion --recogniser own -f xml
 cues EVIL.wav --model m.lipmotion --recogniser own -f json

@@ -7,7 +7,6 @@ from shutil import copy
 import av
 import numpy as np
 import pytest
-from PIL import Image
 
 from cli.conftest import RunCommand, check_refused, is_one_error
 from lipmotion import animate, load_model, read_motion, write
@@ -136,17 +135,6 @@ def test_outputs_are_checked_before_work_begins(run):
         done = run("animate", "missing.wav", "--model", "missing.lipmotion", "-o", *options)
         assert is_one_error(done, code)
         assert "no such" not in done.err[0]
-
-
-def test_a_picture_of_the_posteriors(run, coupled_model_file, toy_speech, here):
-    basics = ("animate", toy_speech, "--model", coupled_model_file, "-o")
-    assert run(*basics, "a.json", "--posteriors", "a.png") == (0, ["a.json", "a.png"], [])
-    with Image.open(here / "a.png") as picture:
-        assert picture.format == "PNG"
-        assert 600 < picture.width <= 2200
-    run(*basics, "b.json")
-    assert (here / "a.json").read_bytes() == (here / "b.json").read_bytes()
-    assert sorted(path.name for path in here.iterdir()) == ["a.json", "a.png", "b.json"]
 
 
 def test_the_addon_is_written_or_one_line_says_why_not(run, here):

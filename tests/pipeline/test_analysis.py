@@ -29,7 +29,7 @@ from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.types import Audio, Span, Speech, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import Lexicon
-from pipeline.made import features_of, read_welcome, recogniser_of
+from pipeline.made import WELCOME, features_of, read_welcome, recogniser_of
 from testing.toy import ToySentence
 
 
@@ -160,54 +160,13 @@ def test_words_that_are_hardly_understood_are_told(confidence, lasts_s, warns, c
     assert (f"confidence {confidence:.2f}" in caplog.text) == warns
 
 
-WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
-
-
-def labels(units: Timeline[Unit]) -> list[tuple[str, str]]:
-    return [(span.label.phone, span.label.word) for span in units]
-
-
-@pytest.fixture(scope="module")
-def found() -> Recognition:
-    return language.recognise_words(WELCOME)
-
-
-def test_long_pauses_end_a_line():
-    timed = ((0.0, 0.3, "oh"), (0.4, 0.6, "no"), (1.2, 1.5, "yes"))
-    words = Timeline(tuple(Span(start_s, end_s, RecognisedWord(text, 0.5)) for start_s, end_s, text in timed))
-    assert language.format_words(words) == "oh no\nyes\n"
-    assert language.format_words(Timeline(())) == ""
-
-
-@pytest.mark.parametrize("suffix", [".txt", ".JSON"])
-def test_files_of_words_are_transcripts(found, tmp_path, suffix):
-    path = tmp_path / f"words{suffix}"
-    language.write_words(found.words, [path], WELCOME)
-    aligned = animate(WELCOME, transcript=path).units
-    assert labels(aligned) == labels(found.units)
-    starts = [(a.start_s, b.start_s) for a, b in zip(aligned, found.units, strict=True)]
-    assert all(abs(a - b) < 0.05 for a, b in starts)
-
-
-def test_files_that_cannot_be_written(found, tmp_path):
-    for name in ("words.srt", "words", "nowhere/words.txt"):
-        with pytest.raises(ExportError):
-            language.write_words(found.words, [tmp_path / "first.txt", tmp_path / name])
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.mark.long
-def test_speech_is_as_reliable_as_its_words(found):
-    request, model = Request(WELCOME), load_model()
-    understood = analyse_speech(model, request)
-    assert understood.recognition.units == found.units
-    assert understood.speech.confidence == pytest.approx(found.reliability)
-    assert understood.speech.units == analyse(model, request).units
-    given = analyse_speech(model, Request(WELCOME, transcript="please speak"))
-    assert given.recognition is None
+def test_speech_is_as_reliable_as_its_words():
+    model, understood = load_model(), analyse_speech(load_model(), Request(WELCOME))
+    assert understood.speech.confidence == pytest.approx(understood.recognition.reliability)
+    assert understood.speech.units == analyse(model, Request(WELCOME)).units
+    assert analyse_speech(model, Request(WELCOME, transcript="please speak")).recognition is None
     assert analyse(model, Request(WELCOME, recogniser="fast")).confidence == pytest.approx(0)
-    long = Audio(np.tile(read_welcome().samples, 7), 16_000)  # of more than half a minute
-    assert language.recognise_words(long, workers=2).words == language.recognise_words(long).words
 
 
 @dataclass(frozen=True)

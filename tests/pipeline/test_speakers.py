@@ -7,11 +7,9 @@ import pytest
 
 from lipmotion import (
     Corpus,
-    Edits,
     Model,
     Request,
     Selection,
-    Session,
     animate,
     evaluate,
     explain,
@@ -24,7 +22,6 @@ from lipmotion import (
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.motion.closure import find_closable_ranges
-from lipmotion.pipeline.generate.explain import chain_posteriors
 from lipmotion.pipeline.request import Onto
 from lipmotion.types import Channel, Constraints, Motion, Pin, Track, Utterance
 from lipmotion_faces.tracking.frames import VideoSpan
@@ -128,9 +125,6 @@ def test_other_engines(two_people, toy_sentence, engine):
     assert pinned["opening"][90] == pytest.approx(0.01, abs=1e-9)
     (explanation,) = explain(request(toy_sentence, "ben"), at=0.9, model=model)
     assert explanation.motion["opening"].value == pytest.approx(ben[90], abs=1e-9)
-    if engine == "coupled":
-        generation, _ = chain_posteriors(Session(request(toy_sentence, "ben"), model=model), Edits())
-        np.testing.assert_allclose(generation.motion["opening"], ben, atol=1e-12)
 
 
 def captured(utterance: Utterance, channels: tuple[Channel, ...]) -> Utterance:

@@ -25,8 +25,6 @@ _option(
 _option("an unknown --recogniser", 3, "unknown recogniser 'best'; required one of: auto", "--recogniser", "best")
 _option("--intensity nan", 3, "the intensity is nan, required 0 to 3", "--intensity=nan")
 _option("--offset-ms that leaves nothing", 3, "nothing is left; give a smaller one", "--offset-ms=-60000")
-_option("--posteriors of a model without chains", 3, "'trajectory' has no chains", "--posteriors", "a.png")
-_option("--posteriors as .jpg", 7, "unknown format '.jpg'; required: .png", "--posteriors", "a.jpg")
 case(GROUP, "cues --hold 1000000000", 0)(
     lambda bench: [
         "cues", bench.speech, "--model", bench.model, "--recogniser", "own", "--hold", "1000000000", "-o", "a.json",

@@ -297,9 +297,6 @@ class Outputs(Configuration):
         help="what motion files hold: arkit, face, visemes, held-visemes, vowels, fap, or the controls of a rig "
         "(FILE.csv; docs/meshes.md)",
     )
-    posteriors: Path | None = option(
-        None, kind=Path, writes=True, metavar="FILE.png", help="draw the posteriors of units over time (coupled)"
-    )
     kinds: tuple[str, ...] = option(
         ("json",),
         flags=("--to",),

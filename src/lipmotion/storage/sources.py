@@ -196,7 +196,7 @@ _NEXT = {
     "picture": "give a recording, and the picture as a face: --face",
     "archive": "unpack it, and give the file that is in it",
     "stand-in": "it stands for the file: fetch the file itself",
-    "sound": "motion is made of it by: lipmotion animate FILE -o OUT; its words by: lipmotion words FILE",
+    "sound": "motion is made of it by: lipmotion animate FILE -o OUT; its words by: -o WORDS.vtt",
 }
 """What to do with a file that is given in the place of another, by group."""
 _KINDS: dict[str, dict[str, tuple[tuple[int, bytes], ...]]] = {

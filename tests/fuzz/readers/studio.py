@@ -152,9 +152,8 @@ def seed_settings(_: Good) -> list[Files]:
         folder = Path(made) / "study"
         small_study(folder)
         found[MANIFEST] = (folder / MANIFEST).read_text(encoding="utf-8")
-        for name in ("edits.json", "edits.toml"):
-            write_edits(edits, folder / name)
-            found[name] = (folder / name).read_text(encoding="utf-8")
+        write_edits(edits, folder / "edits.json")
+        found["edits.json"] = (folder / "edits.json").read_text(encoding="utf-8")
     return [{name: text.encode()} for name, text in found.items()]
 
 

@@ -195,8 +195,6 @@ def _copy(source: IO[bytes], target: Path) -> None:
 
 
 PartT = TypeVar("PartT", bound=Configuration)
-OF_ANIMATE = ("posteriors", "kinds")
-"""Outputs that other verbs do not write."""
 
 
 def add_options(
@@ -226,7 +224,7 @@ def add_outputs(parser: argparse.ArgumentParser, files: str, *, required: bool =
     files    : the suffixes that are possible, for the help
     required : whether there must be an output
     """
-    add_options(parser, Outputs, but=OF_ANIMATE, files={"help": files, "required": required})
+    add_options(parser, Outputs, but=("kinds",), files={"help": files, "required": required})
     add_options(parser, Staging)
     add_options(parser, Delivery)
     add_detail(parser)

@@ -104,7 +104,7 @@ def animate_one_by_one(job: Job, paths: Sequence[Path], options: argparse.Namesp
     the recordings are used, as a corpus and a batch use them. Faces and characters are opened once.
     Returns False, and does nothing, where there is one recording and its outputs are files.
     Raises ExportError: outputs that are not for several recordings, or that clash.
-    Raises InputError: a transcript, units or a picture of posteriors, which belong to one recording; or a pipe.
+    Raises InputError: a transcript, units or edits, which belong to one recording; or a pipe.
     Raises the error of the highest exit code among those that occurred, with the number of recordings that failed.
     """
     from lipmotion.pipeline.model import load_model
@@ -114,7 +114,6 @@ def animate_one_by_one(job: Job, paths: Sequence[Path], options: argparse.Namesp
     _check_named(paths)
     recordings = list_recordings(paths)
     alone = {name: getattr(job.request, name) for name in ("transcript", "units", "edits")}
-    alone["posteriors"] = job.outputs.posteriors
     for name, value in alone.items():
         if value is not None and len(recordings) > 1:
             raise InputError(f"--{name} belongs to one recording, and there are {len(recordings)}; animate each alone")
