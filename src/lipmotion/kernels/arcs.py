@@ -42,13 +42,6 @@ class ArcLayout(NamedTuple):
     block_arcs: Index
 
 
-class ArcWeights(NamedTuple):
-    """Values of arcs, in a layout: by run [shape=(N,)] and by block [shape=(X, Y)]."""
-
-    runs: NDArray[Any]
-    blocks: NDArray[Any]
-
-
 def lay_out_arcs(arc_from: Index, arc_start: Index) -> ArcLayout:
     """Return the layout of a network whose arcs are sorted by target: their sources, and each target's first arc."""
     states = len(arc_start)

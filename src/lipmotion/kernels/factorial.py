@@ -103,7 +103,9 @@ def infer_factorial(
     results = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
     result = next((each for each in results if each is not None), None)
     if result is None:  # there is no path
-        first, second = (LoopCounts(*map(np.zeros_like, (*loop[:2], *loop[3:5]))) for loop in (audio, visual))
+        first, second = (
+            LoopCounts(*map(np.zeros_like, (loop.stay, loop.onward, loop.enter))) for loop in (audio, visual)
+        )
         in_audio, in_visual, in_pairs = (np.zeros(log.shape) for log in logs[:3])
         return FactorialPosteriors(in_audio, in_visual, in_pairs, first, second, -np.inf)
     return result._replace(pair=result.pair[:, np.argsort(order)])
@@ -355,7 +357,7 @@ def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:
     after = np.cumsum(gained[::-1], axis=0)[::-1] - gained
     left = np.maximum(enter.sum(axis=1) + after, 0)
     stay = np.maximum(frames[:-1].sum(axis=0) - left, 0)
-    return LoopCounts(stay, left[:-1], enter, frames[0])
+    return LoopCounts(stay, left[:-1], enter)
 
 
 @compile_to_rounding

@@ -42,14 +42,12 @@ class Loop(NamedTuple):
 class LoopCounts(NamedTuple):
     """Expected counts of the transitions of a loop; shapes as in ``Loop``.
 
-    enter   : [shape=(U, U)], of each unit after each; the sum of a row is the count of that unit being left
-    initial : [shape=(n, U)], posteriors of the first frame
+    enter : [shape=(U, U)], of each unit after each; the sum of a row is the count of that unit being left
     """
 
     stay: Array
     onward: Array
     enter: Array
-    initial: Array
 
 
 class FactorialLogLikelihoods(NamedTuple):

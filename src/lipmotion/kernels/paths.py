@@ -1,6 +1,6 @@
 """Best paths through networks, in NumPy for a short recording, which must not wait for numba, and compiled.
 
-Both forms give the same bits. Paths are also drawn from their posterior, in NumPy alone.
+Both forms give the same bits.
 """
 
 from __future__ import annotations
