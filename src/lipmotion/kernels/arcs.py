@@ -8,7 +8,7 @@ loop do, their arcs are a **block**, a dense matrix. Arcs from a state to itself
 from __future__ import annotations
 
 from collections import defaultdict
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray

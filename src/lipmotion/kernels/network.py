@@ -134,9 +134,7 @@ class ForwardBackwardNetwork(NamedTuple):
             initial, _joint(logs, columns)[:, self.layout.place], self.arc_from, arc_to, arc_log.astype(np.float64),
             np.zeros(len(initial)),
         )  # fmt: skip
-        return NetworkPosteriors(
-            np.exp(log_posterior)[:, self.layout.order].astype(precision), counts, log_likelihood
-        )
+        return NetworkPosteriors(np.exp(log_posterior)[:, self.layout.order].astype(precision), counts, log_likelihood)
 
     def _scale(
         self,

@@ -121,6 +121,17 @@ def test_models_from_before_the_modulation_filter_have_none():
     one = engine.generate(engine.from_arrays(arrays), talk).motion.values
     two = ENGINE.generate(replace(model(), modulation=None), talk).motion.values
     assert one == pytest.approx(two, abs=2e-3)  # half precision
+    with pytest.raises(errors.ModelFormatError):
+        ENGINE.from_arrays(arrays)
+
+
+def test_the_modulation_filter_is_for_voices_that_training_knows():
+    talk = speech(timeline(("aa", "iy", "t", "uw", "s", "aa")))
+    for voice, is_off in ((1.0, False), (0.0, True)):
+        one, two = (
+            ENGINE.generate(each, replace(talk, voice=voice)) for each in (model(), replace(model(), modulation=None))
+        )
+        assert (np.abs(one.motion["opening"] - two.motion["opening"]).max() < 1e-9) == is_off
 
 
 SMALL = {"states": 3, "silent_states": 7, "components": 2}

@@ -267,7 +267,6 @@ class CoupledEngine(Engine[CoupledModel]):
             return motion_statistics
 
         learned = model.motion if self.config.variance_scaling else replace(model.motion, scaling=None)
-        learned = learned.for_voice(speech.voice)
         motion, variance = learned.generate(
             statistics,
             frames,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
-from lipmotion.engines.selection.concatenation import Chosen, Piece, TimeMap, join_motion, list_shown_units, to_pieces
+from lipmotion.engines.selection.concatenation import Piece, TimeMap, join_motion, list_shown_units, to_pieces
 from lipmotion.engines.selection.costs import JOIN_AFTER, JOIN_BEFORE, Costs, SelectionConfig, Target, select
 from lipmotion.engines.selection.inventory import (
     PHONE_NUMBER,
@@ -123,8 +123,7 @@ class SelectionEngine(Engine[SelectionModel]):
         frames = len(speech.features.values)
         units = select(costs, target, required=_find_named_units(costs, target, speech.units))[0]
         pieces = to_pieces(costs, target, units)
-        chosen = Chosen(target, units, pieces)
-        motion, variance = join_motion(model, costs, chosen, speech, constraints, close=self.config.closures)
+        motion, variance = join_motion(model, costs, target, units, pieces, speech, constraints)
         sources = [find_source(costs.inventory, unit) for unit in units.tolist()]
         starts_s = target.windows.times_s[:, 0]
         shown, places = np.unique(list_shown_units(target, pieces, frames), return_inverse=True)
@@ -183,7 +182,7 @@ class SelectionEngine(Engine[SelectionModel]):
         return model_arrays(model)
 
     def from_arrays(self, arrays: Arrays) -> SelectionModel:  # noqa: D102
-        return model_from_arrays(arrays, filtered=self.config.modulation_filter > 0)
+        return model_from_arrays(arrays)
 
 
 def _find_named_units(costs: Costs, target: Target, units: Timeline[Unit]) -> dict[int, int]:
