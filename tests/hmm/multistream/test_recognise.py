@@ -6,7 +6,6 @@ import pytest
 
 from hmm.multistream.synthetic import observed, random_joint, utterances
 from hmm.synthetic import decode
-from kernels.networks import network_posteriors
 from lipmotion import errors, types
 from lipmotion.engines import engine_named
 from lipmotion.errors import AlignmentError, InputError
@@ -15,7 +14,7 @@ from lipmotion.hmm.multistream import densities, recognise, unit_states
 from lipmotion.hmm.multistream import phone_recogniser as module
 from lipmotion.hmm.multistream.densities import SPEECH, ObservedStream, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.recognise import build_context_loop, recognise_units
-from lipmotion.hmm.multistream.unit_states import expand_triphones
+from lipmotion.kernels.forward_backward import log_forward_backward
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.testing import example, examples, speech, timeline
 from oracles import joint as slow
@@ -34,13 +33,15 @@ def slow_densities(hmm, data, weights):
     return density
 
 
-def state_posteriors(hmm, data):
-    """Return the posterior of every state without context in every frame [shape=(T, R)]."""
-    loop = build_context_loop(hmm)
-    log_density = hmm.log_density(hmm.standardise(data, SOFT), loop.leaves, SOFT).astype(np.float32)
-    posteriors, _, _ = network_posteriors(log_density, *loop.network.network)
-    result = np.zeros((data.frames, len(hmm.inventory.monophones)))
-    np.add.at(result.T, loop.monophones, posteriors.T.astype(float))
+def unit_posteriors(hmm, data):
+    """Return the posterior of every unit in every frame [shape=(T, U)]."""
+    loop, leaves = build_context_loop(hmm)
+    log_density = hmm.log_density(hmm.standardise(data, SOFT), leaves, SOFT)
+    emission, arc_from, arc_log, arc_start, initial, final = loop.network
+    arc_to = np.repeat(np.arange(len(emission)), np.diff(arc_start, append=len(arc_from)))
+    found = log_forward_backward(initial, log_density[:, emission], arc_from, arc_to, arc_log, final)[0]
+    result = np.zeros((data.frames, len(hmm.inventory.names)))
+    np.add.at(result.T, [hmm.inventory.names.index(unit) for unit in loop.owners], np.exp(found).T)
     return result
 
 
@@ -78,10 +79,11 @@ def uncertain():
 def test_posteriors_are_the_shares_of_all_sequences(uncertain):
     hmm, data, ways = uncertain
     known = hmm.inventory
-    expected = np.zeros((7, len(known.monophones)))
+    expected = np.zeros((7, len(known.names)))
     for units, lengths, share in ways:
-        expected[np.arange(7), np.repeat(expand_triphones(known, units).monophones, lengths)] += share
-    found = state_posteriors(hmm, data)
+        spoken = [known.names.index(unit) for unit in units for _ in range(known.count(unit))]
+        expected[np.arange(7), np.repeat(spoken, lengths)] += share
+    found = unit_posteriors(hmm, data)
     assert found == pytest.approx(expected, abs=1e-4)
     assert found.sum(axis=1) == pytest.approx(np.ones(7), abs=1e-5)
 
