@@ -16,14 +16,13 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 
-from experiments.conftest import SETTINGS, copied, few_sets, renamed
-from lipmotion import Corpus, errors, units
+from experiments.conftest import SETTINGS, few_sets, renamed
+from lipmotion import errors, units
 from lipmotion_lab import hofer2008, minnis2000, runner
 from lipmotion_lab.report import report
-from lipmotion_lab.report.html import Dot, draw_curve, draw_dots, draw_rising
+from lipmotion_lab.report.html import Dot, draw_dots, draw_rising
 from lipmotion_lab.report.section import Column, PaperOrder, PaperPair, Section, Table
 from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM
 from study.browser import BROWSER, DRIVER, MISSING, browser, check_screen
@@ -82,7 +81,7 @@ def test_what_is_finished_is_not_run_again_and_no_byte_changes(ran, toy_corpus, 
     assert state(folder) == before
     links = Links(folder / report.PAGE)
     assert all((folder / file).is_file() for file in links.files)
-    assert len(links.files) == len(set(links.files)) > 2 * len(report.PARTS)
+    assert len(links.files) == len(set(links.files)) >= 2 * len(report.PARTS)
     stamp = json.loads((folder / "folds" / "figures.json").read_text())["stamp"]
     assert (stamp["seed"], stamp["corpus"]["train"], stamp["machine"]["cores"] > 0) == (0, 8, True)
     assert len(stamp["corpus"]["SHA-256"]) == 64
@@ -181,43 +180,20 @@ def test_what_cannot_be_used_is_refused_before_the_work(ran, toy_corpus, tmp_pat
     assert (ran, sorted(path.name for path in tmp_path.iterdir())) == ([], ["b", "file", "full"])
 
 
-@pytest.fixture(scope="module")
-def written(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> report.WrittenReport:
-    """A report of one real experiment, on recordings without pictures of the mouth."""
-    folder = tmp_path_factory.mktemp("real")
-    bare = copied(toy_corpus, folder, lambda each: replace(each, track=replace(each.track, crops=None)))
-    with few_sets():
-        return report.write_report(bare, folder / "r", only=["hofer2008"], quick=True, settings=SETTINGS)
-
-
-@pytest.mark.long
-def test_a_real_experiment_has_videos_and_curves(written):
-    folder = written.page.parent
-    record = json.loads((folder / "hofer2008" / "figures.json").read_text())
-    systems = ["eVis, 5 states", "phone, 5 states"]
-    assert [each["caption"] for each in record["videos"]] == ["a drawn face, recorded motion", *systems]
-    motion = json.loads((folder / "hofer2008" / "motion.json").read_text())
-    assert sorted(motion["systems"]) == sorted(systems)
-    assert {len(curve) for curve in motion["systems"].values()} == {len(motion["time_s"])}
-    links = Links(written.page)
-    assert all((folder / file).stat().st_size for file in links.files)
-    assert " ".join(motion["words"]) in links.text
-
-
 @pytest.mark.long
 @pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING)
-def test_a_browser_plays_it_and_nobody_is_kept_out(written, tmp_path):
+def test_a_browser_shows_a_real_experiment_and_nobody_is_kept_out(toy_corpus, tmp_path):
+    with few_sets():
+        written = report.write_report(toy_corpus, tmp_path / "r", only=["hofer2008"], quick=True, settings=SETTINGS)
+    links = Links(written.page)
+    assert all((written.page.parent / file).stat().st_size for file in links.files)
+
     with browser(tmp_path) as window:
         for width, height, scheme in SCREENS:
             window.show_as(width, height, scheme, mobile=width < 400)
             window.open(written.page.as_uri())
             window.run("document.querySelectorAll('details').forEach(each => { each.open = true; })")
             check_screen(window, "report", width, scheme)
-        window.click("button.together")
-        playing = "const done = arguments[0], video = document.querySelector('video');" + (
-            "video.addEventListener('timeupdate', () => { if (video.currentTime > 0.1) done(true); });"
-        )
-        assert window.run_until_done(playing)
         assert window.problems() == []
 
 
@@ -413,9 +389,6 @@ def test_every_figure_has_its_interval_and_difference_in_the_files():
     assert [float(first[key]) for key in ("acc", "acc_low", "acc_high")] == [0.5, 0.4, 0.6]
     assert [float(first[key]) for key in ("acc_difference_low", "acc_difference_high")] == [0.1, 0.2]
     assert set(second.values()) == {"c", ""}
-    content = TABLE.as_content()
-    assert content["rows"][0]["acc_difference_low"] == 0.1
-    assert (content["reference"], content["columns"]["acc"]) == ("c", "a note")
 
 
 def test_the_page_shows_the_interval_and_a_star():
@@ -442,18 +415,6 @@ def test_figures_intervals_and_the_papers_stand_on_one_axis():
     assert (low + high) / 2 == pytest.approx(first, abs=0.3)
     assert float(paper.attrib["d"][1:].split()[0]) - first == pytest.approx(2 * (second - first), abs=0.3)
     assert "<b> 0.7" in drawing.attrib["aria-label"]
-
-
-def test_a_curve_has_both_motions_and_what_is_marked():
-    time_s = np.arange(5) / 25
-    made = ElementTree.fromstring(draw_curve("x", time_s, np.zeros(5), np.arange(5.0), [(-0.1, 0.04, "p")])).find("svg")  # noqa: S314 (our own)
-    assert [line.attrib["class"] for line in made.findall("polyline")] == ["recorded", "generated"]
-    assert float(made.find("rect").attrib["x"]) == 34
-
-
-def test_a_still_motion_is_drawn():
-    assert "polyline" in draw_curve("x", np.arange(3.0), np.zeros(3), np.zeros(3), [])
-    assert "nan" not in draw_dots("a", "b", [Dot("still", 0.0, (0.0, 0.0))])
 
 
 def test_a_curve_over_numbers_rises_with_them():

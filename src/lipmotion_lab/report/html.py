@@ -47,14 +47,13 @@ def joined(*content: str) -> Html:
     return Html("".join(text if isinstance(text, Html) else escape(printable(text)) for text in content))
 
 
-def build_page(title: str, style: str, *content: str, script: str = "") -> str:
+def build_page(title: str, style: str, *content: str) -> str:
     """Return a page that loads nothing but the pictures and videos in its own folder.
 
-    style  : CSS, with ``SHARED_COLOURS`` in the place of the colours of all pages
-    Neither may hold the end of its element: both are the caller's own, nothing of a user's.
+    style  : CSS, with ``SHARED_COLOURS`` in the place of the colours of all pages, without the end of its element: the
+             caller's own, nothing of a user's
     """
     policy = "default-src 'none'; style-src 'unsafe-inline'; img-src 'self' file:; media-src 'self' file:"
-    policy += "; script-src 'unsafe-inline'" if script else ""
     head = joined(
         element("meta", charset="utf-8"),
         element("meta", http_equiv="Content-Security-Policy", content_=policy),
@@ -63,8 +62,7 @@ def build_page(title: str, style: str, *content: str, script: str = "") -> str:
         element("title", title),
         Html(f"<style>\n{insert_colours(style)}</style>"),
     )
-    scripts = Html(f"<script>\n{script}</script>" if script else "")
-    body = element("body", *content, scripts)
+    body = element("body", *content)
     return f'<!DOCTYPE html>\n<html lang="en">\n{element("head", head)}\n{body}\n</html>\n'
 
 
@@ -77,7 +75,7 @@ def _simple(name: str) -> str:
 WIDTH, LEFT, RIGHT = 360, 8, 12
 """Width of a drawing, and its margins: on a telephone a unit is about a pixel."""
 ROW, AXIS = 34, 30
-CURVE_HEIGHT, CURVE_LEFT, CURVE_TOP = 120, 34, 14
+CURVE_LEFT = 34
 STEPS = (1.0, 2.0, 5.0)
 Array = NDArray[np.float64]
 
@@ -144,30 +142,6 @@ def draw_dots(title: str, unit: str, rows: Sequence[Dot]) -> Html:
     if any(row.paper is not None for row in rows):
         legend += " Diamond: the paper's own figure, of another speaker and other recordings."
     return _frame(title, f"{title}: {spoken}", height, parts, legend)
-
-
-def draw_curve(
-    title: str, time_s: Array, recorded: Array, generated: Array, marked: Sequence[tuple[float, float, str]]
-) -> Html:
-    """Return recorded (dashed) and generated motion [each shape=(N,)] over time; ``marked``: (start, end, name)."""
-    bottom = CURVE_HEIGHT - 18
-    across = _Scale(float(time_s[0]), float(time_s[-1]), CURVE_LEFT, WIDTH - 4)
-    up = _Scale.fit([*recorded, *generated], bottom, CURVE_TOP)
-    parts = []
-    for start_s, end_s, name in marked:
-        left, right = (across(min(max(time, across.low), across.high)) for time in (start_s, end_s))
-        shade = {"x": f"{left:.1f}", "width": f"{max(right - left, 1):.1f}"}
-        parts.append(element("rect", y=str(CURVE_TOP), height=str(bottom - CURVE_TOP), class_="marked", **shade))
-        parts.append(_draw_text((left + right) / 2, CURVE_TOP - 3, name, "middle"))
-    for tick in up.list_ticks(3):
-        parts.append(_draw_line(CURVE_LEFT, up(tick), WIDTH - 4, up(tick), "level"))
-        parts.append(_draw_text(CURVE_LEFT - 4, up(tick) + 4, f"{tick:g}", "end"))
-    parts += [_draw_text(across(tick), CURVE_HEIGHT - 4, f"{tick:g} s", "middle") for tick in across.list_ticks(4)]
-    for values, kind in ((recorded, "recorded"), (generated, "generated")):
-        points = " ".join(f"{across(t):.1f},{up(v):.1f}" for t, v in zip(time_s, values, strict=True))
-        parts.append(element("polyline", points=points, class_=kind))
-    spoken = f"{title}: recorded and generated opening of the mouth over {time_s[-1] - time_s[0]:.1f} s"
-    return _frame(title, spoken, CURVE_HEIGHT, parts, title)
 
 
 def draw_rising(title: str, unit: str, lines: Mapping[str, Sequence[tuple[float, Dot]]]) -> Html:

@@ -11,7 +11,7 @@ from lipmotion_lab.evaluation.evaluate import find_sign
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES
 from lipmotion_lab.evaluation.table import format_figure
 from lipmotion_lab.hofer2008 import PAPER_SCORES, PINS, REFERENCE_SET
-from lipmotion_lab.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS
+from lipmotion_lab.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, VARIANTS
 from lipmotion_lab.report.html import Dot, Html, draw_dots, draw_rising
 from lipmotion_lab.report.section import Column, PaperOrder, PaperPair, Row, Section, Table, warn_of_few
 from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM, SPLIT
@@ -94,9 +94,8 @@ def build_hofer_section(figures: Mapping[str, Any]) -> Section:
             other = _build_hofer_table(block)
             heading = f"{other.caption.removeprefix(SETS)}: {_build_hofer_order(block).judge()}"
             more.append(replace(other, heading=heading))
-    shown = [f"{units}, {states} states" for units in table.rows]
     title = "Hofer, Yamagishi & Shimodaira 2008, Table 1: unit sets"
-    return Section(title, about, order.judge(), words, charts, table, more, shown)
+    return Section(title, about, order.judge(), words, charts, table, more)
 
 
 def _build_hofer_order(block: Mapping[str, Any]) -> PaperOrder:
@@ -199,8 +198,7 @@ def build_minnis_section(figures: Mapping[str, Any]) -> Section:
     )
     charts = [_draw_acc("ACC of the opening", main)]
     more = [table for table in tables.values() if table is not main]
-    title, compared = "Minnis & Breen 2000: unit selection", (PRINTED, UNGUIDED, EVERYTHING)
-    return Section(title, about, verdict, words, charts, main, more, compared)
+    return Section("Minnis & Breen 2000: unit selection", about, verdict, words, charts, main, more)
 
 
 def _list_effects(rows: Mapping[str, Row], names: Iterable[str]) -> list[str]:
@@ -279,9 +277,7 @@ def build_xie_liu_section(figures: Mapping[str, Any]) -> Section:
         about += " K on val: with the number of Gaussians that was best there; nothing was chosen on test."
     charts = [_draw_acc("ACC of every system", main)]
     title = "Xie & Liu 2007, Table 3: structures of chains"
-    return Section(
-        title, about, verdict, words, charts, main, more, [name for name in PAPER_FIGURES if name in main.rows]
-    )
+    return Section(title, about, verdict, words, charts, main, more)
 
 
 def _build_systems_table(case: str, rows: Mapping[str, Row], size: Mapping[str, Any]) -> Table:
@@ -353,7 +349,7 @@ def build_engines_section(figures: Mapping[str, Any]) -> Section:
         f"{_describe_closings(figures, main.rows[best])}"
     )
     charts = [_draw_acc("ACC of the opening", main)]
-    return Section("The engines of this project", about, verdict, words, charts, main, more, list(main.rows))
+    return Section("The engines of this project", about, verdict, words, charts, main, more)
 
 
 def build_learning_section(figures: Mapping[str, Any]) -> Section:
@@ -395,8 +391,7 @@ def build_learning_section(figures: Mapping[str, Any]) -> Section:
     )
     verdict = f"ACC {low} with {first} recordings, {high} with {last}."
     charts = [draw_rising("ACC of the opening over recordings", "recordings", lines)] if len(sizes) > 1 else []
-    shown = [f"{size} recordings" for size in dict.fromkeys((first, last))]
-    return Section("Learning curve", about, verdict, words, charts, main, more, shown)
+    return Section("Learning curve", about, verdict, words, charts, main, more)
 
 
 def build_folds_section(figures: Mapping[str, Any]) -> Section:

@@ -18,7 +18,7 @@ from lipmotion.engines.coupled.chains.densities import Single, infer_components
 from lipmotion.engines.coupled.chains.lattice import Lattice, LatticePosteriors
 from lipmotion.engines.coupled.chains.model import Chains, Inference, VisualStream, speech_observations
 from lipmotion.engines.coupled.chains.product import COUPLED, FACTORIAL, HMM, MULTISTREAM, Product
-from lipmotion.engines.coupled.conversion import convert, group_index, path_to_means, weigh_regressions
+from lipmotion.engines.coupled.conversion import convert, group_index, path_to_means
 from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.chain_training import mark_allowed_units
 from lipmotion.engines.coupled.training.coupled_training import THREADS, grow_models
@@ -39,12 +39,10 @@ from lipmotion.types import (
     Generation,
     Monitor,
     NamedProbability,
-    RegressedMean,
     Speech,
     StateTrace,
     Timeline,
 )
-from lipmotion.units import VISEME_OF
 
 KINDS = {
     HMM: "one chain, one mixture over all streams",
@@ -58,15 +56,14 @@ LINE = 110
 Array = NDArray[np.float64]
 MAX_STATES = 3
 """Greatest number of states of a chain that an explanation names."""
-REST = "rest"
 MIN_PROBABILITY = 0.005
-"""States and regressions with less probability are not named."""
+"""States with less probability are not named."""
 
 
 def explain_frames(
     frames: Sequence[Explanation], model: CoupledModel, inference: Inference, rows: Sequence[int]
 ) -> list[Explanation]:
-    """Return explanations with chains, Gaussians and regressions; unchanged where no path leads through the chains."""
+    """Return explanations with chains and Gaussians; unchanged where no path leads through the chains."""
     if not np.isfinite(inference.posteriors.log_likelihood):
         return list(frames)
     streams = range(len(model.chains.streams))
@@ -76,9 +73,8 @@ def explain_frames(
             chains=list_chain_states(model.chains, inference.posteriors, row),
             joint=find_joint_state(model.chains, inference.posteriors, row),
             gaussians=tuple(_find_dominant_gaussian(model, inference, row, stream) for stream in streams),
-            regressions=regressions,
         )
-        for frame, row, regressions in zip(frames, rows, _list_means(model, inference, rows), strict=True)
+        for frame, row in zip(frames, rows, strict=True)
     ]
 
 
@@ -183,40 +179,6 @@ def _find_dominant_gaussian(model: CoupledModel, inference: Inference, row: int,
         distance,
         channels,
     )
-
-
-def _list_means(model: CoupledModel, inference: Inference, rows: Sequence[int]) -> list[tuple[RegressedMean, ...]]:
-    """Return, for each frame, expected means of visual streams and their regressions; empty without dynamics."""
-    if not all(stream.dynamic for stream in model.visual):
-        return [() for _ in rows]
-    means, precisions = model.motion_statistics(inference)
-    away, result = model.is_away_from_speech(inference.posteriors.chains[0]), []
-    rest: list[tuple[NamedProbability, ...]] = [(NamedProbability(REST, 1.0),)] * len(model.visual)
-    for row in rows:
-        shares = rest if away[row] else _list_regression_shares(model, inference, row)
-        regressed = []
-        for stream, weights in zip(model.visual, shares, strict=False):
-            mean, variance = means[row, 0, stream.columns], 1 / precisions[row, 0, stream.columns]
-            regressed.append(RegressedMean(stream.name, weights, _list_channel_values(model, stream, mean, variance)))
-        result.append(tuple(regressed))
-    return result
-
-
-def _list_regression_shares(model: CoupledModel, inference: Inference, row: int) -> list[tuple[NamedProbability, ...]]:
-    """Return the weights of the most important regressions of every visual stream in a frame; empty without any."""
-    structure, result = model.chains.structure, []
-    for number, regression in enumerate(model.regression[1] if model.regression is not None else ()):
-        chain, regression_of_state = structure.chain_of(number + 1), regression.regression_of_state
-        posterior = inference.posteriors.chains[chain][row : row + 1]
-        weights = weigh_regressions(posterior, regression_of_state, len(regression.coefficients))[0]
-        names = []  # the viseme of the states that share a regression, with their position if it is the same: ``bi.2``
-        for k in range(len(weights)):
-            units, positions = np.divmod(np.flatnonzero(regression_of_state == k), structure.states)
-            phones = {structure.chains[chain].phones(structure.units[chain][unit])[0] for unit in units}
-            viseme = "/".join(sorted({VISEME_OF[phone] for phone in phones}))
-            names.append(f"{viseme}.{positions[0] + 1}" if len(set(positions.tolist())) == 1 else viseme)
-        result.append(_rank_by_probability(names, weights))
-    return result
 
 
 def _list_channel_values(
