@@ -5,30 +5,25 @@ from __future__ import annotations
 import csv
 import io
 import json
-import re
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from html.parser import HTMLParser
-from itertools import product
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 
-from experiments.conftest import SETTINGS, few_sets, renamed
+from experiments.conftest import SETTINGS, renamed
 from lipmotion import errors, units
 from lipmotion_lab import hofer2008, minnis2000, runner
 from lipmotion_lab.report import report
-from lipmotion_lab.report.html import Dot, draw_dots, draw_rising
+from lipmotion_lab.report.html import Dot, draw_dots
 from lipmotion_lab.report.section import Column, PaperOrder, PaperPair, Section, Table
-from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM
-from study.browser import BROWSER, DRIVER, MISSING, browser, check_screen
+from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES
 
 TWO = ("hofer2008", "folds")
-SCREENS = ((1280, 900, "light"), (1280, 900, "dark"), (320, 640, "light"), (320, 640, "dark"))
 
 
 class Links(HTMLParser):
@@ -180,39 +175,7 @@ def test_what_cannot_be_used_is_refused_before_the_work(ran, toy_corpus, tmp_pat
     assert (ran, sorted(path.name for path in tmp_path.iterdir())) == ([], ["b", "file", "full"])
 
 
-@pytest.mark.long
-@pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING)
-def test_a_browser_shows_a_real_experiment_and_nobody_is_kept_out(toy_corpus, tmp_path):
-    with few_sets():
-        written = report.write_report(toy_corpus, tmp_path / "r", only=["hofer2008"], quick=True, settings=SETTINGS)
-    links = Links(written.page)
-    assert all((written.page.parent / file).stat().st_size for file in links.files)
-
-    with browser(tmp_path) as window:
-        for width, height, scheme in SCREENS:
-            window.show_as(width, height, scheme, mobile=width < 400)
-            window.open(written.page.as_uri())
-            window.run("document.querySelectorAll('details').forEach(each => { each.open = true; })")
-            check_screen(window, "report", width, scheme)
-        assert window.problems() == []
-
-
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
-CONDITIONS = ("audio only", "with transcript")
-LISTS = [f"Unit selection, {part}, {condition}" for part in ("val", "test") for condition in CONDITIONS]
-SIZES = [4, 10, *runner.SIZES, 452]
-CHAINS = [f"Structures of chains, {CONDITIONS[0]}"]
-TABLES: dict[str, tuple[str, str, Callable[..., list[tuple[str, str]]]]] = {
-    "engines.test": ("engines", "engines-test", lambda title, name: [(f"Engines, {title}", name)]),
-    "folds.folds": ("folds", "folds", lambda name: [("Cross-validation, 5 folds", name)]),
-    "hofer2008.all": ("hofer2008", "hofer2008", lambda name: [("Unit sets, 5 states, audio only, as printed", name)]),
-    "xieliu2007.paper": (
-        *("xieliu2007", "xieliu2007-eigenlips-150"),
-        lambda *names: [*product(CHAINS, filter(None, names))],
-    ),
-    "selection.printed": ("minnis2000", "minnis2000", lambda name: [*product(LISTS, [name])]),
-}
-"""By region: the experiment, its stored figures, and, by the keys of a row, the captions and heads of its rows."""
 
 
 def stored(name: str) -> Any:
@@ -303,48 +266,6 @@ def test_figures_that_are_not_defined_end_no_run(name):
     assert "nan" not in "".join(map(str, section.charts))
 
 
-def numbers(text: str) -> Counter[str]:
-    """Return the numbers of a text, with signs and marks of significance."""
-    plain = re.sub(r"(?<=\d),(?=\d{3})", "", text.replace("−", "-"))
-    return Counter(re.findall(r"(?<![\w.])[+-]?\d+(?:\.\d+)?\*?", plain))
-
-
-@pytest.mark.parametrize("region", TABLES)
-def test_a_table_on_a_page_has_what_the_verb_prints(region: str) -> None:
-    """Formats in a sheet make its cells, so they are compared with the verb's own text."""
-    experiment, name, lines = TABLES[region]
-    sheet = stored(f"figures/{region.partition('.')[0]}")
-    source, page = sheet["tables"][region.partition(".")[2]], (RESULTS.parent / sheet["page"]).read_text("utf-8")
-    files = source["from"] if isinstance(source["from"], dict) else {"": source["from"]}
-    assert f"{name}.json" in files.values()
-    shown = page.partition(f"<!--figures:{region}-->\n")[2].partition("\n\n")[0]
-    typed, part = len(source["columns"]) - len(source["cells"]), report.PARTS[experiment]
-    sections = {key: part.section(stored(file.removesuffix(".json"))) for key, file in files.items()}
-    for row, keys in zip(shown.splitlines()[2:], source["rows"], strict=True):
-        if keys[-1].isdigit():
-            continue  # a difference of two systems has other marks there
-        assert (found := numbers(row.split("|", 2)[2]))
-        of, *names = keys[typed:] if len(files) > 1 else ("", *keys[typed:])
-        printed = {table.caption: table.as_lines() for table in sections[of].tables}
-        own = [
-            each.partition("  ")[2]
-            for title, head in lines(*names)
-            for each in printed[title]
-            if each.startswith(f"{head}  ")
-        ]
-        assert found <= numbers(" ".join(own))
-
-
-def test_stored_figures_are_of_the_whole_corpus() -> None:
-    for split, clips in (("val", 22), ("test", 50)):
-        figures = stored(f"engines-{split}")
-        assert (figures["split"], figures["clips"]) == (split, clips)
-    assert (stored("folds")["folds"], stored("folds")["clips"]) == (5, 452)
-    assert stored("hofer2008")["trained_on"] == 452
-    assert [row["names"] for row in stored("learning-curve")["rows"]] == SIZES
-    assert REFERENCE_SYSTEM in stored("xieliu2007")["rows"][0]["training"]
-
-
 PAPER = {"a": 3.0, "b": 2.0, "c": 1.0}
 
 
@@ -399,11 +320,6 @@ def test_the_page_shows_the_interval_and_a_star():
     assert "difference from c leaves out 0" in html
 
 
-def test_a_table_without_rows():
-    empty = Table("t", "none", (Column("acc", "ACC", ".2f"),), {})
-    assert (empty.as_csv().strip(), empty.list_records()) == ("system", [])
-
-
 def test_figures_intervals_and_the_papers_stand_on_one_axis():
     rows = [Dot("a", 0.5, (0.4, 0.6), 0.9), Dot("<b>", 0.7, (None, None)), Dot("c", None)]
     drawing = ElementTree.fromstring(draw_dots("ACC", "ACC", rows)).find("svg")  # noqa: S314 (our own)
@@ -415,11 +331,3 @@ def test_figures_intervals_and_the_papers_stand_on_one_axis():
     assert (low + high) / 2 == pytest.approx(first, abs=0.3)
     assert float(paper.attrib["d"][1:].split()[0]) - first == pytest.approx(2 * (second - first), abs=0.3)
     assert "<b> 0.7" in drawing.attrib["aria-label"]
-
-
-def test_a_curve_over_numbers_rises_with_them():
-    lines = {"a": [(10.0, Dot("10", 0.1, (0.0, 0.2))), (100.0, Dot("100", 0.3, (0.2, 0.4)))]}
-    drawing = ElementTree.fromstring(draw_rising("t", "n", lines)).find("svg")  # noqa: S314 (our own)
-    (x1, y1), (x2, y2) = (map(float, p.split(",")) for p in drawing.find("polyline").attrib["points"].split())
-    assert x2 > x1
-    assert y2 < y1
