@@ -42,8 +42,7 @@ from lipmotion_lab.report.section import Column, Section, Table, warn_of_few, wr
 Array = NDArray[np.float64]
 CHANNELS = ("opening", "width")
 TABLE = "rivals.json"
-SOUND_HZ, GRID_HZ = 48_000, 100.0
-"""Rate of the sound that rivals hear, and that at which their weights are compared."""
+SOUND_HZ, GRID_HZ = 48_000, 100.0  # rate of the sound that rivals hear, and that at which their weights are compared
 LEVEL, LEVEL_SHARE, LEVEL_WINDOW = 0.1, 95, SOUND_HZ // 50
 """Rivals have thresholds: the root mean square of the loudest twentieth of each recording is brought to this."""
 LAGS_S, SMOOTHINGS_S = np.arange(-0.08, 0.33, 0.04), (0.0, 0.03, 0.06, 0.1)
@@ -51,10 +50,8 @@ SHUT_SHARES = (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
 """What is tried of every rival: lags, smoothing (σ), and the share of its 95th percentile under which it is shut."""
 SYNC_STEP_S, RIDGE = 0.01, 1e-3
 FOLDS = 5
-ONSET_REACH_S = 0.2
-"""A movement that begins nowhere within this time counts as an error of it."""
-ABSENT = MissingDependencyError.exit_code
-"""Exit code of an adapter whose rival is not installed."""
+ONSET_REACH_S = 0.2  # a movement that begins nowhere within this time counts as an error of it
+ABSENT = MissingDependencyError.exit_code  # exit code of an adapter whose rival is not installed
 
 
 class RivalError(InputError):

@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 from hmm.synthetic import PAUSE, SILENCE, known_hmm, speaker
 from lipmotion.hmm import align, loudness, network
 
-ROOM = -10.0
-"""The level of the room in ``line``, in which the loudest moments have 0."""
+ROOM = -10.0  # the level of the room in ``line``, in which the loudest moments have 0
 
 
 def energy(seed: int = 0) -> np.ndarray:

@@ -6,8 +6,7 @@ from lipmotion_faces.kernels.textured import SOLID, TexturedTriangles, draw_text
 TONE = np.arange(256).astype(np.uint8)
 HEIGHT, WIDTH = 40, 56
 FACING = [[0, 1, 2], [0, 2, 3]]
-CORNERS = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]])
-"""Of a square, as ``square`` has them: v goes down."""
+CORNERS = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]])  # of a square, as ``square`` has them: v goes down
 WHITE = np.full((4, 3), 1.0)
 
 

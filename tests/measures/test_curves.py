@@ -316,17 +316,3 @@ def test_phones_beyond_the_clip_and_clips_without_phones():
     assert figures.false_per_minute == 1
     nothing = closures.measure_phones(openings, openings, [[], []], 0.0, 0.1, 25.0)
     assert np.isnan([nothing.recall, nothing.false_per_minute, nothing.original_per_minute]).all()
-
-
-@given(clips=st.lists(st.tuples(FRAMES, FRAMES), min_size=1, max_size=4))
-@settings(max_examples=40)
-def test_closings_found_clip_by_clip_add_up_to_the_score(clips):
-    generated, original = ([opening(list(clip[side]))[:, None] for clip in clips] for side in (0, 1))
-    hits, count = closures.clip_closure_counts(generated, original, 0.5)
-    for (g, o), hit, wanted in zip(zip(generated, original, strict=True), hits, count, strict=True):
-        times = [closures.find_closings(side[:, 0], 0.5).tolist() for side in (g, o)]
-        assert wanted.tolist() == [len(times[1])]
-        assert hit.tolist() == [sum(any(abs(a - b) <= 2 for a in times[0]) for b in times[1])]
-    whole = closures.measure_closures([g[:, 0] for g in generated], [o[:, 0] for o in original], 0.5, 25)
-    assert whole.original == sum(count)
-    assert whole.score == pytest.approx(np.sum(hits) / np.sum(count) if np.sum(count) else np.nan, nan_ok=True)

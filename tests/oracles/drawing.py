@@ -72,8 +72,7 @@ def bias(xa: float, ya: float, xb: float, yb: float) -> float:
     return 0.0 if ya > yb or (ya == yb and xa < xb) else 1e-6
 
 
-A = -0.5
-"""Parameter of cubic convolution (Keys 1981)."""
+A = -0.5  # parameter of cubic convolution (Keys 1981)
 
 
 def kernel(distance: float, kind: str) -> float:

@@ -18,13 +18,10 @@ from lipmotion.hmm.model import UnitHmm
 from lipmotion.kernels.paths import NetworkArrays, Windows, best_path
 from lipmotion.stats.bigram import Bigram
 
-LOUD_SILENCE_PENALTY = 8.0
-"""Penalty of silence in a loud frame, subtracted from its log density."""
-QUIET_SPEECH_PENALTY = 1000.0
-"""Penalty of everything but silence in a quiet frame."""
+LOUD_SILENCE_PENALTY = 8.0  # penalty of silence in a loud frame, subtracted from its log density
+QUIET_SPEECH_PENALTY = 1000.0  # penalty of everything but silence in a quiet frame
 
-DensitySelection = NDArray[np.intp] | None
-"""The numbers of the densities to compute; None: all."""
+DensitySelection = NDArray[np.intp] | None  # the numbers of the densities to compute; None: all
 
 
 @dataclass(frozen=True, eq=False)

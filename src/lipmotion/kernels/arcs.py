@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 
 Index = NDArray[np.intp]
 
-MIN_BLOCK = 8
-"""Sources, and targets, that a block has at least."""
-PADDING_ROWS = 16
-"""Rows of a block are padded to a multiple of this."""
+MIN_BLOCK = 8  # sources, and targets, that a block has at least
+PADDING_ROWS = 16  # rows of a block are padded to a multiple of this
 
 
 class ArcLayout(NamedTuple):

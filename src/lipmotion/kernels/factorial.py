@@ -41,12 +41,10 @@ MIN_PRODUCT = {SINGLE: 1e-37, DOUBLE: 1e-300}
 MIN_TOTAL = {SINGLE: 1e-20, DOUBLE: 1e-150}
 """By precision: least sum of these products, as a share of the whole. With such a sum, what was set to 0 or underflowed
 is less than what probabilities are raised to."""
-MIN_POSTERIOR = 1e-20
-"""Smaller posteriors and counts are set to 0, as those of states that cannot be are not quite 0."""
+MIN_POSTERIOR = 1e-20  # smaller posteriors and counts are set to 0, as those of states that cannot be are not quite 0
 MIN_PROBABILITY = 1e-100
 """Least probability of a transition, or of beginning or ending in a state: products of smaller ones may underflow."""
-SPARSE_SHARE = 0.2
-"""A smaller share of possible joint states is fastest in logarithms, which take no time for others."""
+SPARSE_SHARE = 0.2  # a smaller share of possible joint states is fastest in logarithms, which take no time for others
 LARGEST_EXPONENT = 700.0
 """Expected transitions are divided by the probability of the transition: the quotient must stay finite."""
 
@@ -338,8 +336,7 @@ def _count_entered(last: Array, first: Array, log_overlap: float) -> Double:
     return entered
 
 
-_NONE = np.zeros(()), np.zeros(())
-"""Expected transitions out of the last frame."""
+_NONE = np.zeros(()), np.zeros(())  # expected transitions out of the last frame
 
 
 def _frame(before: Double, beta: Double, pairs: Index, whole: float = 1.0) -> _Frame:

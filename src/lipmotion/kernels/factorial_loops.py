@@ -16,8 +16,7 @@ from lipmotion.kernels.compiler import compiled
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Logs = NDArray[np.floating[Any]]
-ROOM_BYTES = 2**27
-"""Memory for what is stored of many frames at once: of as many as fit in, but of √T at least."""
+ROOM_BYTES = 2**27  # memory for what is stored of many frames at once: of as many as fit in, but of √T at least
 
 
 class Loop(NamedTuple):

@@ -30,31 +30,23 @@ from lipmotion.kernels.compiler import compile_to_rounding
 from lipmotion.kernels.forward_backward import log_forward_backward
 
 Index = NDArray[np.intp]
-Unsigned = NDArray[np.uintp]
-"""Unsigned, as loops over indices that may be negative are not vectorised."""
-Array = NDArray[Any]
-"""float32 or float64."""
-CHUNK = 16
-"""Runs are padded to multiples of this, so that vectorised loops over them have no remainder."""
-FRAMES_AT_ONCE = 256
-"""Frames whose roots are taken at once: they stay in the cache."""
+Unsigned = NDArray[np.uintp]  # unsigned, as loops over indices that may be negative are not vectorised
+Array = NDArray[Any]  # float32 or float64
+CHUNK = 16  # runs are padded to multiples of this, so that vectorised loops over them have no remainder
+FRAMES_AT_ONCE = 256  # frames whose roots are taken at once: they stay in the cache
 LOWEST_ROOT = -80.0
 """Least logarithm of a density's eighth root: exp of less is denormal in single precision, which is slow."""
-MIN_ROOT = 1.9e-35
-"""exp(-80): densities up to its eighth power are set to 0."""
+MIN_ROOT = 1.9e-35  # exp(-80): densities up to its eighth power are set to 0
 MIN_JOINT = 1e-4
 """Least root of a frame's best joint density, relative to the product of the chains' best ones: where it is less, joint
 densities are computed from sums of logarithms, as factors under e^LOWEST_ROOT may count."""
 LIMITS = {np.dtype(np.float32): (1e-24, 1e-12, 1e-4), np.dtype(np.float64): (1e-140, 1e-100, 1e-10)}
 """By precision: ``floor``, ``min_scale`` and ``off`` of ``_forward_backward``."""
-MIN_POSTERIOR = 1e-12
-"""Smaller posteriors are set to 0."""
+MIN_POSTERIOR = 1e-12  # smaller posteriors are set to 0
 SHARE = 1e-6
 """Shares of a block's sources are set to 0 under this times the least probability: less than what is raised."""
-MAX_SCALE = 1e6
-"""Greatest scale of a frame. With a smaller one no share of forward probabilities is set to 0."""
-FRAMES_SUMMED = 256
-"""Frames that are summed in the kernel's precision, before they are added in double precision."""
+MAX_SCALE = 1e6  # greatest scale of a frame. With a smaller one no share of forward probabilities is set to 0.
+FRAMES_SUMMED = 256  # frames that are summed in the kernel's precision, before they are added in double precision
 
 
 class NetworkPosteriors(NamedTuple):

@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 from lipmotion.pipeline.batch.report import insert_colours
 from lipmotion.printable import printable
 
-VOID = frozenset({"br", "img", "link", "meta"})
-"""Elements that hold nothing and have no end."""
+VOID = frozenset({"br", "img", "link", "meta"})  # elements that hold nothing and have no end
 SIMPLE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9-]*")
-GENERATOR = '<meta name="generator" content="lipmotion">'
-"""What pages of this program hold."""
+GENERATOR = '<meta name="generator" content="lipmotion">'  # what pages of this program hold
 
 
 class Html(str):
@@ -72,8 +70,7 @@ def _simple(name: str) -> str:
     return name
 
 
-WIDTH, LEFT, RIGHT = 360, 8, 12
-"""Width of a drawing, and its margins: on a telephone a unit is about a pixel."""
+WIDTH, LEFT, RIGHT = 360, 8, 12  # width of a drawing, and its margins: on a telephone a unit is about a pixel
 ROW, AXIS = 34, 30
 CURVE_LEFT = 34
 STEPS = (1.0, 2.0, 5.0)

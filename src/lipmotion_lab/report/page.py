@@ -32,8 +32,7 @@ def draw_mouths(
     return (picture[LOWER_FACE] for picture in stage_face("woman", STAGING).render(motion, silence, fps=FPS))
 
 
-FOLDED = 3
-"""More tables than these are folded together."""
+FOLDED = 3  # more tables than these are folded together
 QUICK_WARNING = (
     "A quick run: few recordings, small models. It shows that everything runs; what it finds about the papers is worth "
     "little. Run it without --quick for figures."

@@ -133,8 +133,7 @@ def _format_cell(column: Column, row: Row) -> tuple[str, str]:
     return format_figure(value, column.form).strip() + mark, interval
 
 
-FEW_CLIPS = 10
-"""Bootstrap intervals over fewer recordings are too narrow to be believed."""
+FEW_CLIPS = 10  # bootstrap intervals over fewer recordings are too narrow to be believed
 
 
 @dataclass(frozen=True)
@@ -194,8 +193,7 @@ def warn_of_few(clips: int) -> dict[str, list[str]]:
     return {"Beware": [warning]} if clips < FEW_CLIPS else {}
 
 
-CHANCE = 0.05
-"""Share of 95 % intervals that leave out 0 where nothing differs."""
+CHANCE = 0.05  # share of 95 % intervals that leave out 0 where nothing differs
 
 
 @dataclass(frozen=True)

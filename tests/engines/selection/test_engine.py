@@ -51,12 +51,6 @@ def test_an_edited_phone_changes_the_motion_near_it_only(model, engine) -> None:
     assert not changed[int(spans[5].start_s * 100) :].any()
 
 
-def test_its_description_counts_units_and_names_stand_ins(model, engine) -> None:
-    text = engine.describe(model)
-    assert text.startswith(f"{int(model.inventory.usable.sum())} units of {len(model.inventory.names)} recordings")
-    assert "ao (aa)" in text
-
-
 def test_silence_longer_than_any_recorded_one_stands_still(model, engine) -> None:
     units = Timeline((*timeline(("b", "aa")).spans[:-1], Span(0.8, 9.0, Unit("sil")), Span(9.0, 9.2, Unit("aa"))))
     opening = engine.generate(model, speech(units)).motion["opening"]

@@ -6,7 +6,6 @@ import math
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from textwrap import wrap
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -17,7 +16,7 @@ from lipmotion.engines.coupled.arrays import coupled_from_arrays, coupled_to_arr
 from lipmotion.engines.coupled.chains.densities import Single, infer_components
 from lipmotion.engines.coupled.chains.lattice import Lattice, LatticePosteriors
 from lipmotion.engines.coupled.chains.model import Chains, Inference, VisualStream, speech_observations
-from lipmotion.engines.coupled.chains.product import COUPLED, FACTORIAL, HMM, MULTISTREAM, Product
+from lipmotion.engines.coupled.chains.product import Product
 from lipmotion.engines.coupled.conversion import convert, group_index, path_to_means
 from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.chain_training import mark_allowed_units
@@ -25,7 +24,6 @@ from lipmotion.engines.coupled.training.coupled_training import THREADS, grow_mo
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import Statistics, count_unseen, slice_dynamics
 from lipmotion.motion.generation import split_into_blocks
-from lipmotion.printable import printable
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.types import (
     ChainPosteriors,
@@ -44,20 +42,9 @@ from lipmotion.types import (
     Timeline,
 )
 
-KINDS = {
-    HMM: "one chain, one mixture over all streams",
-    MULTISTREAM: "one chain, a mixture for each stream",
-    FACTORIAL: "chains with independent transitions, densities of their joint states",
-    COUPLED: "chains whose transitions depend on all chains, densities of their own states",
-}
-LINE = 110
-
-
 Array = NDArray[np.float64]
-MAX_STATES = 3
-"""Greatest number of states of a chain that an explanation names."""
-MIN_PROBABILITY = 0.005
-"""States with less probability are not named."""
+MAX_STATES = 3  # greatest number of states of a chain that an explanation names
+MIN_PROBABILITY = 0.005  # states with less probability are not named
 
 
 def explain_frames(
@@ -310,31 +297,6 @@ class CoupledEngine(Engine[CoupledModel]):
             )
             for parts in zip(*blocks, strict=True)
         )
-
-    def describe(self, model: CoupledModel) -> str:  # noqa: D102
-        chains, structure, product = model.chains, model.chains.structure, model.chains.transitions.product
-        lines = [f"{structure.kind}: {KINDS[structure.kind]}"]
-        if len(structure.chains) > 1:
-            apart = "any number of states" if structure.limit is None else f"up to {structure.limit} state(s)"
-            together = "" if structure.cross_units or structure.limit is None else ", units left together"
-            lines.append(f"  asynchrony: {apart} apart{together}")
-        lines.append(f"  joint states: {product.chain_states.shape[1]}")
-        for number, (chain, units) in enumerate(zip(structure.chains, structure.units, strict=True), start=1):
-            lines.append(f"chain {number}: {chain.name}, {len(units)} units of {structure.states} states")
-            lines += [f"  {line}" for line in wrap(" ".join(units), LINE)]
-        for stream, name in enumerate(chains.streams):
-            densities, components, size = chains.groups[group_index(chains, stream)].stream_mixtures(stream).size
-            lines.append(
-                f"stream {name}: {size} dimensions on chain {structure.chain_of(stream) + 1}, "
-                f"{densities} densities of {components} Gaussian(s)"
-            )
-        regressions = model.regression[1] if model.regression is not None else ()
-        for visual, regression in zip(model.visual, regressions, strict=False):
-            count, inputs, _ = regression.coefficients.shape
-            lines.append(
-                f"means of {visual.name}: {count} regressions on {inputs} inputs, from features and posteriors around"
-            )
-        return "\n".join(map(printable, lines))
 
     def to_arrays(self, model: CoupledModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         return coupled_to_arrays(model)

@@ -131,10 +131,8 @@ class CoupledConfig(Configuration):
 Array = NDArray[np.float64]
 AWAY_FROM_SPEECH_S = 0.45
 """In silence this far from speech the mouth is in the rest pose; nearer, it is still closing or gets ready."""
-LARGEST_SPEECH_POSTERIOR = 0.05
-"""Greatest posterior of speech in a frame that counts as silent."""
-REST_PRECISION_FACTOR = 100.0
-"""How many times more precise the rest pose is than the means that it replaces."""
+LARGEST_SPEECH_POSTERIOR = 0.05  # greatest posterior of speech in a frame that counts as silent
+REST_PRECISION_FACTOR = 100.0  # how many times more precise the rest pose is than the means that it replaces
 
 
 @dataclass(frozen=True, eq=False)

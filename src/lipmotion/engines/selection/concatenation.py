@@ -28,8 +28,7 @@ MIN_OVERLAP_S, MAX_OVERLAP_S = 0.02, 0.15
 """Pieces overlap from at least so much, two frames, to at most so much before and after a soft join."""
 MIN_WEIGHT = 1e-9
 ROUNDING_S = 1e-6
-SHORTEST_S = 1e-3
-"""Two joins are never closer."""
+SHORTEST_S = 1e-3  # two joins are never closer
 
 
 @dataclass(frozen=True)
@@ -187,8 +186,7 @@ def _smooth(
         motion[near] += (share if side == 0 else -share) * bend[:, None] * jump
 
 
-SETTLED_S = 0.06
-"""Half of the rest pose is left so long before the first phone, and reached so long after the last one."""
+SETTLED_S = 0.06  # half of the rest pose is left so long before the first phone, and reached so long after the last one
 
 
 def join_motion(

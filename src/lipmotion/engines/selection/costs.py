@@ -134,16 +134,13 @@ class SelectionConfig(Configuration):
         return self.invisible_phones if self.suppressed else frozenset()
 
 
-LARGEST_WINDOW = 11
-"""Keys of larger windows do not fit into 64 bits."""
+LARGEST_WINDOW = 11  # keys of larger windows do not fit into 64 bits
 
 
 Array = NDArray[np.float64]
-POINTS = 5
-"""Points of a phone at which motions are compared."""
+POINTS = 5  # points of a phone at which motions are compared
 FRACTIONS = (np.arange(POINTS) + 0.5) / POINTS
-PER_S = 10.0
-"""Costs of the guide are given for a tenth of a second."""
+PER_S = 10.0  # costs of the guide are given for a tenth of a second
 MIN_S = 0.01
 ABUTTING_JOIN, JOIN_BEFORE, JOIN_AFTER, NO_JOIN = 0, 1, 2, 3
 """Kinds of a join: units abut, overlap in the phone before or after it, or were recorded in succession."""

@@ -6,7 +6,6 @@ import logging
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from textwrap import wrap
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -15,14 +14,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
 from lipmotion.engines.selection.concatenation import Piece, TimeMap, join_motion, list_shown_units, to_pieces
 from lipmotion.engines.selection.costs import JOIN_AFTER, JOIN_BEFORE, Costs, SelectionConfig, Target, select
-from lipmotion.engines.selection.inventory import (
-    PHONE_NUMBER,
-    SOURCE,
-    RecordedUnits,
-    find_source,
-    find_substitutes,
-    list_windows,
-)
+from lipmotion.engines.selection.inventory import PHONE_NUMBER, SOURCE, RecordedUnits, find_source, list_windows
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
 from lipmotion.engines.selection.selection_training import build_target, fit_selection
 from lipmotion.errors import InputError
@@ -30,7 +22,6 @@ from lipmotion.motion.predictors import count_conditions
 from lipmotion.printable import printable
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Configuration, Constraints, Example, Generation, Monitor, Speech, StateTrace, Timeline, Unit
-from lipmotion.units import PHONES
 
 Array = NDArray[np.float64]
 SOUND: dict[str, Any] = {
@@ -82,9 +73,7 @@ def _source_piece(inventory: RecordedUnits, target: Target, piece: Piece, follow
 
 
 LOG = logging.getLogger("lipmotion")
-LINE = 110
-NAMED_UNITS = 3
-"""Units that one warning names."""
+NAMED_UNITS = 3  # units that one warning names
 
 
 @final
@@ -165,18 +154,6 @@ class SelectionEngine(Engine[SelectionModel]):
             tuple(_source_piece(inventory, target, *pair) for pair in pairs),
             with_sources(units, target.windows.times_s[:, 0], sources),
         )
-
-    def describe(self, model: SelectionModel) -> str:  # noqa: D102
-        windows, usable = model.inventory.windows, model.inventory.usable
-        counts = {phone: int((usable & (windows.phones == number)).sum()) for number, phone in enumerate(PHONES)}
-        stand_ins = find_substitutes(windows, usable)
-        lines = [f"{int(usable.sum())} units of {len(model.inventory.names)} recordings"]
-        for title, items in (
-            ("units of each phone", [f"{phone} {count}" for phone, count in counts.items() if count]),
-            ("phones without units, and what stands in for them", [f"{p} ({q})" for p, q in stand_ins.items()]),
-        ):
-            lines += [f"{title}:", *(f"  {line}" for line in wrap(", ".join(items), LINE))] if items else []
-        return "\n".join(lines)
 
     def to_arrays(self, model: SelectionModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         return model_arrays(model)

@@ -47,10 +47,8 @@ def interpolate_at(motion: Array, times_s: Array) -> Array:
 
 
 Array = NDArray[np.float64]
-LONGEST_SILENCE_FRAMES = 100
-"""At least one of so many frames is stored."""
-LATE_S = 1.0
-"""Units end at most so long after the motion of their recording."""
+LONGEST_SILENCE_FRAMES = 100  # at least one of so many frames is stored
+LATE_S = 1.0  # units end at most so long after the motion of their recording
 
 
 @dataclass(frozen=True, eq=False)

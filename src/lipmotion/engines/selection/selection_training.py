@@ -25,10 +25,8 @@ from lipmotion.storage.archive import Checkpoint
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Span, Speech, Timeline, Unit, sub_monitor
 from lipmotion.units import SILENCE, is_silent
 
-SEGMENT_S = 0.1
-"""Duration of the segments of speech whose phones cannot be relied on."""
-MIN_RELIABILITY = 0.5
-"""Mean reliability of the phones from which on they choose."""
+SEGMENT_S = 0.1  # duration of the segments of speech whose phones cannot be relied on
+MIN_RELIABILITY = 0.5  # mean reliability of the phones from which on they choose
 
 
 def build_target(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
@@ -61,10 +59,8 @@ LEFT_OUT_RECORDINGS = 24
 MIN_EXPANSION, MAX_EXPANSION = 1.0, 1.6
 NEW_SPEECH_EXPANSION = 1.05
 """Predictions for new recordings are so much narrower again than those for recordings of the training."""
-REST_AWAY_S = 0.3
-"""The rest pose is that of silence further than this from speech,"""
-MIN_REST_FRAMES = 20
-"""or, where there are fewer frames of it, that of the frames with the smallest openings."""
+REST_AWAY_S = 0.3  # the rest pose is that of silence further than this from speech,
+MIN_REST_FRAMES = 20  # or, where there are fewer frames of it, that of the frames with the smallest openings
 KEPT_SILENCE_S = 0.5
 """Silence further than this from speech is not stored (§6: "to edit out this data but maintain synchronisation")."""
 _STAGE = "units"

@@ -225,13 +225,11 @@ EMISSION = (*TREES, *DENSITIES, *REGRESSION)
 """Names of the arrays of an emission: L densities, C regressions on A components."""
 
 
-NETWORK_SHARE = 0.6
-"""Weight of the predictor beside the states, 0 to 1, in models that have no other."""
+NETWORK_SHARE = 0.6  # weight of the predictor beside the states, 0 to 1, in models that have no other
 RESTING_SHARE = 0.5
 """Share of its weight that the predictor has where the states rest, with voices that training knows: their mouths open
 before they speak."""
-UNSEEN_VOICE_LOSS = 0.8
-"""Share of their weight that states lose with voices that training does not know at all."""
+UNSEEN_VOICE_LOSS = 0.8  # share of their weight that states lose with voices that training does not know at all
 
 
 @dataclass(frozen=True, eq=False)

@@ -121,10 +121,8 @@ def recognise_units(hmm: JointHmm, observed: StreamObservations) -> list[Recogni
 
 
 Array = NDArray[np.float64]
-ITERATIONS = 20
-"""Largest number of steps of EM; a dozen are enough nearly always."""
-MIN_GAIN = 1e-4
-"""EM ends when a step raises the log likelihood per frame by less."""
+ITERATIONS = 20  # largest number of steps of EM; a dozen are enough nearly always
+MIN_GAIN = 1e-4  # EM ends when a step raises the log likelihood per frame by less
 LOG_2PI = float(np.log(2 * np.pi))
 
 

@@ -99,8 +99,7 @@ def _run_threaded(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], 
         yield from pool.map(function, items)
 
 
-THREADS = Checkpoint(parallel_map=_run_threaded)
-"""Nothing is stored; threads of this process share the work."""
+THREADS = Checkpoint(parallel_map=_run_threaded)  # nothing is stored; threads of this process share the work
 
 
 def grow_models(
