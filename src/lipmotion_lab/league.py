@@ -548,7 +548,7 @@ def describe_league(league: League) -> Section:
     words = warn_of_few(len(league.recordings))
     for title, reasons in (("Not installed", league.absent), ("Failed", league.failed)):
         words |= {title: [f"{name}: {reason}" for name, reason in reasons.items()]} if reasons else {}
-    return Section("The league", about, verdict, words, (), table)
+    return Section("The league", about, verdict, words, table)
 
 
 def write_league(league: League, folder: Path) -> dict[str, Any]:

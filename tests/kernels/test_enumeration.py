@@ -103,7 +103,7 @@ def chain(draw, frames, states, spread, extreme):
 def test_two_loops_without_a_path_have_probability_0():
     draw = np.random.default_rng(7)
     audio, visual, logs = factorial_model(draw, 5, 30.0, False)
-    logs.visual[3] = -np.inf
+    logs.visual[3] = logs.pair[3] = -np.inf
     found = factorial.infer_factorial(audio, visual, logs)
     assert found.log_likelihood == find_factorial_path(audio, visual, logs)[2] == -np.inf
     assert not any(part.any() for part in (*found[:2], *found.audio_counts, *found.visual_counts))

@@ -1,4 +1,4 @@
-"""The page of a report: what was found first, then every experiment with its words, charts, tables and videos."""
+"""The page of a report: what was found first, then every experiment with its words, tables and pictures."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ STAGING = Staging(size=640, blinks=False, gaze=False, brows=False, head=False)
 """Only the mouth moves, so that nothing else differs between systems."""
 LOWER_FACE = (slice(340, 340 + 4 * MOUTH_HEIGHT), slice(176, 176 + 4 * MOUTH_WIDTH))
 """The part of the drawn picture that is shown."""
-RECORDED = "recorded"
 
 
 def draw_mouths(
@@ -112,7 +111,7 @@ def _write_part(part: FinishedPart) -> Html:
         element("h2", section.title, id=heading),
         element("p", section.about, class_="quiet"),
         element("p", section.verdict, class_="verdict"),
-        element("div", element("div", *words), element("div", *section.charts), class_="beside"),
+        *words,
         section.table.as_html(part.name),
         *more,
         *([element("h3", "Pictures"), element("div", *pictures, class_="pictures")] if pictures else []),

@@ -1,4 +1,4 @@
-"""One experiment in a report: words, charts, tables, and whether the order in the paper held."""
+"""One experiment in a report: words, tables, and whether the order in the paper held."""
 
 from __future__ import annotations
 
@@ -138,12 +138,11 @@ FEW_CLIPS = 10  # bootstrap intervals over fewer recordings are too narrow to be
 
 @dataclass(frozen=True)
 class Section:
-    """The words, charts and tables of one experiment.
+    """The words and tables of one experiment.
 
     about    : what was trained and compared, in sentences
     verdict  : what was found, in one sentence
     words    : by heading, sentences on what held and what did not
-    charts   : drawings
     table    : the most important one
     """
 
@@ -151,7 +150,6 @@ class Section:
     about: str
     verdict: str
     words: Mapping[str, Sequence[str]]
-    charts: Sequence[Html]
     table: Table
     more: Sequence[Table] = ()
 
