@@ -304,8 +304,7 @@ class OpenRecording:
         with self._preview():
             (explanation,) = explain_session(self.session, self.file.edits, [time_s])
         span = explanation.span
-        shares = [share for regression in explanation.regressions for share in regression.shares]
-        shares = shares or [state for chain in explanation.chains for state in chain.states]
+        shares = [state for chain in explanation.chains for state in chain.states]
         return {
             "time_s": explanation.time_s,
             "frame": explanation.frame,

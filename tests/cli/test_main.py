@@ -194,23 +194,6 @@ def test_the_model_inside_is_named_with_its_rights(run, toy_model_file, here):
     assert prior["attribution"].startswith("GRID corpus")
 
 
-def test_its_trees_can_be_printed(run, toy_model_file):
-    done = run("info", toy_model_file, "--structure")
-    assert (done.code, done.err) == (0, [])
-    assert done.out[0] == "speech.0"
-    assert sum("leaf (" in line for line in done.out) >= 18
-
-
-def test_the_chains_of_a_coupled_model(run, coupled_model_file):
-    done = run("info", coupled_model_file, "--structure")
-    assert (done.code, done.err) == (0, [])
-    assert done.out[0].startswith("coupled: chains whose transitions depend on all chains")
-    assert "  asynchrony: up to 1 state(s) apart" in done.out
-    assert "chain 2: 2vis, 2 units of 3 states" in done.out
-    assert any(line.startswith("stream geometry: ") and "6 densities of 1 Gaussian" in line for line in done.out)
-    assert any(line.startswith("means of geometry: ") for line in done.out)
-
-
 ROOT = Path(__file__).parents[2]
 
 
@@ -259,7 +242,7 @@ def test_what_a_header_adds():
 
 ASKED: dict[tuple[str, ...], set[str]] = {
     ("cue",): {"cues"}, ("corpus", "pre"): {"prepare"}, ("corpus", "prepare", "--no"): {"--no-crops"},
-    ("face", "info", "--struc"): set(), ("info", "--struc"): {"--structure"},
+    ("face", "info", "--struc"): set(),
     ("animate", "--pauses", ""): {"rest", "natural"}, ("animate", "a.wav", "-o", "ou"): {"out.json"},
     ("completion", ""): set(SHELLS),
 }  # fmt: skip

@@ -46,8 +46,6 @@ def test_the_question_that_matters_is_asked_first_and_the_tree_can_be_read():
     assert tree.questions[tree.splits[0]] == Question(0, "early", frozenset("ab"))
     assert len(tree.leaves) == 2
     assert tree.frames[0] == 20 * 64
-    leaves = ["  yes: leaf (640 frames)", "  no: leaf (640 frames)"]
-    assert tree.text().splitlines() == ["left is early? (1280 frames)", *leaves]
     assert [tree.name(node) for node in range(3)] == ["any", "left is early", "left is not early"]
 
 
@@ -78,14 +76,6 @@ def test_splits_are_those_of_a_search_by_hand():
     assert tree.splits[0] == int(np.argmax([gain(question) for question in QUESTIONS]))
 
 
-def test_a_context_never_seen_is_treated_like_those_that_answer_alike():
-    seen = [context for context in CONTEXTS if context[0] != "b"]
-    values = [x for x, c in zip(sample(lambda c: 5.0 * (c[0] in "ab")), CONTEXTS, strict=True) if c[0] != "b"]
-    tree = grown(values, [q for q in QUESTIONS if q.name == "early"], seen)  # the only ones about b
-    unseen, alike, other = (tree.path((left, "a", "a"))[-1] for left in "bac")
-    assert unseen == alike != other
-
-
 def test_trees_come_back_from_arrays():
     trees = {
         "one": grown(sample(lambda context: float(UNITS.index(context[0]) + 3 * UNITS.index(context[2])))),
@@ -94,7 +84,7 @@ def test_trees_come_back_from_arrays():
     again = trees_from_arrays(trees_to_arrays(trees))
     assert list(again) == ["one", "two"]
     for name, tree in trees.items():
-        assert again[name].text() == tree.text()
+        assert again[name].questions == tree.questions
         assert [again[name].path(c) for c in CONTEXTS] == [tree.path(c) for c in CONTEXTS]
 
 
@@ -137,13 +127,6 @@ def test_voicing_alone_is_worth_a_question():
         values.append(np.where(voiced, draw.normal(0, 1, 30), np.nan))
     tree = grown(values, sums=spaces_of, likelihood=score_multispace, parameters=3)
     assert tree.questions[tree.splits[0]] == Question(1, "early", frozenset("ab"))
-
-
-def test_frames_that_are_all_alike_gain_no_more_than_the_least_variance_allows():
-    x = np.full((5, 1), 3.0)
-    assert score_gaussian(statistics_of([x]), 0.5)[0] == pytest.approx(-2.5 * np.log(2 * np.pi * 0.5))
-    spread = np.array([[0.0], [2.0]])  # a variance of 1 under a Gaussian of 4
-    assert score_gaussian(statistics_of([spread]), 4.0)[0] == pytest.approx(-(np.log(2 * np.pi * 4) + 0.25))
 
 
 @pytest.mark.parametrize("seed", range(20))

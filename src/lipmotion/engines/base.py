@@ -136,10 +136,6 @@ class Engine(Animator[ModelT]):
         """Return, for every chain of hidden states, the posterior probability of each of its units in every frame."""
         return ()
 
-    def describe(self, model: ModelT) -> str:  # noqa: ARG002
-        """Return a text that describes the parts of a model: its decision trees, its chains; empty: there is none."""
-        return ""
-
 
 @dataclass(frozen=True)
 class SourcePiece:

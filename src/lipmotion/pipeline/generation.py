@@ -228,7 +228,6 @@ def map_explanation(person: SpeakerMap | None, explanation: Explanation, speech:
         explanation,
         motion=map_values(explanation.motion),
         gaussians=tuple(replace(each, channels=map_values(each.channels)) for each in explanation.gaussians),
-        regressions=tuple(replace(each, channels=map_values(each.channels)) for each in explanation.regressions),
     )
 
 

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.printable import printable
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays
 
 Context = tuple[str, ...]
@@ -21,8 +20,8 @@ Likelihood = Callable[[Array], Array]
 """Function of N sufficient statistics [shape=(N, K)], the number of frames first: returns the log likelihood of each
 under the density estimated from it [shape=(N,)]."""
 MIN_VARIANCE = 1e-12
-TIE = 1e-10
-"""Gains of questions that differ by less, as a share of the log likelihood or of the frames, are equal."""
+MAX_CONTEXTS = 50_000  # whose leaves are kept, so that motion is generated again sooner
+TIE = 1e-10  # gains of questions that differ by less, as a share of the log likelihood or of the frames, are equal
 
 
 class Question(NamedTuple):
@@ -75,10 +74,22 @@ class Tree:
             nodes.append(at + 1 if node < no[at] else no[at])
         return nodes
 
-    @property
+    @cached_property
     def leaves(self) -> NDArray[np.intp]:
         """The numbers of the leaves."""
         return np.nonzero(self.splits < 0)[0]
+
+    def rank(self, context: Context) -> int:
+        """Return the place of the leaf of a context among ``leaves``; it is looked for once."""
+        if context not in self._ranks:
+            if len(self._ranks) > MAX_CONTEXTS:
+                self._ranks.clear()
+            self._ranks[context] = int(np.searchsorted(self.leaves, self.path(context)[-1]))
+        return self._ranks[context]
+
+    @cached_property
+    def _ranks(self) -> dict[Context, int]:
+        return {}
 
     def name(self, node: int) -> str:
         """Return the answers that lead to a node, in words."""
@@ -89,22 +100,6 @@ class Tree:
             verb = "is" if following == at + 1 else "is not"
             answers.append(f"{POSITIONS[question.position]} {verb} {question.name}")
         return ", ".join(answers) or "any"
-
-    def text(self) -> str:
-        """Return the tree as readable text: one line for each node, indented by its depth."""
-        lines: list[str] = []
-
-        def write(node: int, depth: int, answer: str) -> None:
-            number = self.splits[node]
-            question = self.questions[number] if number >= 0 else None
-            line = f"{POSITIONS[question.position]} is {question.name}?" if question else "leaf"
-            lines.append(f"{'  ' * depth}{answer}{line} ({self.frames[node]:.0f} frames)")
-            if question:
-                write(node + 1, depth + 1, "yes: ")
-                write(int(self.no[node]), depth + 1, "no: ")
-
-        write(0, 0, "")
-        return "\n".join(map(printable, lines))
 
 
 POSITIONS = ("left", "unit", "right")

@@ -264,20 +264,6 @@ class DominantGaussian:
 
 
 @dataclass(frozen=True)
-class RegressedMean:
-    """A mean of a stream that is regressed on the acoustic features and posteriors around a frame.
-
-    stream   : name of the stream
-    shares   : weight of each regression, largest first; ``rest`` in silence away from speech
-    channels : weighted mean of the regressions, and its standard deviation, by channel
-    """
-
-    stream: str
-    shares: tuple[NamedProbability, ...]
-    channels: Mapping[str, ChannelValue]
-
-
-@dataclass(frozen=True)
 class Explanation:
     """What determined one frame of generated motion; returned by ``explain``.
 
@@ -290,7 +276,6 @@ class Explanation:
     chains      : posterior probabilities of the states of each chain (empty: the engine has no chains)
     joint       : the most probable joint state of all chains (None: the engine does not list joint states)
     gaussians   : the dominant Gaussian of each stream
-    regressions : the regressed mean of each stream that has one
 
     >>> import lipmotion
     >>> (explanation,) = lipmotion.explain("examples/welcome.flac", at=1.0)
@@ -307,7 +292,6 @@ class Explanation:
     chains: tuple[ChainStates, ...] = ()
     joint: NamedProbability | None = None
     gaussians: tuple[DominantGaussian, ...] = ()
-    regressions: tuple[RegressedMean, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from lipmotion.pipeline.training.labels import fingerprint_training
 from lipmotion.storage import files, locks
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.storage.sources import Source, check_apart
-from lipmotion.types import Item, sub_monitor
+from lipmotion.types import Item
 from lipmotion.units import Lexicon
 from lipmotion_lab import hofer2008
 from lipmotion_lab.engine_comparison import compare_engines
@@ -28,7 +28,7 @@ from lipmotion_lab.learning_curve import run_learning_curve
 from lipmotion_lab.minnis2000 import run_minnis2000
 from lipmotion_lab.report import sections
 from lipmotion_lab.report.html import GENERATOR
-from lipmotion_lab.report.page import ClipKeeper, FinishedPart, write_html, write_videos
+from lipmotion_lab.report.page import FinishedPart, write_html
 from lipmotion_lab.report.section import Section, write_text
 from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, Stamp, check_opening, share_out, take_quick_part
 from lipmotion_lab.xie_liu2007 import six_systems
@@ -111,8 +111,8 @@ PARTS: dict[str, ReportPart] = {
 """All experiments by name, in the order of the report: the papers' first."""
 
 
-PAGE, FIGURES, MOTION = "index.html", "figures.json", "motion.json"
-"""The page; and in the folder of an experiment its figures with their stamp, and the motion of one clip."""
+PAGE, FIGURES = "index.html", "figures.json"
+"""The page; and in the folder of an experiment its figures with their stamp."""
 KEY_DIGITS = 8
 NOT_YET = "not finished; the same command goes on with it"
 FAILED, AGAIN = "failed: ", "mend that, then give the same command: it goes on with it"
@@ -144,7 +144,7 @@ def write_report(
     quick: bool = False,
     settings: ExperimentSettings = DEFAULT_SETTINGS,
 ) -> WrittenReport:
-    """Run experiments on a corpus, and write a page of what they found, with its tables, pictures and videos.
+    """Run experiments on a corpus, and write a page of what they found, with its tables and pictures.
 
     folder   : of the report, made if need be. What is finished in it is not computed again; a call after a stop goes on
     The page is written anew when an experiment is finished; where nothing is left to do, nothing is written. Every
@@ -224,11 +224,11 @@ class _Writer:
         """Return a digest of all that the figures of an experiment depend on."""
         return hashlib.sha256(f"{name} {self.digest}".encode()).hexdigest()
 
-    def record(self, name: str) -> tuple[dict[str, Any], dict[str, Any]] | None:
-        """Return figures and motion of an experiment that is finished; None: it is not, or was another one."""
+    def record(self, name: str) -> dict[str, Any] | None:
+        """Return the figures of an experiment that is finished; None: it is not, or was another one."""
         try:
-            record, motion = (from_json((self.folder / name / file).read_bytes()) for file in (FIGURES, MOTION))
-            return (record, motion) if record["key"] == self.make_key(name) else None
+            record = dict(from_json((self.folder / name / FIGURES).read_bytes()))
+            return record if record["key"] == self.make_key(name) else None
         except (OSError, ValueError, KeyError, TypeError):
             return None
 
@@ -239,7 +239,7 @@ class _Writer:
             record = self.record(name)
             if record is not None:
                 try:
-                    finished.append(FinishedPart(name, *record, part.section(record[0]["figures"])))
+                    finished.append(FinishedPart(name, record, part.section(record["figures"])))
                 except Exception as error:  # what one experiment says must not hide the others
                     self.failed[name] = error
         return finished
@@ -266,23 +266,19 @@ class _Writer:
         part, target, key = PARTS[name], self.folder / name, self.make_key(name)
         models = self.folder / "models" / self.make_key("models")[:KEY_DIGITS]  # of other recordings, other models
         with locks.keep_unfinished(self.folder / f"{name}.json") as work:
-            stamp, keeper = Stamp(), ClipKeeper(work / MOTION, key)
-            running = replace(settings.narrow(0, 0.95), receive=keeper)
-            plots = work / "plots" if part.draws and self.can_draw else None
-            figures = part.run(PartRun(self.corpus, self.quick, work, models, plots, running))
-            section, motion = part.section(figures), keeper.collect()
+            stamp, plots = Stamp(), work / "plots" if part.draws and self.can_draw else None
+            figures = part.run(PartRun(self.corpus, self.quick, work, models, plots, settings))
+            section = part.section(figures)
             made_with = stamp.collect(self._build_command([name]), self.corpus, settings)
             shutil.rmtree(target, ignore_errors=True)
             with files.replace_folder(target) as made:
-                drawing, captions = sub_monitor(settings.monitor, 0.95, 1), PLOT_CAPTIONS if plots is not None else {}
-                videos = write_videos(motion, section.shown, self.corpus, made, drawing) if motion else []
+                captions = PLOT_CAPTIONS if plots is not None else {}
                 for file in captions:
                     shutil.move(work / "plots" / file, made / file)
                 pictures = [{"file": file, "caption": caption} for file, caption in captions.items()]
-                record = {"experiment": name, "key": key, "stamp": made_with, "figures": figures, "videos": videos}
+                record = {"experiment": name, "key": key, "stamp": made_with, "figures": figures, "pictures": pictures}
                 section.write_tables(made / "tables")
-                for file, content in ((MOTION, motion), (FIGURES, record | {"pictures": pictures})):
-                    write_text(made / file, as_json(content, indent=1) + "\n")
+                write_text(made / FIGURES, as_json(record, indent=1) + "\n")
 
     def _build_command(self, wanted: Sequence[str]) -> list[str]:
         words = ["lipmotion", "experiment", "all", self.corpus.path.resolve().name, "-o", self.folder.resolve().name]

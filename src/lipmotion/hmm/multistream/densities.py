@@ -120,16 +120,11 @@ def stream_observations(
     return StreamObservations(streams)
 
 
-MIN_FRAMES = 2.0
-"""A Gaussian with less data, in frames, is not re-estimated."""
-SPLIT_FRAMES = 40.0
-"""A Gaussian with less data, in frames, is not split."""
-MIN_VOICED_PROBABILITY = 1e-3
-"""Smallest probability of a frame being voiced, and of its being unvoiced."""
-MIN_POSTERIOR = np.float32(1e-10)
-"""Smaller posteriors are set to 0; so none is denormal, which would be slow."""
-MIN_SCALE = 1e-6
-"""Smallest standard deviation of a scale: a dimension that varies less is constant."""
+MIN_FRAMES = 2.0  # a Gaussian with less data, in frames, is not re-estimated
+SPLIT_FRAMES = 40.0  # a Gaussian with less data, in frames, is not split
+MIN_VOICED_PROBABILITY = 1e-3  # smallest probability of a frame being voiced, and of its being unvoiced
+MIN_POSTERIOR = np.float32(1e-10)  # smaller posteriors are set to 0; so none is denormal, which would be slow
+MIN_SCALE = 1e-6  # smallest standard deviation of a scale: a dimension that varies less is constant
 
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]

@@ -24,7 +24,6 @@ from lipmotion.hmm.multistream.densities import (
     TiedDensities,
 )
 from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState
-from lipmotion.printable import printable
 from lipmotion.stats.bigram import BIGRAM, Bigram, bigram_from_array
 from lipmotion.stats.mixture import MIXTURES, mixtures_from_arrays
 from lipmotion.stats.trees import (
@@ -63,10 +62,6 @@ class Forest:
         ends = np.cumsum([0, *(len(tree.leaves) for tree in self.trees.values())])
         return dict(zip(self.trees, ends.tolist(), strict=False))
 
-    @cached_property
-    def _leaf_cache(self) -> dict[TriphoneState, int]:
-        return {}
-
     @property
     def size(self) -> int:
         """The number of leaves."""
@@ -74,14 +69,9 @@ class Forest:
 
     def leaf(self, state: TriphoneState) -> int:
         """Return the leaf of a state in context, whether or not the context occurred in training."""
-        number = self._leaf_cache.get(state)
-        if number is None:
-            context, position = state
-            name = self.inventory.tree(context[1], position)
-            tree = self.trees[name]
-            number = self._first_leaf[name] + int(np.searchsorted(tree.leaves, tree.path(context)[-1]))
-            self._leaf_cache[state] = number
-        return number
+        context, position = state
+        name = self.inventory.tree(context[1], position)
+        return self._first_leaf[name] + self.trees[name].rank(context)
 
     def leaves(self, states: Iterable[TriphoneState]) -> NDArray[np.intp]:
         """Return the leaves of states in context [shape=(S,)]."""
@@ -116,10 +106,6 @@ class Forest:
         """Return the tree of a leaf and the answers that lead to it, in words."""
         tree = next(name for name in reversed(self._first_leaf) if self._first_leaf[name] <= leaf)
         return f"state {tree}: {self.trees[tree].name(int(self.trees[tree].leaves[leaf - self._first_leaf[tree]]))}"
-
-    def text(self) -> str:
-        """Return all trees as readable text."""
-        return "\n".join(f"state {printable(name)}\n{tree.text()}" for name, tree in self.trees.items())
 
 
 def build_unit_forest(inventory: Inventory, spoken: Sequence[str]) -> Forest:
@@ -302,13 +288,6 @@ class JointHmm:
     def log_move(self) -> NDArray[np.float64]:
         """Log P(leave the state) of every state without context [shape=(R,)]."""
         return np.log(-np.expm1(self.log_stay))
-
-    def text(self) -> str:
-        """Return the trees of all streams as readable text."""
-        forests = {name: model.forest for name, model in self.models.items()}
-        return "\n\n".join(
-            f"{printable(name)}: {forest.size} leaves\n{forest.text()}" for name, forest in forests.items()
-        )
 
 
 NAMES = {
