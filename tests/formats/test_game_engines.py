@@ -58,8 +58,8 @@ def test_godot_parser_reads_the_same_tracks(tmp_path: Path) -> None:
     ("name", "channel", "message"),
     [
         ("a.tres", "Face.jawOpen", r"'Face\.jawOpen' has one of the letters"),
-        ("a.tres", "headYaw", "no blendshapes"),
-        ("a.anim", "headYaw", "no blendshapes, or no two frames"),
+        ("a.tres", "headYaw", "required 1 or more of weight"),
+        ("a.anim", "headYaw", "required 2 or more of weight"),
     ],
 )
 def test_names_and_motion_without_weights_are_refused(tmp_path: Path, name: str, channel: str, message: str) -> None:

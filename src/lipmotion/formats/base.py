@@ -45,7 +45,9 @@ class MotionFormat:
 
     write   : writes a generation to a path; the mappings describe the origin of its speech and of its model
     read    : returns motion and units of a file, or raises InputError; None: the format cannot be read
-    check   : raises ExportError for motion that does not fit into such a file
+    needs   : names of channels of which the motion must have one; ``WEIGHT``: a weight; empty: any channels
+    min_frames : so many frames it must have, at least one where it needs channels
+    check   : raises ExportError for motion that does not fit into such a file otherwise
     units   : returns the units of a file that holds units alone, and None of other files; None: there are no such files
     curves  : the set of curves that such a file holds, as of ``pipeline.outputs.curve_sets.curves_of`` (``arkit``, for
               instance): the pipeline computes them from the motion; empty: the channels of the motion
@@ -73,6 +75,8 @@ class MotionFormat:
     names_sound: bool = False
     mouth: bool = False
     keyed: bool = False
+    needs: tuple[str, ...] = ()
+    min_frames: int = 0
 
 
 MOTION_FORMATS: Registry[MotionFormat] = Registry(
@@ -165,6 +169,12 @@ def check_motion(path: Path, motion: Motion) -> None:
     chosen = find_motion_format(path)
     if motion.values.size and not np.isfinite([motion.values.min(), motion.values.max()]).all():  # no mask of an hour
         raise ExportError(f"{path}: the motion has values that are not finite; interpolate them before writing")
+    known = {*motion.names, *(channel.unit for channel in motion.channels)}
+    lacking = bool(chosen.needs) and not known & {*chosen.needs}
+    if lacking or len(motion.values) < max(chosen.min_frames, bool(chosen.needs)):
+        what = f"{path}: the motion has {len(motion.values)} frames of {', '.join(motion.names[:4]) or 'no channel'}"
+        needed = f"{max(chosen.min_frames, 1)} or more of {' or '.join(chosen.needs) or 'any channel'}"
+        raise ExportError(f"{what}, required {needed}; write .json or .csv")
     chosen.check(motion)
 
 

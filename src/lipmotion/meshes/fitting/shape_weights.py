@@ -31,7 +31,7 @@ VISEME_CHANNELS = tuple(f"viseme_{name}" for name in VISEMES_15)
 NEAREST_VOWEL = {row["viseme"]: row["vowel"] for row in _VISEMES if row["vowel"]}
 """The vowel of VRM for each viseme that opens the mouth."""
 VISEME_POSES = np.array([[float(row[name] or 0) for row in _VISEMES] for name in ("gap", "protrusion")])
-"""The gap, in eye distances, and the protrusion of each viseme at weight 1, as in distinct speech; closed ones have 0."""
+"""The gap, in eye distances, and the protrusion of each viseme at weight 1, as in distinct speech; 0: closed."""
 LARGEST_ADDED = 0.4  # a viseme gives up at most this share to ``aa`` where the lips are further apart
 LAX = "E"  # the viseme of parted lips in a pause
 MAX_CLOSED_WEIGHT = 0.85  # largest sum of the visemes of closed lips where the lips are parted
