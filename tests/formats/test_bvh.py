@@ -106,7 +106,6 @@ def test_what_cannot_be_placed_is_refused(tmp_path, talking_bvh):
 
 VMD_FRAMES = 31
 NAMES = ("aa", "ih", "ou", "ee", "oh", "closed", "eyeBlinkLeft", "eyeBlinkRight", *ANGLES)
-
 BROWS = tuple(Channel(name, WEIGHT) for name in ("browDownLeft", "browDownRight", "a", "b", "c"))
 
 

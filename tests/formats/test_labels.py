@@ -285,7 +285,6 @@ def test_others_read_it(tmp_path: Path) -> None:
 
 
 Interval = tuple[float, float, str]
-
 TEXTGRID_WORDS: list[Interval] = [(0, 0.4, ""), (0.4, 0.9, 'say ""hi""'), (0.9, 1.5, "Bob"), (1.5, 2.0, "")]
 TEXTGRID_PHONES: list[Interval] = [
     *[(0.0, 0.4, "sil"), (0.4, 0.6, "S"), (0.6, 0.75, "EY1"), (0.75, 0.8, "HH"), (0.8, 0.9, "AY1")],

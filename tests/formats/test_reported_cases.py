@@ -267,8 +267,6 @@ SERVICES: dict[str, Any] = {
     "TTML of words": '<tt xmlns="http://www.w3.org/ns/ttml"><body begin="0.1s"><p begin="0.1s" end="2s">'
     + " ".join(f'<span begin="{a - 0.2:.2f}s" end="{b - 0.2:.2f}s">{w}</span>' for w, a, b in W) + "</p></body></tt>",
 }  # fmt: skip
-
-
 MS = [(w, 1000 * a, 1000 * b) for w, a, b in W]
 OTHERS: dict[str, Any] = {
     "Speechify": [

@@ -205,8 +205,6 @@ def test_what_is_a_table_of_the_app(write):
 
 
 GOOD_ROWS = [row(f"10:00:00:{n:02d}.000") for n in range(10)]
-
-
 WRONG_TAKES = [
     ([], "there are no rows"),
     (GOOD_ROWS[:1], "1 rows with values, required two or more"),

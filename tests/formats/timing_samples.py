@@ -61,7 +61,6 @@ MFA = {"start": 0, "end": 1.0, "tiers": {
         [0.1, 0.2, "m"], [0.2, 0.5, "aj"], [0.5, 0.6, "s"], [0.6, 0.7, "p"], [0.7, 0.9, "ɒː"], [0.9, 1.0, "tʰ"]]},
 }}  # fmt: skip
 MFA_CSV = "Begin,End,Label,Type,Speaker\n0.1,0.5,my,words,ann\n0.1,0.2,M,phones,ann\n0.2,0.5,AY1,phones,ann\n"
-
 SAMPLES = {
     "polly": POLLY, "words": AZURE_WORDS, "visemes": AZURE_VISEMES, "characters": ELEVENLABS, "messages": CARTESIA,
     "marks": GOOGLE, "piper": PIPER, "kokoro": KOKORO, "gentle": GENTLE, "mfa": MFA, "table": MFA_CSV,

@@ -166,7 +166,6 @@ def _obj(text: bytes, **others: bytes) -> Files:
 SQUARE = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 LIBRARY = b"".join(b"newmtl m%d\nmap_Kd skin.png\n" % n for n in range(2000))
 USED = SQUARE + b"".join(b"usemtl m%d\nf 1 2 3\n" % n for n in range(2000))
-
 CHARACTER_FLOODS: dict[str, Callable[[], Files]] = {
     "matrices without bytes": lambda: _gltf(_matrices),
     "20,000 primitives": lambda: _gltf(_primitives(20_000)),
@@ -225,8 +224,6 @@ CHARACTER_FLOODS: dict[str, Callable[[], Files]] = {
     ),
 }
 """By what they are."""
-
-
 TIER = b'"ooTextFile"\n"TextGrid"\n0\n2\n<exists>\n1\n"%s"\n"a"\n0\n2\n1\n0\n2\n"x"\n'
 
 

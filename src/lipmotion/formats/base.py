@@ -31,10 +31,7 @@ LOG = logging.getLogger("lipmotion")
 Array = NDArray[np.float64]
 About = Mapping[str, str]
 LARGEST_MOTION_BYTES = 1 << 31  # most bytes of a motion file: four hours of a hundred channels
-
 LARGEST_UNITS_BYTES = 1 << 28  # most bytes of a file of units alone: phones of a day
-
-
 LARGEST_WEIGHT = 4.0  # largest weight of a blendshape that is read; captures and sculpted faces go a little over 1
 TOLERATED_WEIGHT = 0.1  # by how much weights may go beyond 0 to 1 without a warning
 

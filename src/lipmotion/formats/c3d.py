@@ -37,7 +37,6 @@ from lipmotion.types import EYE_DISTANCE, Channel, Generation, Motion, Timeline,
 Array = NDArray[np.float64]
 Values = list[str] | NDArray[np.floating[Any]] | NDArray[np.integer[Any]]
 """The values of a parameter: texts, or numbers in the order of the file."""
-
 BLOCK = 512
 MARK = 0x50
 INTEL_PROCESSOR = 84  # the lowest byte first; others (DEC, MIPS) are no more
@@ -337,8 +336,6 @@ def _points(motion: Motion) -> list[int]:
 
 
 MOTION_FORMAT = MotionFormat(write, read, check, min_frames=1)
-
-
 MILLIMETRES = 90.0  # the distance between the outer eye corners of a grown person, where markers do not show it
 UNITS = {"mm": 1.0, "millimeter": 1.0, "cm": 10.0, "m": 1000.0, "meter": 1000.0, "in": 25.4, "inch": 25.4}
 """Units of length in millimetres."""
@@ -350,7 +347,6 @@ RIGID = ("forehead", "head", "nasion", "nosebridge", "glabella", "temple", "ear"
 MIN_RIGID_MARKERS = 3
 LARGEST_COORDINATE = 1e6
 MIN_DISTANCE = 1e-3  # least distance of the eye corners in any frame, as a share of the median
-
 DISTANCES = {"opening": (13, 14), "width": (61, 291), "outer": (0, 17)}  # channels that are the distance of two points
 MARKER = re.compile(r"(?:lip|jaw|p|point)[ _]?(\d{1,3})$", re.IGNORECASE)  # at a point of the face mesh
 

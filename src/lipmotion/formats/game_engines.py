@@ -134,8 +134,6 @@ def write_godot(path: Path, generation: Generation, _source: Mapping[str, str], 
 _WEIGHTS: dict[str, Any] = {"needs": (WEIGHT,), "curves": "face", "other_curves": True, "keyed": True}
 UNITY = MotionFormat(write_unity, rate_hz=RATE_HZ, min_frames=2, **_WEIGHTS)
 GODOT = MotionFormat(write_godot, check=check_godot, **_WEIGHTS)
-
-
 OPEN, FORM = "ParamMouthOpenY", "ParamMouthForm"
 """Live2D's standard parameters: 0 closed to 1 open; −1 puckered to 1 wide, as in a smile."""
 FULL_GAP = 0.20  # the gap between the lips that is drawn as wholly open, eye distances
@@ -201,8 +199,6 @@ def _sum_effects(motion: Motion, effects: Array) -> Array:
 
 
 LIVE2D = MotionFormat(write_live2d, needs=SHOWING, min_frames=2, mouth=True)
-
-
 SCRIPT_MODULES = ("takes.py", "curves.py", "keying.py", "script.py")
 """The modules of the add-on that a script holds, one after another."""
 COPIED = "# -- what follows is copied into scripts\n"
@@ -230,7 +226,6 @@ files = "Reads the motion file and the sound that you choose"
 SCRIPT_DECIMALS = 5
 _BEGINNING = re.compile(r'\A""".*?"""\n', re.DOTALL)
 _IMPORT = re.compile(r"^from (\.\w*|__future__) import .*\n", re.MULTILINE)
-
 _HEAD = '''"""Lip motion for Blender, written by lipmotion.
 
 Select the face or the rig and run this script: in the text editor (Alt P), or

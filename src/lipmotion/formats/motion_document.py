@@ -201,8 +201,6 @@ def read_npz(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
 JSON = MotionFormat(write_json_file, read_json, units=read_json_units)
 NPZ = MotionFormat(write_npz, read_npz)
-
-
 LOG = logging.getLogger("lipmotion")
 NAMES, WEIGHTS, RATE = "facsNames", "weightMat", "exportFps"
 SOUND, POSES, FRAMES = "trackPath", "numPoses", "numFrames"  # the members of a file
@@ -243,8 +241,6 @@ def read_audio2face(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
 
 _AUDIO2FACE = members({NAMES: items(text(1000)), RATE: number()}, (NAMES, RATE))
-
-
 AUDIO2FACE = MotionFormat(write_audio2face, read_audio2face, curves="face", rate_hz=RATE_HZ, names_sound=True)
 
 

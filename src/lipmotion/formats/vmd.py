@@ -24,7 +24,6 @@ from lipmotion.types.motion import RADIAN
 
 Keys = Sequence[tuple[int, float]]  # frames and values
 Turns = Sequence[tuple[int, tuple[float, float, float, float]]]  # frames and rotations, as quaternions x, y, z, w
-
 RATE_HZ = 30.0
 MARK, OLD_MARK = b"Vocaloid Motion Data 0002", b"Vocaloid Motion Data file"
 MARK_BYTES, MODEL_BYTES, OLD_MODEL_BYTES = 30, 20, 10

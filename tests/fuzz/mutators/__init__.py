@@ -8,7 +8,6 @@ from fuzz.inputs import Files
 from fuzz.mutators import arrays, documents, json_text, raw, riff, text, xml_text, zips
 
 Mutate = Callable[[Random, bytes], bytes]
-
 TEXTS = ".obj .mtl .csv .toml .txt .align .lab .TextGrid .dict".split()
 FORMS: dict[str, tuple[Mutate, ...]] = {
     **dict.fromkeys(TEXTS, (text.change,) * 3),

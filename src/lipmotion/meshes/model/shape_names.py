@@ -38,8 +38,6 @@ _VOWEL_SPELLINGS = {"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh"} | {na
 _VOWEL_SPELLINGS |= dict(zip("あいうえお", VRM_VOWELS, strict=True))
 _ARKIT = {name.lower(): name for name in (*ARKIT_MOUTH, *ARKIT_OTHERS)}
 _SIDES = {"l": "left", "r": "right", "left": "left", "right": "right"}
-
-
 _COPY = re.compile(r"(?:[._ ](?:\d{1,4}|(?i:copy|mesh|head|face|body|weight|(?:mesh)?shape)))+$|(?<=[a-z])Shape$")
 """What programs add to a name: ``jawOpen.001``, ``jawOpen_Head``, ``jawOpenShape``."""
 
