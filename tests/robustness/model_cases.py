@@ -1,4 +1,3 @@
-import zipfile
 from collections.abc import Callable
 from typing import Any
 
@@ -21,16 +20,6 @@ _file("an empty zip", b"PK\5\6" + bytes(18), *NO_MODEL)
 case(GROUP, "cut off", 6, *NO_MODEL)(
     lambda bench: bench.animate(None, "--model", bench.file("m.lipmotion", bench.model.read_bytes()[:-99]))
 )
-
-
-@case(GROUP, "flipped bytes in a member", 6, *DAMAGED)
-def _(bench: Bench) -> list[object]:
-    content = bytearray(bench.model.read_bytes())
-    with zipfile.ZipFile(bench.model) as file:
-        member = file.getinfo("phones/means.npy")
-    place = member.header_offset + 100
-    content[place : place + 8] = bytes(byte ^ 255 for byte in content[place : place + 8])
-    return bench.animate(None, "--model", bench.file("m.lipmotion", bytes(content)))
 
 
 def _header(name: str, *messages: str, **header: object) -> None:
@@ -63,9 +52,6 @@ _changed("a header with a key twice", "header.json", b'{"format": "lipmotion.mod
          "the key 'format' occurs twice")  # fmt: skip
 _changed("without an array of the engine", "engine/variances.npy", None, *DAMAGED)
 _changed("a trillion numbers declared", "phones/means.npy", declared("(1000000000000,)"), *DAMAGED, "in 0 bytes")
-case(GROUP, "a hundred megabytes of zeros", 6, *NO_MODEL, "would grow to", "at most")(
-    lambda bench: bench.animate(None, "--model", bench.changed_model({"phones/means.npy": bytes(2**27)}))
-)
 _changed("pickled objects", "phones/means.npy", npy(np.array([{}], object)), *DAMAGED)
 _changed("a path to elsewhere", "../../elsewhere.npy", npy(np.zeros(3)), *DAMAGED)
 _changed("an array that nothing declares", "engine/more.npy", npy(np.zeros(3)), *DAMAGED, "undeclared 'more'")

@@ -1,6 +1,5 @@
 import io
 import json
-import os
 import zipfile
 
 import numpy as np
@@ -49,15 +48,6 @@ _json("a channel that is a spreadsheet's formula", {"channels": [{"name": "=1+1"
 _json("100,000 brackets", '{"values": ' + "[" * 100_000, 3, "not JSON", "export it again")
 
 
-def _csv(name: str, content: str, *messages: str) -> None:
-    case(GROUP, f"csv: {name}", 3, *messages)(
-        lambda bench: bench.animate(None, "--units", bench.file("units.csv", content))
-    )
-
-
-_csv("a good one, which has no units", "time_s,opening\n0,1\n0.1,2\n", "the units are an empty list")
-
-
 def _npz(name: str, values: bytes, *messages: str, document: bytes | None = None) -> None:
     @case(GROUP, f"npz: {name}", 3, *messages)
     def _(bench: Bench) -> list[object]:
@@ -75,15 +65,6 @@ _npz("texts", npy(np.array([["a"], ["b"]])), "values of <U1, required numbers")
 _npz("a document that is none", npy(np.zeros((2, 1))), *NO_MOTION, document=npy(np.array("{")))
 
 
-@case(GROUP, "a pipe", 3, "is a pipe or a device, required a file")
-def _(bench: Bench) -> list[object]:
-    os.mkfifo(bench.folder / "units.json")
-    return bench.animate(None, "--units", bench.folder / "units.json")
-
-
-case(GROUP, "a file that does not exist", 3, "units.json: cannot be read: No such file")(
-    lambda bench: bench.animate(None, "--units", bench.folder / "units.json")
-)
 case(GROUP, "a recording as units", 3, "is a recording, required a units file")(
     lambda bench: bench.animate(None, "--units", bench.speech)
 )

@@ -69,12 +69,6 @@ _output("a folder where nothing can be written", "/proc/a.json", "/proc/a.json: 
 _output("a name that is too long", "x" * 300 + ".json", "cannot be written: File name too long")
 
 
-@case(OUTPUTS, "a folder", 7, "is a folder; give the name of a file in it")
-def _(bench: Bench) -> list[object]:
-    (bench.folder / "a.json").mkdir()
-    return bench.animate(output=bench.folder / "a.json")
-
-
 case(OUTPUTS, "one name twice", 7, "is given twice; give every output another")(
     lambda bench: bench.animate(None, "-o", Path("./a.json"), output=Path.cwd() / "a.json")
 )

@@ -1,10 +1,8 @@
-import os
 import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
 
 from robustness.case import Bench, case
 from speech.sounds import tone, write_constant_flac, write_pictures, write_sound, write_stamped
@@ -105,12 +103,6 @@ case(GROUP, "random bytes", 3, *NO_RECORDING)(
 )
 
 
-@case(GROUP, "a picture", 3, "is a picture, required a recording")
-def _(bench: Bench) -> list[object]:
-    Image.new("RGB", (32, 32)).save(bench.folder / "a.png")
-    return bench.animate(bench.folder / "a.png")
-
-
 case(GROUP, "a video without sound", 3, "has no sound track")(
     lambda bench: bench.animate(write_pictures(bench.folder / "a.mp4"))
 )
@@ -119,27 +111,8 @@ case(GROUP, "a folder", 3, "no sounds and no videos in it; give a folder of reco
 )
 
 
-@case(GROUP, "a link to itself", 3, "a.wav")
-def _(bench: Bench) -> list[object]:
-    (bench.folder / "a.wav").symlink_to(bench.folder / "a.wav")
-    return bench.animate(bench.folder / "a.wav")
-
-
-@case(GROUP, "a pipe that nobody writes to", 3, "is a pipe or a device, required a file")
-def _(bench: Bench) -> list[object]:
-    os.mkfifo(bench.folder / "a.wav")
-    return bench.animate(bench.folder / "a.wav")
-
-
 case(GROUP, "/dev/zero", 3, "is a pipe or a device, required a file")(lambda bench: bench.animate(Path("/dev/zero")))
 case(GROUP, "a name that is too long", 3, "required a path")(lambda bench: bench.animate("x" * 300 + ".wav"))
-
-
-@case(GROUP, "a name that is no UTF-8", 0)
-def _(bench: Bench) -> list[object]:
-    path = bench.folder / os.fsdecode(b"a\xff\xfe.wav")
-    path.write_bytes(bench.speech.read_bytes())
-    return bench.animate(path)
 
 
 case(GROUP, "time stamps that alternate", 3, "beside 8.0 s of sound, at most 760 s are bridged; export the recording")(

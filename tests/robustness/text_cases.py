@@ -1,8 +1,6 @@
 """Unusual and unusable transcripts and lexicons."""
 
-import os
-
-from robustness.case import Bench, case
+from robustness.case import case
 
 GROUP = "transcripts"
 NO_WORD = ("holds no word", "give the words that are spoken")
@@ -52,13 +50,6 @@ _transcript_file("UTF-16 without its mark", "papa mama".encode("utf-16-le"), 0)
 _transcript_file(
     "a sound as a transcript", b"RIFF\x80\x81\x82", 3, "not a readable UTF-8 transcript", "save it as UTF-8 text"
 )
-
-
-@case(GROUP, "a file of terabytes", 3, "1099511627776 bytes, required at most 16777216")
-def _(bench: Bench) -> list[object]:
-    path = bench.file("words.txt", b"")
-    os.truncate(path, 2**40)
-    return bench.animate(None, "--transcript", path)
 
 
 case(GROUP, "words of another sentence", 0, "the transcript seems not to be what is said", "check it, or leave it out")(
