@@ -1,4 +1,5 @@
 import json
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -71,16 +72,24 @@ def test_every_form_of_labels(write: Any, name: str) -> None:
         assert [list(line) for line in lines(timed(path))] == list(map(expected, case["lines"]))
     if "words" in case:
         assert [list(word) for word in words(timed(path))] == list(map(expected, case["words"]))
+    if "spans" in case:
+        spans = [[start, end if math.isfinite(end) else None, phone] for start, end, phone, _ in phones(path)]
+        assert spans == list(map(expected, case["spans"]))
     if "phones" in case:
         found = phones(path)
         assert [f"{phone}/{word.lower()}" if word else phone for *_, phone, word in found] == case["phones"].split()
         assert case.get("end", found[0][1]) in [each[1] for each in found]
 
 
+def read_both(path: Path) -> None:
+    read_labels(path)
+    read_transcript(path)
+
+
 @pytest.mark.parametrize("name", [name for name, case in LABEL_CASES.items() if "error" in case])
 def test_what_is_damaged_is_refused_with_its_place(write: Any, name: str) -> None:
     with pytest.raises(InputError, match=LABEL_CASES[name]["error"]):
-        read_transcript(write(LABEL_CASES[name]["content"]))
+        read_both(write(LABEL_CASES[name]["content"]))
 
 
 def test_some_words_have_no_time_some_share_one_and_an_end_just_before_its_start_is_its_start(read: Read) -> None:
