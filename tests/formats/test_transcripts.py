@@ -3,12 +3,9 @@ import math
 import re
 from collections.abc import Callable
 from pathlib import Path
-from string import ascii_lowercase
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from formats.examples import LABEL_CASES, timed
 from lipmotion.errors import InputError
@@ -204,37 +201,6 @@ def test_json_of_another_kind_beside_a_recording_is_passed_over(tmp_path: Path) 
     (tmp_path / "take.json").write_text('{"segments": [')
     with pytest.raises(InputError, match=r"take\.json: line 1: damaged JSON"):
         find_labels(tmp_path / "take.mp4")
-
-
-times = st.integers(0, 3_600_000).map(lambda ms: ms / 1000)
-word = st.lists(st.sampled_from(ascii_lowercase), min_size=1, max_size=12).map("".join)
-many_lines = st.lists(st.tuples(times, times, st.lists(word, min_size=1, max_size=6)), min_size=1, max_size=8)
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("transcripts")
-
-
-@given(rows=many_lines, form=st.sampled_from(["srt", "vtt", "json", "tsv"]))
-@settings(max_examples=25)
-def test_what_is_written_is_read(folder: Path, rows: list[tuple[float, float, list[str]]], form: str) -> None:
-    shortest_s = 0.2  # shorter cues that repeat the one before are the bridges of captions that scroll
-    longest_s = 10  # words that last longer are in another unit
-    spans = sorted((min(a, b), min(a, b) + min(max(abs(a - b), shortest_s), longest_s), said) for a, b, said in rows)
-    if form == "json":
-        text = json.dumps({"segments": [{"start": a, "end": b, "text": " ".join(said)} for a, b, said in spans]})
-    elif form == "tsv":
-        rounded = [f"{round(1000 * a)}\t{round(1000 * b)}\t{' '.join(said)}\n" for a, b, said in spans]
-        text = "start\tend\ttext\n" + "".join(rounded)
-    else:
-        mark = "," if form == "srt" else "."
-        cues = [f"{clock(a, mark)} --> {clock(b, mark)}\n{' '.join(said)}\n" for a, b, said in spans]
-        text = ("WEBVTT\n\n" if form == "vtt" else "") + "\n".join(cues)
-    (folder / "a").write_text(text)
-    got = [(line.start_s, [each.word for each in line.words]) for line in timed(folder / "a").lines]
-    assert [line[0] for line in got] == pytest.approx([a for a, *_ in spans], abs=1e-6)
-    assert sorted(line[1] for line in got) == sorted(said for *_, said in spans)
 
 
 def test_times_are_never_spoken(read: Read) -> None:
