@@ -9,10 +9,8 @@ from lipmotion.errors import InputError
 from lipmotion.formats import label_files, label_tiers
 from lipmotion.formats.annotations import parse_interval_tiers, write_textgrid
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import PHONES, group_words
+from lipmotion.units import group_words
 from lipmotion.units.text_normalisation import LARGEST_TRANSCRIPT_BYTES
-
-SPOKEN = [phone for phone in PHONES if phone not in ("sil", "sp")]
 
 
 @pytest.fixture

@@ -33,11 +33,6 @@ def words(transcript: TimedTranscript) -> list[tuple[str, float | None, float | 
     return [(word.word, word.start_s, word.end_s) for line in transcript.lines for word in line.words]
 
 
-def clock(time_s: float, mark: str = ",") -> str:
-    ms = round(1000 * time_s)
-    return f"{ms // 3_600_000:02}:{ms // 60_000 % 60:02}:{ms // 1000 % 60:02}{mark}{ms % 1000:03}"
-
-
 SRT = "1\n00:00:01,000 --> 00:00:02,500\nHello there!\n\n2\n00:00:02,750 --> 00:00:04,000\nHow are\nyou?\n"
 ASS = """[Script Info]
 Title: no words
