@@ -41,7 +41,6 @@ BLOCK = 512
 MARK = 0x50
 INTEL_PROCESSOR = 84  # the lowest byte first; others (DEC, MIPS) are no more
 MAX_FRAMES, OVERFLOW = 65_535, 65_536  # most frames that the header can number, and after how many it begins at 0 again
-LARGEST_FILE_BYTES = 1 << 28  # most bytes of a file that is read
 MAX_POINTS, MAX_ANALOG_CHANNELS = 2_000, 5_000
 LONGEST_LABEL_CHARACTERS = 64
 LOG = logging.getLogger("lipmotion")
@@ -86,49 +85,42 @@ class C3dFile:
 def read_c3d(path: Path) -> C3dFile:
     """Return the points of a file, and its analog channels if they have one sample a frame.
 
-    Raises InputError: not a C3D file, cut short, too large, of a processor that is not known, or sizes that disagree.
+    Raises InputError: not a C3D file, cut short, or of another processor. ValueError, IndexError, OverflowError,
+    struct.error: sizes that disagree.
     """
-    size = path.stat().st_size
-    if size > LARGEST_FILE_BYTES:
-        raise InputError(f"{size} bytes, required at most {LARGEST_FILE_BYTES}: divide the capture into takes")
-    try:
-        content = path.read_bytes()
-        if len(content) < 2 * BLOCK or content[1] != MARK:
-            raise InputError("not a C3D file: its first bytes are not those of the format; export the capture again")
-        start = (content[0] - 1) * BLOCK
-        if content[start + 3] != INTEL_PROCESSOR:
-            raise InputError(f"its processor type is {content[start + 3]}, required 84 (Intel); export the capture so")
-        parameters = _read_parameters(content, start + 4)
-        words: list[int] = _numbers(content, "u2", 10).astype(int).tolist()
-        _, points, analog, first, last, _, _, _, block, samples = words
-        rate_hz = _number(parameters, "POINT.RATE", _numbers(content, "f4", 1, 20)[0])
-        scale = _number(parameters, "POINT.SCALE", _numbers(content, "f4", 1, 12)[0])
-        if not (0 <= points <= MAX_POINTS and 0 <= analog <= MAX_ANALOG_CHANNELS and points + analog > 0):
-            raise InputError(f"{points} points and {analog} analog values a frame, required at least one of each")
-        if not 0 < rate_hz <= 1e5 or not np.isfinite(scale) or not scale:
-            raise InputError(f"the rate is {rate_hz:g} Hz and the scale {scale:g}, required positive numbers")
-        kind, width = "f4" if scale < 0 else "i2", points * 4 + analog
-        data = content[(block - 1) * BLOCK :] if block > 1 else b""
-        held, spare = len(data) // (width * int(kind[1])), BLOCK // (width * int(kind[1])) + 1
-        frames = _count_frames(parameters, last - first + 1, held, spare)
-        rows = _numbers(data, kind, frames * width).reshape(frames, width)
-        placed = rows[:, : points * 4].reshape(len(rows), points, 4)
-        places = placed[..., :3] * (1.0 if scale < 0 else scale)
-        unseen = (placed[..., 3] < 0) | ~np.isfinite(places).all(axis=2) | (places == 0).all(axis=2)
-        places[unseen] = np.nan
-        labels = [label for n in ("", "2", "3") for label in _texts(parameters, f"POINT.LABELS{n}")]
-        labels = [*labels, *(f"point{number}" for number in range(len(labels) + 1, points + 1))][:points]
-        curves = rows[:, points * 4 :] if samples == 1 else rows[:, :0]
-        count = curves.shape[1]
-        names = [*_texts(parameters, "ANALOG.LABELS"), *(f"analog{n}" for n in range(count))][:count]
-        units = [*_texts(parameters, "ANALOG.UNITS"), *[""] * count][:count]
-        unit, software = (next(iter(_texts(parameters, name)), "") for name in ("POINT.UNITS", "MANUFACTURER.SOFTWARE"))
-        exact_hz = exact_rate(float(f"{rate_hz:.7g}"), 5e-6)
-        return C3dFile(tuple(labels), places, exact_hz, unit or "mm", software, curves, tuple(names), tuple(units))
-    except InputError:
-        raise
-    except (struct.error, IndexError, ValueError, OverflowError) as error:
-        raise InputError(f"not a C3D file ({error}); export the capture again") from error
+    content = path.read_bytes()
+    if len(content) < 2 * BLOCK or content[1] != MARK:
+        raise InputError("not a C3D file: its first bytes are not those of the format; export the capture again")
+    start = (content[0] - 1) * BLOCK
+    if content[start + 3] != INTEL_PROCESSOR:
+        raise InputError(f"its processor type is {content[start + 3]}, required 84 (Intel); export the capture so")
+    parameters = _read_parameters(content, start + 4)
+    words: list[int] = _numbers(content, "u2", 10).astype(int).tolist()
+    _, points, analog, first, last, _, _, _, block, samples = words
+    rate_hz = _number(parameters, "POINT.RATE", _numbers(content, "f4", 1, 20)[0])
+    scale = _number(parameters, "POINT.SCALE", _numbers(content, "f4", 1, 12)[0])
+    if not (0 <= points <= MAX_POINTS and 0 <= analog <= MAX_ANALOG_CHANNELS and points + analog > 0):
+        raise InputError(f"{points} points and {analog} analog values a frame, required at least one of each")
+    if not 0 < rate_hz <= 1e5 or not np.isfinite(scale) or not scale:
+        raise InputError(f"the rate is {rate_hz:g} Hz and the scale {scale:g}, required positive numbers")
+    kind, width = "f4" if scale < 0 else "i2", points * 4 + analog
+    data = content[(block - 1) * BLOCK :] if block > 1 else b""
+    held, spare = len(data) // (width * int(kind[1])), BLOCK // (width * int(kind[1])) + 1
+    frames = _count_frames(parameters, last - first + 1, held, spare)
+    rows = _numbers(data, kind, frames * width).reshape(frames, width)
+    placed = rows[:, : points * 4].reshape(len(rows), points, 4)
+    places = placed[..., :3] * (1.0 if scale < 0 else scale)
+    unseen = (placed[..., 3] < 0) | ~np.isfinite(places).all(axis=2) | (places == 0).all(axis=2)
+    places[unseen] = np.nan
+    labels = [label for n in ("", "2", "3") for label in _texts(parameters, f"POINT.LABELS{n}")]
+    labels = [*labels, *(f"point{number}" for number in range(len(labels) + 1, points + 1))][:points]
+    curves = rows[:, points * 4 :] if samples == 1 else rows[:, :0]
+    count = curves.shape[1]
+    names = [*_texts(parameters, "ANALOG.LABELS"), *(f"analog{n}" for n in range(count))][:count]
+    units = [*_texts(parameters, "ANALOG.UNITS"), *[""] * count][:count]
+    unit, software = (next(iter(_texts(parameters, name)), "") for name in ("POINT.UNITS", "MANUFACTURER.SOFTWARE"))
+    exact_hz = exact_rate(float(f"{rate_hz:.7g}"), 5e-6)
+    return C3dFile(tuple(labels), places, exact_hz, unit or "mm", software, curves, tuple(names), tuple(units))
 
 
 def _count_frames(parameters: dict[str, Values], numbered: int, held: int, spare: int) -> int:
@@ -335,7 +327,7 @@ def _points(motion: Motion) -> list[int]:
     return [point for point in numbers if all(Channel(f"{axis}_{point}") in eyes for axis in "xyz")]
 
 
-MOTION_FORMAT = MotionFormat(write, read, check, min_frames=1)
+MOTION_FORMAT = MotionFormat(write, read, check, min_frames=1, max_bytes=1 << 28)
 MILLIMETRES = 90.0  # the distance between the outer eye corners of a grown person, where markers do not show it
 UNITS = {"mm": 1.0, "millimeter": 1.0, "cm": 10.0, "m": 1000.0, "meter": 1000.0, "in": 25.4, "inch": 25.4}
 """Units of length in millimetres."""
