@@ -19,8 +19,7 @@ from fuzz.worker import Worker
 
 ACCEPTED_SHARE, RECENT_SHARE = 0.7, 0.5
 """Probability that an input that was read is changed, not one that was refused; that one of the last few is."""
-STOP_AFTER = 200
-"""Hangs and crashes after which a reader is abandoned: each of them costs a new process."""
+STOP_AFTER = 200  # hangs and crashes after which a reader is abandoned: each of them costs a new process
 
 
 @dataclass

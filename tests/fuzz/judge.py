@@ -13,10 +13,8 @@ from lipmotion.cli.terminal.progress import describe_outcome
 
 READ, REFUSED = "read", "refused"
 ERROR, IMPLAUSIBLE, LEFT, MEMORY, HANG, CRASH = "error", "implausible", "left behind", "memory", "hang", "crash"
-LONGEST_LINE = 2000
-"""Most characters of an error message."""
-OBEYED = re.compile("[\x00-\x1f\x7f-\x9f]")
-"""Terminal control characters."""
+LONGEST_LINE = 2000  # most characters of an error message
+OBEYED = re.compile("[\x00-\x1f\x7f-\x9f]")  # terminal control characters
 
 
 @dataclass(frozen=True)

@@ -78,8 +78,7 @@ def busy_s(process: int) -> float:
 HANG_S = 20.0
 PATIENCE = 3
 """Factor between clock time and processor time that is allowed where other processes keep the processor busy."""
-START_S = 300.0
-"""Longest start of the process: the first import compiles kernels."""
+START_S = 300.0  # longest start of the process: the first import compiles kernels
 Readers = dict[str, Reader]
 
 
