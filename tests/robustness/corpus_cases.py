@@ -153,8 +153,6 @@ def _write_sentence_with_motion(bench: Bench, name: str = "a") -> None:
 
 
 NONE = "none of 1 recordings is usable; the first, a:"
-_recordings_case("an empty folder", 4, "no videos in it, and no sounds with motion")(lambda bench: bench)
-_recordings_case("an empty video", 4, NONE, "the file is empty")(lambda bench: (bench.folder / "a.mp4").touch())
 _recordings_case("a text named .mp4", 4, NONE, "is text, required a recording")(
     lambda bench: bench.file("a.mp4", "hello " * 500)
 )

@@ -12,11 +12,6 @@ NO_MODEL = ("not a lipmotion model", "give a file that `lipmotion train` wrote")
 DAMAGED = ("damaged", "train or download")
 
 
-def _file(name: str, content: bytes, *messages: str) -> None:
-    case(GROUP, name, 6, *messages)(lambda bench: bench.animate(None, "--model", bench.file("m.lipmotion", content)))
-
-
-_file("an empty zip", b"PK\5\6" + bytes(18), *NO_MODEL)
 case(GROUP, "cut off", 6, *NO_MODEL)(
     lambda bench: bench.animate(None, "--model", bench.file("m.lipmotion", bench.model.read_bytes()[:-99]))
 )
@@ -74,5 +69,3 @@ _changed_array("coupled: one state less", "engine/chain_0/advance", lambda a: a[
 _changed_array("coupled: rest times 1000", "engine/rest", lambda a: a * 1000, *DAMAGED, "rest pose of", of="coupled")
 LIPS = ("the eigenlips are damaged", "train the model again")
 _changed_array("eigenlips: a colour less", "eigenlips/basis", lambda a: a[:2], *LIPS, "basis of shape", of="pictured")
-case(GROUP, "a device", 3, "no such model; train one")(lambda bench: bench.animate(None, "--model", "/dev/zero"))
-case(GROUP, "info of a damaged one", 6, *NO_MODEL)(lambda bench: ["info", bench.file("m.lipmotion", "hello")])
