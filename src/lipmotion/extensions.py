@@ -28,8 +28,7 @@ GROUPS = (
 """Every group of entry points that is read."""
 PACKAGE = "lipmotion"
 OWN = {PACKAGE, "lipmotion_faces", "lipmotion_studio", "lipmotion_lab", "argparse"}
-SOURCE = "source"
-"""What stands for the version where lipmotion is not installed."""
+SOURCE = "source"  # what stands for the version where lipmotion is not installed
 
 
 def find_version() -> str:

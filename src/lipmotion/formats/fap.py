@@ -74,35 +74,32 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """Return the parameters of a file; one that is not given keeps its value. Raises InputError: not such a file."""
-    try:
-        with path.open(encoding="utf-8-sig") as file:
-            lines = (line for line in iter(partial(file.readline, LONGEST_LINE), "") if line[0] != "#" and line.strip())
-            head = next(lines, "").split()
-            if len(head) < 4 or not head[0].startswith("2."):
-                raise ValueError(f"it begins with {shorten(' '.join(head))!r}, required {VERSION} NAME FPS FRAMES")
-            rate, frames = head[-2], int(head[-1])
-            rows: list[NDArray[np.int32]] = []
-            current, used = np.zeros(COUNT, np.int32), np.zeros(COUNT, bool)
-            if not 0 < frames <= MAX_FRAMES:
-                raise ValueError(f"{frames} frames, required 1 to {MAX_FRAMES}")
-            for frame in range(frames):
-                marks, values = next(lines, "").split(), next(lines, "").split()[1:]
-                if len(marks) != COUNT or set(marks) - {"0", "1"}:
-                    raise ValueError(f"frame {frame} of {frames} has {len(marks)} marks, required {COUNT} of 0 or 1")
-                marked = [number for number, mark in enumerate(marks, 1) if mark == "1"]
-                needed = sum(MANY_VALUES.get(number, 1) for number in marked)
-                if len(values) != needed:
-                    raise ValueError(f"frame {frame} of {frames} has {len(values)} values, required {needed}")
-                skipped = sum(MANY_VALUES[number] for number in marked if number in MANY_VALUES)
-                given = [int(value) for value in values[skipped:]]
-                if max(map(abs, given), default=0) > LARGEST_VALUE:
-                    raise ValueError(f"frame {frame} has a value over {LARGEST_VALUE}")
-                current = current.copy()
-                places = [number - 1 for number in marked if number not in MANY_VALUES]
-                current[places], used[places] = given, True
-                rows.append(current)
-    except ValueError as error:
-        raise InputError(f"not a file of facial animation parameters ({error}); export it again") from error
+    with path.open(encoding="utf-8-sig") as file:
+        lines = (line for line in iter(partial(file.readline, LONGEST_LINE), "") if line[0] != "#" and line.strip())
+        head = next(lines, "").split()
+        if len(head) < 4 or not head[0].startswith("2."):
+            raise InputError(f"it begins with {shorten(' '.join(head))!r}, required {VERSION} NAME FPS FRAMES")
+        rate, frames = head[-2], int(head[-1])
+        rows: list[NDArray[np.int32]] = []
+        current, used = np.zeros(COUNT, np.int32), np.zeros(COUNT, bool)
+        if not 0 < frames <= MAX_FRAMES:
+            raise InputError(f"{frames} frames, required 1 to {MAX_FRAMES}")
+        for frame in range(frames):
+            marks, values = next(lines, "").split(), next(lines, "").split()[1:]
+            if len(marks) != COUNT or set(marks) - {"0", "1"}:
+                raise InputError(f"frame {frame} of {frames} has {len(marks)} marks, required {COUNT} of 0 or 1")
+            marked = [number for number, mark in enumerate(marks, 1) if mark == "1"]
+            needed = sum(MANY_VALUES.get(number, 1) for number in marked)
+            if len(values) != needed:
+                raise InputError(f"frame {frame} of {frames} has {len(values)} values, required {needed}")
+            skipped = sum(MANY_VALUES[number] for number in marked if number in MANY_VALUES)
+            given = [int(value) for value in values[skipped:]]
+            if max(map(abs, given), default=0) > LARGEST_VALUE:
+                raise InputError(f"frame {frame} has a value over {LARGEST_VALUE}")
+            current = current.copy()
+            places = [number - 1 for number in marked if number not in MANY_VALUES]
+            current[places], used[places] = given, True
+            rows.append(current)
     numbers = np.flatnonzero(used) + 1
     channels = tuple(Channel(NAMES.get(int(number), f"fap{number}"), FAP) for number in numbers)
     return Motion(np.stack(rows)[:, numbers - 1].astype(np.float64), exact_rate(float(rate)), channels), Timeline(())

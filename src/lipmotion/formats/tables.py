@@ -31,7 +31,6 @@ from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, T
 
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")
-
 TIME = "time_s"  # the first column
 LONGEST_S = 1e6  # largest time that is accepted: more than eleven days
 _SWAPPED = {"jawLeft": "jawRight", "jawRight": "jawLeft", "mouthLeft": "mouthRight", "mouthRight": "mouthLeft"}

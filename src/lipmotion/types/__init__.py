@@ -30,7 +30,6 @@ __all__ = [
     "check_magnitude", "frame_of", "frames_of", "from_sixteen_bits", "option", "silent_monitor", "sort_lines",
     "sub_monitor", "to_sixteen_bits", "with_progress",
 ]  # fmt: skip
-
 _MODULES = (
     *("configuration", "delivery", "audio", "timeline", "motion"),
     *("edits", "speech", "generation", "progress"),

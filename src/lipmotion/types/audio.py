@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.types.timeline import Span
 
 SPEECH_RATE_HZ = 16_000  # of all speech that is analysed
-FULL_SCALE = 32_768
-"""The 16-bit value of a sample of 1, which is one more than there is."""
+FULL_SCALE = 32_768  # the 16-bit value of a sample of 1, which is one more than there is
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +59,9 @@ class Prosody:
     log_f0: NDArray[np.floating[Any]]
 
 
-FRAME_RATE_HZ = 100.0
-"""Frames per second of all models; frame n is centred at n / FRAME_RATE_HZ seconds."""
-ENERGY_FEATURE = 12
-"""The acoustic feature that is the log energy."""
-SPECTRUM_BANDS = 40
-"""Mel bands of a spectrum, the input of acoustic networks."""
+FRAME_RATE_HZ = 100.0  # frames per second of all models; frame n is centred at n / FRAME_RATE_HZ seconds
+ENERGY_FEATURE = 12  # the acoustic feature that is the log energy
+SPECTRUM_BANDS = 40  # mel bands of a spectrum, the input of acoustic networks
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,8 +58,7 @@ CODECS = {
     **{"ts": ("mpeg2video", "yuv420p"), "y4m": ("rawvideo", "yuv420p")},
 }
 VIDEO_FRAMES = 6
-MAX_PIXELS = 1 << 26
-"""Twice those of the largest video that anybody records."""
+MAX_PIXELS = 1 << 26  # twice those of the largest video that anybody records
 
 
 def seed_video(_: Good) -> list[Files]:
@@ -104,10 +103,8 @@ def check_video(folder: Path, _: Good) -> None:
 
 
 FACE_FRAMES = 3
-FEW = slice(6)
-"""Candidates of the good face: a small file is changed in more places."""
-CODES = 1e6
-"""Largest plausible coefficient of a picture, grey levels."""
+FEW = slice(6)  # candidates of the good face: a small file is changed in more places
+CODES = 1e6  # largest plausible coefficient of a picture, grey levels
 
 
 def seed_face(_: Good) -> list[Files]:
@@ -295,8 +292,7 @@ def check_character(folder: Path, _: Good) -> None:
 
 
 NAMES, VALUES = "x_bs_name.npy", "bs_value_a.npy"
-CURVES_FRAMES, RATE_HZ = 23, 30.0
-"""As long as the short speech."""
+CURVES_FRAMES, RATE_HZ = 23, 30.0  # as long as the short speech
 
 
 def seed_curves(_: Good) -> list[Files]:
