@@ -35,8 +35,7 @@ def test_an_opening_has_the_gap_that_it_was_made_of_or_its_own():
     assert contact.read_gap(both) == pytest.approx([0.1, 0.0])
 
 
-@pytest.mark.parametrize("phone", ["p", "b", "m", "em"])
-@pytest.mark.parametrize("start_s", [0.2, 0.213, 0.227])
+@pytest.mark.parametrize(("phone", "start_s"), [("p", 0.2), ("b", 0.213), ("em", 0.227)])
 @pytest.mark.parametrize("length_s", [0.02, 0.08, 0.15])
 def test_lips_touch_once_in_every_p_b_and_m_for_longer_than_a_picture(phone, start_s, length_s):
     dip = 0.1 - 0.06 * np.exp(-(((np.arange(101) / 100 - start_s - length_s / 2) / 0.04) ** 2))

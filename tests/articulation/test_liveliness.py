@@ -6,6 +6,7 @@ from lipmotion.articulation import expression, liveliness
 from lipmotion.articulation.liveliness import compute_liveliness
 from lipmotion.articulation.mouth import EXPRESSED, ROUND_WIDTH, find_mouth
 from lipmotion.pipeline.outputs.deliver import FACTORS, deliver, with_detected, with_manners
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import Channel, Generation, Motion, Prosody, Span, Timeline, Unit, VoiceEvent
 from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
 from lipmotion.types.delivery import MANNERS, MOODS, NEUTRAL, PLAIN, Delivery, MoodKey, format_moods, parse_moods
@@ -59,11 +60,9 @@ def test_nothing_depends_on_the_frame_rate():
         assert getattr(slow, name) == pytest.approx(getattr(fast, name)[::2])
 
 
-def test_a_seed_gives_the_same_and_another_seed_something_else():
-    first, same, other = (compute_liveliness(frames(25), MINUTE, SAID, None, seed=seed) for seed in (1, 1, 2))
-    for name in CURVES:
-        assert np.array_equal(getattr(first, name), getattr(same, name))
-        assert np.abs(getattr(first, name) - getattr(other, name)).max() > 0
+def test_another_seed_gives_something_else():
+    first, other = (compute_liveliness(frames(25), MINUTE, SAID, None, seed=seed) for seed in (1, 2))
+    assert all(np.abs(getattr(first, name) - getattr(other, name)).max() > 0 for name in CURVES)
 
 
 @pytest.mark.parametrize(("part", "curve"), [("blinks", "lids"), ("brows", "brows"), ("head", "turn")])
@@ -102,24 +101,12 @@ def test_glances_are_steps_between_rests_and_of_limited_size():
     assert (np.abs(np.diff(moved.gaze[:, 0])) < 1e-6).mean() > 0.8
 
 
-def test_brows_are_level_at_rest_and_never_below():
-    brows = compute_liveliness(frames(25), MINUTE, SILENT, Prosody(np.full(6001, -30.0), np.full(6001, np.nan))).brows
-    assert brows.min() >= 0
-    assert brows.max() < 0.01
-
-
 def test_the_head_moves_slowly_and_less_in_silence():
     turn, silent = (compute_liveliness(frames(100), MINUTE, units, None).turn for units in (SAID, SILENT))
     assert np.abs(np.diff(turn, axis=0)).max() * 100 < 0.8  # radians a second
     assert 0.01 < turn.std(axis=0).max() < 0.08
     assert np.abs(turn).max() < 0.25
     assert 0 < silent.std(axis=0).max() < 0.7 * turn.std(axis=0).max()
-
-
-def test_without_time_and_phones_nothing_fails():
-    nothing = Motion(np.zeros((1, 1)), 100.0, (Channel("opening"),))
-    moved = compute_liveliness(np.zeros(1), nothing, Timeline(()), None)
-    assert len(moved.lids) == len(moved.turn) == 1
 
 
 ACTION_UNITS = {1, 2, 4, 5, 6, 7, 9, 10, 12, 14, 15, 17, 20, 23, 24, 25, 26, 43, 53, 54, 55, 56, 57, 58, 64}
@@ -133,7 +120,8 @@ PROTOTYPES = {
 
 
 def test_every_mood_has_known_action_units_with_intensities_and_sources():
-    rows = [(row["mood"], int(row["action_unit"]), row["source"]) for row in expression.list_mood_rows()]
+    table = read_shipped_table("lipmotion.articulation", "moods.csv")
+    rows = [(row["mood"], int(row["action_unit"]), row["source"]) for row in table]
     assert {mood for mood, *_ in rows} == {*MOODS}
     assert len({(mood, unit) for mood, unit, _ in rows}) == len(rows)
     assert {source for *_, source in rows} == SOURCES

@@ -222,9 +222,7 @@ def prior() -> articulation.ArticulationPrior:
     """The table in the range of the synthetic speaker."""
     some = examples()
     space, values = fit_reduced_motion(some, 3)
-    found = articulation.fit_articulation_prior(space, values, some)
-    assert found is not None
-    return found
+    return articulation.fit_articulation_prior(space, values, some)  # type: ignore[return-value]
 
 
 def test_the_table_is_in_the_speakers_own_range(prior: articulation.ArticulationPrior) -> None:
@@ -279,13 +277,6 @@ def test_contexts_are_counted_with_pauses_as_silence() -> None:
     first, *spoken, last = units
     first, last = (replace(span, label=replace(span.label, phone="sp")) for span in (first, last))
     assert articulation.count_contexts([units, Timeline((first, *spoken, last))])["sil", "t", "aa"] == 2
-
-
-def test_it_is_the_same_after_serialisation(prior: articulation.ArticulationPrior) -> None:
-    again = articulation.articulation_from_arrays(articulation.articulation_to_arrays(prior), len(prior.centre))
-    assert again.contexts == prior.contexts
-    np.testing.assert_allclose(again.matrix, prior.matrix)
-    assert articulation.articulation_from_arrays({}, 5) is None
 
 
 def test_motion_without_an_opening_has_no_table() -> None:

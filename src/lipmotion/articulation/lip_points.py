@@ -7,14 +7,13 @@ as in the names of the channels (``x_13``, ``y_13``, ``z_13``).
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import Motion
 
 UPPER_MIDDLE, LOWER_MIDDLE = 13, 14  # the middles of the inner lips; the channel ``opening`` is their distance
@@ -75,8 +74,7 @@ class MouthTemplate:
 @cache
 def build_mouth() -> MouthTemplate:
     """Return the template of the table ``lip_points.csv``."""
-    text = resources.files("lipmotion.articulation").joinpath("lip_points.csv").read_text(encoding="ascii")
-    rows = list(csv.DictReader(text.splitlines()))
+    rows = read_shipped_table("lipmotion.articulation", "lip_points.csv")
     points = tuple(int(row["point"]) for row in rows)
     return MouthTemplate(
         points,

@@ -62,23 +62,15 @@ UPPER_FACE_UNITS = {"inner": 1, "outer": 2, "lowered": 4, "wide": 5, "squint": 7
 
 
 class UpperFace(NamedTuple):
-    """What a mood does to brows, lids, cheeks and nose in one frame, each 0 to 1.
+    """What a mood does to brows, lids, cheeks and nose in one frame, each 0 to 1."""
 
-    inner, outer : the inner and the outer ends of the brows are raised
-    lowered      : the brows are lowered and drawn together
-    wide         : the upper lids are raised
-    squint       : the lids are tightened: the lower ones raised, the upper ones lowered a little
-    cheek        : the cheeks are raised
-    sneer        : the nose is wrinkled
-    """
-
-    inner: float = 0.0
-    outer: float = 0.0
-    lowered: float = 0.0
-    wide: float = 0.0
-    squint: float = 0.0
-    cheek: float = 0.0
-    sneer: float = 0.0
+    inner: float = 0.0  # the inner ends of the brows are raised
+    outer: float = 0.0  # their outer ends are raised
+    lowered: float = 0.0  # the brows are lowered and drawn together
+    wide: float = 0.0  # the upper lids are raised
+    squint: float = 0.0  # the lids are tightened: the lower ones raised, the upper ones lowered a little
+    cheek: float = 0.0  # the cheeks are raised
+    sneer: float = 0.0  # the nose is wrinkled
 
 
 CALM = UpperFace()

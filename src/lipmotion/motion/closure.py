@@ -81,30 +81,6 @@ def estimate_closed_opening(smallest: Sequence[float], *groups: NDArray[np.float
     return max(min([*middle, *bounds], default=0.0), 0.0)
 
 
-def estimate_closure(
-    values: Sequence[Array], valid: Sequence[NDArray[np.bool_]], timelines: Sequence[Timeline[Unit]], column: int
-) -> Closure:
-    """Return the closure of the lips, estimated from motion with its phones.
-
-    values    : motion in the motion space [each shape=(T, Q)]
-    valid     : the frames of each that were measured [each shape=(T,)]
-    timelines : the phones of each
-    column    : of the opening
-    ``closed`` is from ``estimate_closed_opening``, of all measured frames.
-    """
-    smallest = [
-        float(x[frames][known[frames], column].min())
-        for x, known, units in zip(values, valid, timelines, strict=True)
-        for frames in find_closable_ranges(units, len(x))
-        if known[frames].any()
-    ]
-    poses = np.concatenate([x[known] for x, known in zip(values, valid, strict=True)])
-    centred = poses - poses.mean(axis=0)
-    opening = centred[:, column]
-    closed = estimate_closed_opening(smallest, poses[:, column])
-    return Closure(column, closed, opening @ centred / max(float(opening @ opening), 1e-12))
-
-
 def choose_closed_frames(closure: Closure, opening: Array, ranges: Sequence[slice], pinned: Sequence[int]) -> list[int]:
     """Return the frames in which the lips must be made to close: the least open frame of each p, b and m.
 
@@ -122,8 +98,23 @@ def choose_closed_frames(closure: Closure, opening: Array, ranges: Sequence[slic
 
 
 def fit_closure(names: Sequence[str], values: Sequence[Array], examples: Sequence[Example]) -> Closure | None:
-    """Return the closure of the lips in motion of examples [each shape=(T, Q)]; None without a channel ``opening``."""
+    """Return the closure of the lips in motion of examples; None without a channel ``opening``.
+
+    names  : of the dimensions that are channels, the first ones of the motion space
+    values : motion of each example in the motion space [each shape=(T, Q)]
+    ``closed`` is from ``estimate_closed_opening``, of all measured frames.
+    """
     if OPENING not in names:
         return None
-    masks, timelines = [example.valid for example in examples], [example.speech.units for example in examples]
-    return estimate_closure(values, masks, timelines, names.index(OPENING))
+    column = names.index(OPENING)
+    smallest = [
+        float(x[frames][example.valid[frames], column].min())
+        for x, example in zip(values, examples, strict=True)
+        for frames in find_closable_ranges(example.speech.units, len(x))
+        if example.valid[frames].any()
+    ]
+    poses = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
+    centred = poses - poses.mean(axis=0)
+    opening = centred[:, column]
+    closed = estimate_closed_opening(smallest, poses[:, column])
+    return Closure(column, closed, opening @ centred / max(float(opening @ opening), 1e-12))

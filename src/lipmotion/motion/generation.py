@@ -166,7 +166,7 @@ class LearnedMotion:
             values, variance = self._solve_block(predicted, block_pins, block_ranges)
             self.limits.check(values, self.closure, block_pins)
             inside = slice(inner.start - outer.start, inner.stop - outer.start)
-            motion[inner], _ = space.restore(values[inside], variance[inside])
+            motion[inner] = space.restore(values[inside])
             spread[inner] = variance[inside]
         weights = [channel.unit == WEIGHT for channel in space.channels]
         motion[:, weights] = np.maximum(motion[:, weights], 0)

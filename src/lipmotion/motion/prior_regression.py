@@ -9,11 +9,10 @@ from typing import Any, ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import CorpusError, InputError, ModelFormatError
+from lipmotion.errors import CorpusError, InputError
 from lipmotion.motion.articulation import ARTICULATORS, trace_articulators
 from lipmotion.motion.network_steps import STEP, check_scale, interpolate_steps, measure_error_variances
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining, split_folds
-from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
 from lipmotion.types import SPECTRUM_BANDS, Speech
 
@@ -79,11 +78,12 @@ class EncodingRegression(Predictor):
         if speech.encoding is None:
             raise InputError("the speech has no encoding; an engine that uses one says so by ``inputs``")
         frames = len(speech.features.values)
-        return speech.cached(self, lambda: self._predict(speech, frames)), np.zeros(frames)
 
-    def _predict(self, speech: Speech, frames: int) -> Array:
-        steps = stack_encoding(speech) @ self.coefficients.astype(float) + self.centre
-        return interpolate_steps(steps, frames)
+        def follow() -> Array:
+            steps = stack_encoding(speech) @ self.coefficients.astype(float) + self.centre
+            return interpolate_steps(steps, frames)
+
+        return speech.cached(self, follow), np.zeros(frames)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Serialise the regression; the coefficients at half precision."""
@@ -188,11 +188,7 @@ class PriorRegression(Predictor):
                 predictions[number] = interpolate_steps(steps, len(values[number]))
         coefficients, centre = _solve(data, penalty)
         mean_32, scale_32, coefficients_32 = (x.astype(np.float32) for x in (mean, scale, coefficients))
-        errors = [
-            with_dynamics(x - predicted)[mark_known_dynamics(example.valid)]
-            for predicted, x, example in zip(predictions, values, examples, strict=True)
-        ]
-        variances = np.square(np.concatenate(errors)).mean(axis=0) + 1e-12
+        variances = measure_error_variances(training, predictions, spread)
         return PredictorFit(cls(sizes, mean_32, scale_32, coefficients_32, centre, variances), predictions)
 
     def can_predict(self, speech: Speech) -> bool:
@@ -206,8 +202,7 @@ class PriorRegression(Predictor):
         result = np.tile(row, (len(kinds[0]), 1))  # what the training had and this speech has not has its mean
         for kind, start, size in zip(kinds, starts, self.sizes, strict=False):
             result[:, start : start + min(size, kind.shape[1])] = kind[:, :size]
-        regressors = (result - self.mean) / self.scale
-        steps = (regressors @ self.coefficients).astype(float) + self.centre
+        steps = ((result - self.mean) / self.scale @ self.coefficients).astype(float) + self.centre
         frames = len(speech.features.values)
         distortion = speech.prior.distortion if speech.prior is not None else np.zeros(len(steps))
         outputs = interpolate_steps(np.concatenate([steps, distortion[:, None]], axis=1), frames)
@@ -226,8 +221,6 @@ class PriorRegression(Predictor):
     @classmethod
     def from_arrays(cls, arrays: Arrays, dimensions: int) -> PriorRegression:
         """Deserialise a regression; as ``Predictor.from_arrays``."""
-        if np.shape(arrays["prior_sizes"]) == (len(KINDS) - 1,):
-            raise ModelFormatError("a regression without the encoding of the sound, as of 2026-11-27; train again")
         stored = check_arrays(arrays, PRIOR_ARRAYS, Q=dimensions)
         sizes = tuple(stored["prior_sizes"].tolist())
         around = (2 * ENCODING_REACH + 1) * ENCODING_COMPONENTS

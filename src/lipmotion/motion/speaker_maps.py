@@ -5,7 +5,7 @@ Engines learn and generate the motion of the mean person; ``speaker_estimation``
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -78,45 +78,12 @@ class SpeakerMap:
         if missing:
             raise InputError(f"no map of speakers for the channel {missing[0]!r}; train the model again")
         columns = [self.channels.index(channel) for channel in channels]
-        parts = (self.gain[columns], self.offset[columns], self.rest[columns], self.habits[:, columns])
+        parts = (getattr(self, part)[..., columns] for part in PARTS)
         return SpeakerMap(tuple(channels), *parts, self.lips)
 
 
-@dataclass(frozen=True, eq=False)
-class SpeakerMaps:
-    """The maps of all S people of a model.
-
-    channels : the P channels
-    names    : of the S people
-    gain, offset, rest : as in ``SpeakerMap``, of each [each shape=(S, P)]
-    habits   : as in ``SpeakerMap``, of each, in the order of ``VISEME_NAMES`` [shape=(S, V, P)]
-    lips     : as in ``SpeakerMap``, the same for all
-    """
-
-    channels: tuple[Channel, ...]
-    names: tuple[str, ...]
-    gain: Array
-    offset: Array
-    rest: Array
-    habits: Array
-    lips: tuple[float, float]
-
-    def of(self, name: str) -> SpeakerMap:
-        """Return the map of one person. Raises InputError: a person of another name."""
-        if name not in self.names:
-            raise InputError(
-                f"the model knows no speaker {name!r}, only: {', '.join(self.names)}; give one of these, or none for "
-                "the mean person"
-            )
-        number = self.names.index(name)
-        parts = (self.gain[number], self.offset[number], self.rest[number], self.habits[number])
-        return SpeakerMap(self.channels, *parts, self.lips)
-
-    def select(self, names: Sequence[str]) -> SpeakerMaps:
-        """Return the maps of some people."""
-        rows = [self.names.index(name) for name in names]
-        parts = (self.gain[rows], self.offset[rows], self.rest[rows], self.habits[rows])
-        return SpeakerMaps(self.channels, tuple(names), *parts, self.lips)
+SpeakerMaps = Mapping[str, SpeakerMap]
+"""The maps of all people of a model by their names: of the same channels, and with the same ``lips``."""
 
 
 def measure_restfulness(units: Timeline[Unit], frames: int) -> Array:
@@ -147,9 +114,10 @@ def weigh_visemes(units: Timeline[Unit], frames: int) -> Array:
 
 def speakers_to_arrays(maps: SpeakerMaps) -> dict[str, NDArray[Any]]:
     """Serialise maps."""
-    channels = np.array([(channel.name, channel.unit) for channel in maps.channels])
-    parts = {name: getattr(maps, name) for name in ("gain", "offset", "rest", "habits")}
-    return {"channels": channels, "names": np.array(maps.names), **parts, "lips": np.array(maps.lips)}
+    people = list(maps.values())
+    channels = np.array([(channel.name, channel.unit) for channel in people[0].channels])
+    parts = {part: np.stack([getattr(person, part) for person in people]) for part in PARTS}
+    return {"channels": channels, "names": np.array(list(maps)), **parts, "lips": np.array(people[0].lips)}
 
 
 def speakers_from_arrays(arrays: Arrays) -> SpeakerMaps:
@@ -158,12 +126,12 @@ def speakers_from_arrays(arrays: Arrays) -> SpeakerMaps:
         refuse_undeclared(arrays, SPEAKERS)
         stored = check_arrays(arrays, SPEAKERS, V=len(VISEME_NAMES))
         channels = tuple(Channel(name, unit) for name, unit in stored["channels"].tolist())
-        names = tuple(stored["names"].tolist())
+        names = stored["names"].tolist()
         if len({channel.name for channel in channels}) < len(channels) or len({*names} - {""}) < len(names):
             raise ValueError("names of speakers or channels that are empty or repeat")
         closed, opened = stored["lips"].tolist()
-        parts = (stored["gain"], stored["offset"], stored["rest"], stored["habits"])
-        return SpeakerMaps(channels, names, *parts, (closed, opened))
+        people = zip(names, *(stored[part] for part in PARTS), strict=True)
+        return {name: SpeakerMap(channels, *parts, (closed, opened)) for name, *parts in people}
 
 
 SPEAKERS = {
@@ -176,6 +144,7 @@ SPEAKERS = {
     "lips": ArraySpec(np.float64, "2", 0, 1e6),
 }
 """Arrays of the maps of S speakers, P channels and V visemes."""
+PARTS = ("gain", "offset", "rest", "habits")
 
 
 def compose_maps(first: SpeakerMap | None, second: SpeakerMap) -> SpeakerMap:

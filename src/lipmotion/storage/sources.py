@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import csv
 import ctypes
 import hashlib
 import logging
@@ -14,6 +15,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -148,6 +150,12 @@ def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES, *, 
             raise InputError(f"{what} save it as UTF-8 text") from error
     LOG.warning("%s: not UTF-8; read as Windows-1252 (western Europe); save it as UTF-8 if letters are wrong", path)
     return text
+
+
+@cache
+def read_shipped_table(package: str, name: str) -> list[dict[str, str]]:
+    """Return the rows of a table that is a file of a package: fields by the names of their columns."""
+    return list(csv.DictReader(resources.files(package).joinpath(name).read_text(encoding="ascii").splitlines()))
 
 
 def check_source(path: Path, kind: str) -> None:

@@ -145,13 +145,8 @@ def score_shifts(utterance: Utterance) -> NDArray[np.float64]:
     """Return the agreement of sound and motion at every shift of up to ``REACH_S`` seconds [shape=(81,)]."""
     motion = utterance.track.motion
     predicted = predict_opening_speed(utterance.features)
-    opening, valid = resample_to_model(
-        np.asarray(motion[OPENING], float)[:, None],
-        np.asarray(utterance.track.seen),
-        motion.rate_hz,
-        len(predicted),
-        FRAME_RATE_HZ,
-    )
+    curve, seen = np.asarray(motion[OPENING], float)[:, None], np.asarray(utterance.track.seen)
+    opening, valid = resample_to_model(curve, seen, motion.rate_hz, len(predicted))
     return shift_scores(predicted, measure_opening_speed(opening[:, 0]), valid, round(REACH_S * FRAME_RATE_HZ))
 
 
