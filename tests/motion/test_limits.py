@@ -1,4 +1,5 @@
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -159,7 +160,7 @@ def test_only_frames_that_do_not_close_anyway_are_chosen():
 def test_how_closed_is_the_median_of_the_least_openings():
     one = examples(1)[0]
 
-    def fitted(x: np.ndarray, seen: np.ndarray, units: Timeline[Unit]) -> closure.Closure:
+    def fitted(x: np.ndarray, seen: np.ndarray, units: Timeline[Unit]) -> Any:
         return closure.fit_closure(
             ("opening",), [x], [replace(one, valid=seen, speech=replace(one.speech, units=units))]
         )

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -176,7 +177,8 @@ def test_its_share_depends_on_voice_recogniser_and_noise(network, voice, mean, d
     assert distortions == pytest.approx(np.full(FRAMES, distortion), rel=1e-5)
     wanted = without + share * (beside.predict(spoken)[0] - without)
     np.testing.assert_allclose(motion, wanted, rtol=0, atol=1e-6, equal_nan=False)
-    (plain, sound), (both, same) = alone.hidden(spoken), replace(alone, posterior_network=beside).hidden(spoken)
+    hidden: Any = [each.hidden(spoken) for each in (alone, replace(alone, posterior_network=beside))]
+    (plain, sound), (both, same) = hidden
     wanted = np.concatenate([plain, beside.hidden_units(posteriors(0), len(plain))], axis=1)
     np.testing.assert_allclose(both, wanted, rtol=1e-6, equal_nan=False)
     np.testing.assert_allclose(same, sound, rtol=1e-6, equal_nan=False)

@@ -79,8 +79,10 @@ def map_to_mean_person(examples: Sequence[Example], speakers: Sequence[str]) -> 
     shut = float(closed.mean())
     wide = float(np.mean([person.range[column] for person in people])) if column is not None else 0.0
     habits, lips = np.zeros((len(VISEME_NAMES), len(channels))), (shut, shut + FULL_HABIT_SHARE * wide)
-    parts = zip(names, gain, offset, rest, strict=True)
-    maps = {name: SpeakerMap(channels, *of_person, habits, lips) for name, *of_person in parts}
+    maps = {
+        name: SpeakerMap(channels, gain[number], offset[number], rest[number], habits, lips)
+        for number, name in enumerate(names)
+    }
     mapped = []
     for example, speaker in zip(examples, speakers, strict=True):
         motion = example.motion

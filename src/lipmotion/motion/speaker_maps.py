@@ -6,7 +6,7 @@ Engines learn and generate the motion of the mean person; ``speaker_estimation``
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -78,8 +78,8 @@ class SpeakerMap:
         if missing:
             raise InputError(f"no map of speakers for the channel {missing[0]!r}; train the model again")
         columns = [self.channels.index(channel) for channel in channels]
-        parts = (getattr(self, part)[..., columns] for part in PARTS)
-        return SpeakerMap(tuple(channels), *parts, self.lips)
+        parts = {part: getattr(self, part)[..., columns] for part in PARTS}
+        return replace(self, channels=tuple(channels), **parts)
 
 
 SpeakerMaps = Mapping[str, SpeakerMap]
@@ -130,8 +130,9 @@ def speakers_from_arrays(arrays: Arrays) -> SpeakerMaps:
         if len({channel.name for channel in channels}) < len(channels) or len({*names} - {""}) < len(names):
             raise ValueError("names of speakers or channels that are empty or repeat")
         closed, opened = stored["lips"].tolist()
-        people = zip(names, *(stored[part] for part in PARTS), strict=True)
-        return {name: SpeakerMap(channels, *parts, (closed, opened)) for name, *parts in people}
+        people = [{part: stored[part][number] for part in PARTS} for number in range(len(names))]
+        maps = (SpeakerMap(channels, **parts, lips=(closed, opened)) for parts in people)
+        return dict(zip(names, maps, strict=True))
 
 
 SPEAKERS = {

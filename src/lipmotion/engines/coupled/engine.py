@@ -227,7 +227,7 @@ def _list_channel_values(
     values, variance = (np.zeros((1, space.dimensions)) for _ in range(2))
     values[:, stream.columns], variance[:, stream.columns] = means, variances
     motion, deviations = space.restore(values)[0].tolist(), np.sqrt(variance @ space.mixing)[0].tolist()
-    missing = np.delete(space.mixing, stream.columns, axis=0).any(axis=0)  # channels of other streams
+    missing = np.asarray(np.delete(space.mixing, stream.columns, axis=0).max(axis=0, initial=0) > 0)  # of other streams
     channels = zip(space.channels, motion, deviations, missing.tolist(), strict=True)
     return {channel.name: ChannelValue(value, deviation) for channel, value, deviation, gone in channels if not gone}
 
