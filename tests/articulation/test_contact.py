@@ -91,9 +91,3 @@ def test_pictures_show_every_contact_and_no_other():
                 near = (time_s > (first - 1) / 100 - 0.5 / fps) & (time_s < stop / 100 + 0.5 / fps)
                 assert shown[near].any()
     assert contact.sample_pictures(gap, gap == 0, 100.0, np.arange(120) / 100) == pytest.approx(gap)
-
-
-def test_pictures_of_no_contact_and_of_nothing_but_contact():
-    rows = np.arange(10.0)
-    for touching in (np.zeros(10, bool), np.ones(10, bool)):
-        assert contact.sample_pictures(rows, touching, 100.0, np.array([0.0, 0.04, 0.08])) == pytest.approx([0, 4, 8])

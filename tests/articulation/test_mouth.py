@@ -47,13 +47,6 @@ def test_width_is_as_measured_but_not_without_end():
     assert 1 - WIDTH_REACH <= width[90] < 0.72
 
 
-def test_the_opening_alone_is_enough():
-    mouth = find_mouth(motion(opening=[0, 0.1, 0.3]), NOTHING_SAID)
-    assert mouth.width[0] == mouth.fullness[0] == 1
-    assert mouth.width[2] < mouth.width[1] < 1
-    assert mouth.jaw == pytest.approx(measure_jaw_drop(mouth.gap))
-
-
 def test_the_tracked_chin_moves_the_jaw_within_reason():
     opening = np.r_[np.zeros(20), np.full(60, 0.1)]
     chin = np.r_[np.full(20, -1.4), np.full(20, -1.475), np.full(20, -1.4), np.full(20, -2.0)]

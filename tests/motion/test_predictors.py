@@ -255,13 +255,6 @@ def test_predictions_in_cross_validation_are_not_those_of_the_training() -> None
     assert held_out > inside
 
 
-def test_a_useless_prior_is_left_out() -> None:
-    examples, values = zip(*(standing(seed, noise=100.0) for seed in range(4)), strict=True)
-    regression, _ = PriorRegression.fit(PredictorTraining(examples, values, 2))
-    one, motion = standing(50, noise=100.0)
-    assert np.square(regression.predict(one.speech)[0] - motion).mean() < 1.3 * motion.var(axis=0).mean()
-
-
 def test_folds_part_all_examples() -> None:
     for count in (1, 2, 5, 9):
         assert sorted([number for _, out in split_folds(count) for number in out]) == list(range(count))
