@@ -28,8 +28,7 @@ CLEARANCE = 4
 """A pixel is interpolated from neighbours at distance s only where the edge of the region is further away than this
 times s. At least 3, the reach of the interpolation. With 4 the error for noise of grey levels is below 1 grey level;
 with 5 it is a third of that, at a quarter more time (docs/results/video.md)."""
-LEVELS = 4
-"""The pixels of the widest grid are 2 to this power apart, px."""
+LEVELS = 4  # the pixels of the widest grid are 2 to this power apart, px
 TAPS = ((-3, -1 / 16), (-1, 9 / 16), (1, 9 / 16), (3, -1 / 16))
 """Offset, in spacings of the grid that is filled, and weight of the four neighbours of cubic interpolation."""
 
@@ -154,10 +153,8 @@ Mask = NDArray[np.bool_]
 Pictures = NDArray[np.uint8] | NDArray[np.floating[Any]]
 
 COLOURS = 3
-LARGEST_EDGE = 2048
-"""Largest number of pixels on the edge of a region; the matrix grows with its square, to 100 MB."""
-CHUNK = 1 << 17
-"""About the number of pixels that are interpolated at once: what fits into the cache of a processor."""
+LARGEST_EDGE = 2048  # largest number of pixels on the edge of a region; the matrix grows with its square, to 100 MB
+CHUNK = 1 << 17  # about the number of pixels that are interpolated at once: what fits into the cache of a processor
 BATCH = 64
 
 

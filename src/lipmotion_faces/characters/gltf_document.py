@@ -37,10 +37,8 @@ from lipmotion_faces.characters.file_limits import ALLOWANCE, Budget
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 COMPRESSIONS = {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"}
-LARGEST_NUMBER = 1e9
-"""Largest plausible number of a file: a place, a factor."""
-MAX_GROUPS = 8
-"""Most groups of four joints a vertex."""
+LARGEST_NUMBER = 1e9  # largest plausible number of a file: a place, a factor
+MAX_GROUPS = 8  # most groups of four joints a vertex
 _LISTS = (
     *("accessors", "animations", "buffers", "bufferViews", "images", "materials", "meshes", "nodes", "scenes", "skins"),
     "textures",
@@ -50,8 +48,7 @@ _NAME = if_fits(text(1000))
 _WORD = text(1000)
 _SIZE = whole(0, _LARGEST_INTEGER)
 _NUMBER = number(-LARGEST_NUMBER, LARGEST_NUMBER)
-ASSET = members({"asset": members({"version": text(20)}, ["version"])}, ["asset"])
-"""What a document of any version has."""
+ASSET = members({"asset": members({"version": text(20)}, ["version"])}, ["asset"])  # what a document of any version has
 
 
 _ANY_NUMBER = whole(-_LARGEST_INTEGER, _LARGEST_INTEGER)
@@ -373,8 +370,7 @@ class GltfArrays:
 
 
 Matrix = NDArray[np.float64]
-DEEPEST_NESTING = 256
-"""Most levels of nodes."""
+DEEPEST_NESTING = 256  # most levels of nodes
 
 
 @dataclass(frozen=True, eq=False)

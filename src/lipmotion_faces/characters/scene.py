@@ -16,8 +16,7 @@ from lipmotion_faces.characters.surface import build_surface, compute_normals, d
 
 Array = NDArray[np.float64]
 
-MIN_TURN = 1e-3
-"""Normals that a blendshape turns by less than this are left out of it."""
+MIN_TURN = 1e-3  # normals that a blendshape turns by less than this are left out of it
 
 
 @dataclass(frozen=True, eq=False)

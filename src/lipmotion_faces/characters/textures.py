@@ -14,15 +14,11 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.model.mesh import Texture
 from lipmotion_faces.characters.file_limits import Budget
 
-MAX_BYTES = 400_000_000
-"""Most bytes that decoding a picture may take: a larger one is not looked at."""
-MAX_SCANS = 100
-"""Most passes over a JPEG; each takes as long as a picture."""
-DIRECT = {"RGB", "L"}
-"""Modes of pictures that are reduced as they are; all others get an opacity first."""
+MAX_BYTES = 400_000_000  # most bytes that decoding a picture may take: a larger one is not looked at
+MAX_SCANS = 100  # most passes over a JPEG; each takes as long as a picture
+DIRECT = {"RGB", "L"}  # modes of pictures that are reduced as they are; all others get an opacity first
 PICTURES = ("PNG", "JPEG", "WEBP")
-MAX_COLUMNS = 1024
-"""Textures are reduced to this many pixels across: a head of 720 rows shows no more."""
+MAX_COLUMNS = 1024  # textures are reduced to this many pixels across: a head of 720 rows shows no more
 FULL_SCALE = 65535
 
 

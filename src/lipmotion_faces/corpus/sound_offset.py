@@ -17,8 +17,7 @@ from lipmotion.types import Audio, Features
 
 Array = NDArray[np.float64]
 
-MIN_OVERLAP_SHARE = 0.5
-"""Share of the shorter recording that the other one must cover, where levels are compared."""
+MIN_OVERLAP_SHARE = 0.5  # share of the shorter recording that the other one must cover, where levels are compared
 MIN_LEVEL_CORRELATION, MIN_MARGIN, PEAK_S = 0.5, 0.1, 0.25
 """Least correlation of levels at which the sounds tell their offset, by how much it must exceed all others, and how far
 from the best an offset is another one."""
@@ -113,8 +112,7 @@ def _cut(samples: NDArray[np.float32], begin: int, end: int) -> Array:
 
 STATIC_FEATURES = 13
 """The first columns of the features, which are used: c1–c12 and log energy; their context holds the deltas."""
-FRAME_OFFSETS = tuple(range(-15, 16, 3))
-"""The context of a frame, in frames from it: 150 ms before and after."""
+FRAME_OFFSETS = tuple(range(-15, 16, 3))  # the context of a frame, in frames from it: 150 ms before and after
 WEIGHTS = "lip-speed.json"
 
 

@@ -80,8 +80,7 @@ def filter_videos(paths: Iterable[Path]) -> list[Path]:
 
 
 LISTS = tuple(f"{split}.txt" for split in SPLITS)
-LARGEST_LIST_BYTES = 1 << 24
-"""Most bytes of a list of names."""
+LARGEST_LIST_BYTES = 1 << 24  # most bytes of a list of names
 MAX_MISSING_NAMES = 20_000
 """Names without a recording that are reported one by one; more of them mean a list of another folder."""
 

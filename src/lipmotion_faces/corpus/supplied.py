@@ -28,8 +28,7 @@ DIGESTS = ("sha256", "motion_sha256", "phones_sha256", "recorder_sha256")
 CURVES_MARGIN_S, CURVES_MARGIN_SHARE = 0.5, 0.02
 """Largest difference of duration between curves and sound: seconds, or share of the sound. It is larger where the frame
 rate of the curves is wrong."""
-PHONES_MARGIN_S = 0.1
-"""Seconds by which labels may end after the sound; labelling programs round times."""
+PHONES_MARGIN_S = 0.1  # seconds by which labels may end after the sound; labelling programs round times
 
 
 def digest_sources(recording: SourceRecording) -> dict[str, str]:
@@ -125,8 +124,7 @@ def _contain_speech(spans: Iterable[Span[Unit]]) -> bool:
 
 
 GIVEN, ALIKE = "as given", "found by the sound of both"
-MIN_SHARED_S = 0.5
-"""Shortest time that sound and motion must share."""
+MIN_SHARED_S = 0.5  # shortest time that sound and motion must share
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,8 +22,7 @@ Array = NDArray[np.float64]
 
 FORMAT, VERSION = "lipmotion.face", 1
 SUFFIX = ".face"
-FULL_SCALE = 32767
-"""Full scale of the stored sound."""
+FULL_SCALE = 32767  # full scale of the stored sound
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,8 +185,7 @@ def _read_background(arrays: schema.Arrays) -> StoredBackground:
     return StoredBackground(video, maps, stored["chin_px"], tuple(cuts.tolist()))
 
 
-MIN_DETERMINANT = 1e-6
-"""A map with a smaller determinant has no inverse."""
+MIN_DETERMINANT = 1e-6  # a map with a smaller determinant has no inverse
 
 
 def _take(arrays: schema.Arrays, channels: tuple[Channel, ...]) -> SpokenTake:

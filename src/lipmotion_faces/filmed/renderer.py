@@ -22,13 +22,10 @@ Floats = NDArray[np.float32]
 Picture = NDArray[np.uint8]
 Pictures = NDArray[np.uint8]
 
-BATCH = 16
-"""Frames in memory at a time, at one sample a pixel; fewer of larger faces."""
-FEATHER_PX = 6.0
-"""Width of the seam, px of the face."""
+BATCH = 16  # frames in memory at a time, at one sample a pixel; fewer of larger faces
+FEATHER_PX = 6.0  # width of the seam, px of the face
 
-LARGEST_DIFFERENCE = 20.0
-"""Differences on the edge of the jaw above this are no difference of light, grey levels."""
+LARGEST_DIFFERENCE = 20.0  # differences on the edge of the jaw above this are no difference of light, grey levels
 
 
 @dataclass(frozen=True)

@@ -36,14 +36,11 @@ from lipmotion_faces.outputs.drawn_video import check_drawable
 
 GLTF, USD, FBX = ".glb", ".usda", ".fbx"
 SCENE_SUFFIXES = (GLTF, USD, FBX)
-FBX_RATE_HZ = 60
-"""Frames a second of ``.fbx``, which are whole numbers; fewer where fewer keys are asked for."""
-ANIMATED_SUFFIXES = (GLTF, ".vrm")
-"""Suffixes of files of characters that are kept as they are, with an animation more."""
+FBX_RATE_HZ = 60  # frames a second of ``.fbx``, which are whole numbers; fewer where fewer keys are asked for
+ANIMATED_SUFFIXES = (GLTF, ".vrm")  # suffixes of files of characters that are kept as they are, with an animation more
 MARGIN, MOUTH_MARGIN = 10, 50
 """Frames before and after those that are wanted alone, within which weights settle, and the mouth."""
-METRES = 0.09
-"""The distance between the outer eye corners of the 3D head, in metres."""
+METRES = 0.09  # the distance between the outer eye corners of the 3D head, in metres
 
 
 class SceneOutput(Output):

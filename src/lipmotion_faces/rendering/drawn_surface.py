@@ -195,13 +195,10 @@ class TexturedCanvas:
 
 Rows = NDArray[np.int64]
 
-MIN_OPACITY = 0.5
-"""Parts without texture that are clearer than this are not drawn: shells around eyes."""
-SCATTER = (0.3, 0.2, 0.15)
-"""How far red, green and blue light reach round into the shade, as in skin."""
+MIN_OPACITY = 0.5  # parts without texture that are clearer than this are not drawn: shells around eyes
+SCATTER = (0.3, 0.2, 0.15)  # how far red, green and blue light reach round into the shade, as in skin
 FARTHEST_UV = 1e4
-EMPTY = 3
-"""The kind of triangles whose texture is clear all over: they are left out."""
+EMPTY = 3  # the kind of triangles whose texture is clear all over: they are left out
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,10 +51,8 @@ WHOLE = VideoSpan()
 SEEK_MARGIN_S = 1.0
 """Decoding starts at the key frame before the span by this much: containers that seek by the time of decoding are late
 by the pictures that wait for others."""
-ROUNDING_S = 1e-4
-"""A picture belongs to a span that begins this much later: times of the container are whole ticks."""
-SHORT_S = 0.5
-"""Pictures that end more than this before the stated duration are reported."""
+ROUNDING_S = 1e-4  # a picture belongs to a span that begins this much later: times of the container are whole ticks
+SHORT_S = 0.5  # pictures that end more than this before the stated duration are reported
 MIN_SIDE_PX, LONGEST_SIDE_PX = 16, 8192
 """Bounds of a picture's width and height, px: a smaller one shows no face, a larger one fills the memory."""
 
