@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.liveliness import find_phrases
 from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.paths import find_segments
+from lipmotion.motion.closure import frames_within
 from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import CurveEdit, Generation, Hold, Motion, Span, Timeline, Unit
 from lipmotion.types.edits import Locked
@@ -219,8 +220,7 @@ def _hold_costs(cost: Array, edits: Sequence[CurveEdit], fps: float) -> Array:
 
 def _find_least_open_s(span: Span[Unit], motion: Motion) -> float:
     """Return the time in a phone at which the mouth is least open; without an opening, the middle of the phone."""
-    first, last = np.ceil(span.start_s * motion.rate_hz - 1e-6), np.floor(span.end_s * motion.rate_hz + 1e-6)
-    first, stop = int(max(first, 0)), int(min(last + 1, len(motion.values)))
+    first, stop = frames_within(span.start_s, span.end_s, motion.rate_hz, len(motion.values))
     if "opening" not in motion.names or first >= stop:
         return max((span.start_s + span.end_s) / 2, 0.0)
     return float((first + int(motion["opening"][first:stop].argmin())) / motion.rate_hz + 1e-9)

@@ -315,18 +315,14 @@ where phones cannot be relied on at all, and where they can. The general network
 class UnseenSpeaker:
     """What is changed in the motion of a voice that training does not know; precisions stay those of the model.
 
-    prior       : the table of articulation
-    units       : phones in time, in T frames
-    reliability : of the phones in time, 0 to 1 [shape=(T,)]
-    voice       : how well training knows the voice, 0 to 1; at 1 it only follows the sound in noise
     Every method takes and returns a function that returns means and precisions of a range of frames.
     """
 
-    prior: ArticulationPrior
-    units: Timeline[Unit]
+    prior: ArticulationPrior  # the table of articulation
+    units: Timeline[Unit]  # phones in time, in T frames
     frames: int
-    reliability: Array | float
-    voice: float
+    reliability: Array | float  # of the phones in time, 0 to 1 [shape=(T,)]
+    voice: float  # how well training knows the voice, 0 to 1; at 1 it only follows the sound in noise
 
     def follow_sound(self, statistics: Predict, articulators: Array) -> Predict:
         """Draw motion in and near speech towards articulators that the general network hears [shape=(T, 8)]."""

@@ -45,6 +45,13 @@ def clip_at_zero(motion: Motion) -> None:
     motion.values[:, bounded] = np.maximum(motion.values[:, bounded], 0)
 
 
+def frames_within(start_s: float, end_s: float, rate_hz: float, frames: int) -> tuple[int, int]:
+    """Return the first frame in a time, both ends included, and the one after the last; cut to so many frames."""
+    first = max(int(np.ceil(start_s * rate_hz - 1e-6)), 0)
+    stop = min(int(np.floor(end_s * rate_hz + 1e-6)) + 1, frames)
+    return first, stop
+
+
 def find_closable_ranges(
     units: Timeline[Unit], frames: int, closing_units: Container[str] = (), reach_s: float = REACH_S
 ) -> list[slice]:
@@ -60,8 +67,7 @@ def find_closable_ranges(
         label = span.label
         if closing or (not label.phone and label.unit in closing_units):
             inside_s = min(-reach_s, span.duration_s / 2)
-            first = max(int(np.ceil((span.start_s + inside_s) * FRAME_RATE_HZ - 1e-6)), 0)
-            stop = min(int(np.floor((span.end_s - inside_s) * FRAME_RATE_HZ + 1e-6)) + 1, frames)
+            first, stop = frames_within(span.start_s + inside_s, span.end_s - inside_s, FRAME_RATE_HZ, frames)
             stop = max(stop, min(first + 1, frames)) if reach_s < 0 else stop
             if first < stop:
                 ranges.append(slice(first, stop))

@@ -95,16 +95,11 @@ def cut_random_piece(sequence: TrainingSequence, rng: np.random.Generator) -> Tr
 
 @dataclass(frozen=True)
 class NetworkShape(ABC, Generic[NetworkT]):
-    """Shape of a network, and how it is trained and stored.
+    """Shape of a network, and how it is trained and stored."""
 
-    prefix : of the names of its arrays in a model file
-    name   : in messages and of its checkpoint
-    inputs : values of a time step
-    """
-
-    prefix: str
-    name: str
-    inputs: int
+    prefix: str  # of the names of its arrays in a model file
+    name: str  # in messages and of its checkpoint
+    inputs: int  # values of a time step
 
     @property
     def specs(self) -> dict[str, ArraySpec]:

@@ -25,16 +25,11 @@ RIDGE = 0.01
 @final
 @dataclass(frozen=True, eq=False)
 class EncodingRegression(Predictor):
-    """Linear regression of motion on the encoding of the sound from 200 ms before a frame to 200 ms after it.
+    """Linear regression of motion on the encoding of the sound from 200 ms before a frame to 200 ms after it."""
 
-    coefficients : float32 array [shape=(704, Q)]
-    centre       : the motion where all regressors are 0 [shape=(Q,)]
-    variances    : of the error of static value, Δ and Δ² in training [shape=(3, Q)]
-    """
-
-    coefficients: NDArray[np.float32]
-    centre: Array
-    variances: Array
+    coefficients: NDArray[np.float32]  # float32 array [shape=(704, Q)]
+    centre: Array  # the motion where all regressors are 0 [shape=(Q,)]
+    variances: Array  # of the error of static value, Δ and Δ² in training [shape=(3, Q)]
     name: ClassVar[str] = "encoding"
     needs: ClassVar[str] = "encoding"
     ARRAYS: ClassVar[Mapping[str, ArraySpec]] = {
@@ -46,21 +41,18 @@ class EncodingRegression(Predictor):
     @classmethod
     def fit(cls, training: PredictorTraining) -> PredictorFit:
         """Return the regression. Raises CorpusError: an example without encoding."""
-        products = targets = 0.0
         rows: list[tuple[Array, Array]] = []
         for example, values in zip(training.examples, training.values, strict=True):
             if example.speech.encoding is None:
                 raise CorpusError("examples without encoding, which the predictor encoding needs")
-            steps = np.arange(0, len(values), STEP)
-            steps = steps[example.valid[steps]]
-            rows.append((stack_encoding(example.speech)[steps // STEP], values[steps]))
+            measured = example.valid[::STEP]
+            rows.append((stack_encoding(example.speech)[measured], values[::STEP][measured]))
         count = sum(len(x) for x, _ in rows)
         if not count:
             raise CorpusError("no frame with measured motion; train on recordings with a face")
-        mean = sum(x.sum(axis=0) for x, _ in rows) / count
-        centre = sum(y.sum(axis=0) for _, y in rows) / count
-        for x, y in rows:
-            products, targets = products + (x - mean).T @ (x - mean), targets + (x - mean).T @ (y - centre)
+        mean, centre = (sum(each.sum(axis=0) for each in arrays) / count for arrays in zip(*rows, strict=True))
+        products = sum((x - mean).T @ (x - mean) for x, _ in rows)
+        targets = sum((x - mean).T @ (y - centre) for x, y in rows)
         penalty = RIDGE * np.trace(products) / len(mean)
         coefficients = np.linalg.solve(products + penalty * np.eye(len(mean)), targets)
         if 0 < training.direct < len(centre):  # jaw and points go with lips as they do in the training

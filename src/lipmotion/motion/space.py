@@ -20,16 +20,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class MotionSpace:
-    """The dimensions of motion in a model: distances as they are, points reduced to principal components.
+    """The dimensions of motion in a model: distances as they are, points reduced to principal components."""
 
-    channels : the P channels of the motion
-    direct   : int array [shape=(P',)], columns of the channels that are modelled as they are
-    points   : principal components of all other channels, K of them (None: there are no others); Q = P' + K
-    """
-
-    channels: tuple[Channel, ...]
-    direct: NDArray[np.intp]
-    points: Pca | None
+    channels: tuple[Channel, ...]  # the P channels of the motion
+    direct: NDArray[np.intp]  # int array [shape=(P',)], columns of the channels that are modelled as they are
+    points: Pca | None  # principal components of all other channels, K of them (None: there are no others); Q = P' + K
 
     @property
     def direct_names(self) -> tuple[str, ...]:

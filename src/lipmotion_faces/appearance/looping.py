@@ -33,18 +33,12 @@ place of the face, px of the frame: smaller differences are not seen."""
 
 @dataclass(frozen=True, eq=False)
 class FrameDescriptors:
-    """What T frames look like, in levels of green.
+    """What T frames look like, in levels of green."""
 
-    whole : thumbnails of the whole frame; the cells of the lower face are 0 in all of them [shape=(T, A)]
-    face  : the upper face, aligned [shape=(T, B)]
-    eyes  : the eyes, aligned [shape=(T, C)]
-    place : x and then y of the eye corners and the mouth in the frame, px [shape=(T, 6)]
-    """
-
-    whole: Array
-    face: Array
-    eyes: Array
-    place: Array
+    whole: Array  # thumbnails of the whole frame; the cells of the lower face are 0 in all of them [shape=(T, A)]
+    face: Array  # the upper face, aligned [shape=(T, B)]
+    eyes: Array  # the eyes, aligned [shape=(T, C)]
+    place: Array  # x and then y of the eye corners and the mouth in the frame, px [shape=(T, 6)]
 
     def __len__(self) -> int:
         return len(self.whole)

@@ -42,13 +42,10 @@ class NestedGrids:
     grid every pixel of the region is a node. For a function that satisfies the Laplace equation this loses little: the
     further from the edge, the smoother it is.
     Source: the adaptive grid of Agarwala 2007, with cubic instead of linear interpolation.
-
-    region : bool array [shape=(H, W)]
-    nodes  : of each grid, finest first: numbers of the pixels of the picture, counted row by row
     """
 
-    region: NDArray[np.bool_]
-    nodes: tuple[Index, ...]
+    region: NDArray[np.bool_]  # bool array [shape=(H, W)]
+    nodes: tuple[Index, ...]  # of each grid, finest first: numbers of the pixels of the picture, counted row by row
 
     def shape(self, level: int) -> tuple[int, int]:
         """Return the number of rows and columns of a grid."""

@@ -173,18 +173,13 @@ extensions are accepted as well."""
 
 @dataclass(frozen=True, eq=False)
 class GltfDocument:
-    """The JSON of a glTF file, and its buffers.
-
-    parts   : what is used of it, of the types and in the ranges of ``build_schema``
-    budget  : what has been read so far
-    buffers : by number
-    """
+    """The JSON of a glTF file, and its buffers."""
 
     json: dict[str, Any]
-    parts: Mapping[str, Any]
+    parts: Mapping[str, Any]  # what is used of it, of the types and in the ranges of ``build_schema``
     folder: Path
-    budget: Budget
-    buffers: dict[int, memoryview] = field(default_factory=dict)
+    budget: Budget  # what has been read so far
+    buffers: dict[int, memoryview] = field(default_factory=dict)  # by number
 
     def get(self, name: str) -> list[dict[str, Any]]:
         """Return a list of objects of the document; none if it is missing."""

@@ -55,16 +55,11 @@ def read_texture(content: bytes | memoryview, budget: Budget | None = None) -> T
 
 @dataclass(frozen=True, eq=False)
 class TextureTable:
-    """Some textures, each reduced by half again and again, down to one pixel, in one array.
+    """Some textures, each reduced by half again and again, down to one pixel, in one array."""
 
-    texels : reflected light and opacity, 0 to 65535 [shape=(N, 4)]
-    levels : first texel, width and height of every reduction [shape=(L, 3)]
-    first  : the row of ``levels`` that is each texture in full; the following rows are its reductions
-    """
-
-    texels: NDArray[np.uint16]
-    levels: NDArray[np.int64]
-    first: tuple[int, ...]
+    texels: NDArray[np.uint16]  # reflected light and opacity, 0 to 65535 [shape=(N, 4)]
+    levels: NDArray[np.int64]  # first texel, width and height of every reduction [shape=(L, 3)]
+    first: tuple[int, ...]  # the row of ``levels`` that is each texture in full; the following rows are its reductions
 
     def pick(self, texture: int, in_texture: NDArray[np.float64], on_screen: NDArray[np.float64]) -> NDArray[np.int32]:
         """Return the row of ``levels`` that suits triangles, by areas in texture and on screen [each shape=(F,)]."""

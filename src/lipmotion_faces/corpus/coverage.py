@@ -39,17 +39,12 @@ class MissingUnit:
 
 @dataclass(frozen=True)
 class KindCoverage:
-    """The coverage of the sequences of one length.
-
-    needed  : how many different ones the text needs
-    covered : how many of these the corpus has
-    share   : of the text that these cover, 0 to 1: each counts as often as the text needs it
-    """
+    """The coverage of the sequences of one length."""
 
     kind: str
-    needed: int
-    covered: int
-    share: float
+    needed: int  # how many different ones the text needs
+    covered: int  # how many of these the corpus has
+    share: float  # of the text that these cover, 0 to 1: each counts as often as the text needs it
     missing: tuple[MissingUnit, ...]
 
 

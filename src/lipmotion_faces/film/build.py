@@ -41,19 +41,14 @@ RIGHTS = ("licence", "attribution")  # what is kept of the rights of a recording
 
 @dataclass(frozen=True)
 class Take:
-    """One recording of a person.
-
-    collection : the folder that it is in, by its last two names
-    speaker    : name of the person; empty where it is not known
-    rights     : licence and attribution, where known
-    """
+    """One recording of a person."""
 
     name: str
     file: Path
     span: VideoSpan
-    collection: str
-    speaker: str
-    rights: tuple[tuple[str, str], ...]
+    collection: str  # the folder that it is in, by its last two names
+    speaker: str  # name of the person; empty where it is not known
+    rights: tuple[tuple[str, str], ...]  # licence and attribution, where known
 
 
 def choose_takes(source: Path, recordings: Path | None = None, speaker: str = "") -> list[Take]:

@@ -27,18 +27,12 @@ FULL_SCALE = 32767  # full scale of the stored sound
 
 @dataclass(frozen=True, eq=False)
 class StoredBackground:
-    """A background sequence: footage of the person, with the place of the face in every frame.
+    """A background sequence: footage of the person, with the place of the face in every frame."""
 
-    video         : T frames, of even height and width
-    face_to_frame : affine maps from px of the face to px of the frame [shape=(T, 2, 3)]
-    chin_px       : how far the tip of the chin is below the eyes in each frame, px of the face [shape=(T,)]
-    cuts          : frames at which another part of the footage begins, rising
-    """
-
-    video: StoredVideo
-    face_to_frame: Array
-    chin_px: Array
-    cuts: tuple[int, ...] = ()
+    video: StoredVideo  # T frames, of even height and width
+    face_to_frame: Array  # affine maps from px of the face to px of the frame [shape=(T, 2, 3)]
+    chin_px: Array  # how far the tip of the chin is below the eyes in each frame, px of the face [shape=(T,)]
+    cuts: tuple[int, ...] = ()  # frames at which another part of the footage begins, rising
 
 
 @dataclass(frozen=True, eq=False)

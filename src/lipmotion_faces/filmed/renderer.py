@@ -30,17 +30,12 @@ LARGEST_DIFFERENCE = 20.0  # differences on the edge of the jaw above this are n
 
 @dataclass(frozen=True)
 class Background:
-    """One frame of footage.
-
-    face_to_frame : affine map from px of the face to px of the frame [shape=(2, 3)]
-    chin_px       : how far the tip of the chin is below the eyes, px of the face
-    has_face      : whether the person is seen; False: the frame stays as it is
-    """
+    """One frame of footage."""
 
     frame: Picture
-    face_to_frame: Array
-    chin_px: float
-    has_face: bool = True
+    face_to_frame: Array  # affine map from px of the face to px of the frame [shape=(2, 3)]
+    chin_px: float  # how far the tip of the chin is below the eyes, px of the face
+    has_face: bool = True  # whether the person is seen; False: the frame stays as it is
 
 
 @dataclass(frozen=True)

@@ -17,21 +17,15 @@ Triangles = NDArray[np.int32]
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A surface that keeps its form.
-
-    places    : of its vertices at rest [shape=(V, 3)];  normals : of length 1 [shape=(V, 3)]
-    triangles : counterclockwise from outside [shape=(F, 3)]
-    colours   : diffuse reflection, linear [shape=(V, 3)]
-    strands   : directions of hair [shape=(V, 3)], or None
-    """
+    """A surface that keeps its form."""
 
     name: str
-    places: Real
-    triangles: Triangles
-    colours: Real
+    places: Real  # of its vertices at rest [shape=(V, 3)];  normals : of length 1 [shape=(V, 3)]
+    triangles: Triangles  # counterclockwise from outside [shape=(F, 3)]
+    colours: Real  # diffuse reflection, linear [shape=(V, 3)]
     finish: Finish
     normals: Real
-    strands: Real | None = None
+    strands: Real | None = None  # directions of hair [shape=(V, 3)], or None
 
     def mirror(self, name: str) -> Part:
         """Return the same part on the other side of the face."""

@@ -220,18 +220,13 @@ NECK_TOP, NECK_END = 1.15, 1.85  # between these heights the movement of the hea
 
 
 class HeadPlacement(NamedTuple):
-    """Where the head is: shifts in eye distances, to the right and down; angles in radians.
-
-    roll  : to the speaker's left shoulder, clockwise in the picture
-    yaw   : features move to the right against the outline of the head
-    pitch : features move down against it: nodding
-    """
+    """Where the head is: shifts in eye distances, to the right and down; angles in radians."""
 
     x: float = 0.0
     y: float = 0.0
-    roll: float = 0.0
-    yaw: float = 0.0
-    pitch: float = 0.0
+    roll: float = 0.0  # to the speaker's left shoulder, clockwise in the picture
+    yaw: float = 0.0  # features move to the right against the outline of the head
+    pitch: float = 0.0  # features move down against it: nodding
 
 
 class SkinField:

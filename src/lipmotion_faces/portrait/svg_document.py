@@ -320,17 +320,13 @@ class _Group(NamedTuple):
 
 @dataclass
 class _DrawingReader:
-    """Takes the elements of one drawing as the parser finds them.
-
-    depth   : of elements that are open
-    passed  : depth of the element that is passed over with all in it; 0: none
-    """
+    """Takes the elements of one drawing as the parser finds them."""
 
     box: tuple[float, float, float, float] | None = None
     shapes: list[tuple[tuple[str, ...], Shape]] = field(default_factory=list)
     groups: list[_Group] = field(default_factory=list)
-    depth: int = 0
-    passed: int = 0
+    depth: int = 0  # of elements that are open
+    passed: int = 0  # depth of the element that is passed over with all in it; 0: none
     elements: int = 0
     points: int = 0
     covered: float = 0.0

@@ -26,17 +26,12 @@ class VideoFrame:
 
 @dataclass(frozen=True, eq=False)
 class OpenVideo:
-    """An open video.
-
-    stated_rates_hz : the frame rates that the container states, the most reliable first
-    stated_s        : the duration that the container states, 0 if none
-    damage          : a reason for every packet or picture that was left out so far
-    """
+    """An open video."""
 
     frames: Iterator[VideoFrame]
-    stated_rates_hz: tuple[float, ...]
-    stated_s: float
-    damage: list[str]
+    stated_rates_hz: tuple[float, ...]  # the frame rates that the container states, the most reliable first
+    stated_s: float  # the duration that the container states, 0 if none
+    damage: list[str]  # a reason for every packet or picture that was left out so far
 
 
 @dataclass(frozen=True)
