@@ -7,7 +7,7 @@ import pytest
 from lipmotion import FilmedFace, types
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion_faces.appearance import candidates, lower_face, motion_map
-from lipmotion_faces.appearance.person import EDGE_PX, JAW_CANDIDATES, Appearance, FootagePictures, learn_appearance
+from lipmotion_faces.appearance.person import JAW_CANDIDATES, Appearance, FootagePictures, learn_appearance
 from pipeline.damage import DAMAGES, UNREADABLE, damaged
 from testing.toy import toy_motion, toy_sentences
 from testing.toy_face import NOISE, SHAPE, toy_chin_px, toy_footage_pictures, toy_lower_faces
@@ -108,18 +108,6 @@ def test_a_jaw_of_sound_is_the_least_squares_line_of_its_level(
     assert appearance.from_sound[:, -1] == pytest.approx([start, slope], rel=0.01)
 
 
-def test_jaws_differ_in_the_jaw_alone(appearance: Appearance) -> None:
-    """Their mouth is the mean one, and so is what is further away from the jaw than cloning reads."""
-    same = (appearance.jaws == appearance.jaws[0]).all(axis=(0, 3))
-    inside = lower_face.mark_replaced(SHAPE, 1)
-    assert same[lower_face.mark_mouth(1)].all()
-    assert not same[inside & ~lower_face.mark_mouth(1)].any()
-    rows, columns = np.nonzero(~same)
-    reach = np.nonzero(inside)
-    for found, wanted in ((rows, reach[0]), (columns, reach[1])):
-        assert (found.min(), found.max()) == (wanted.min() - EDGE_PX, wanted.max() + EDGE_PX)
-
-
 @pytest.mark.parametrize(
     ("wrong", "counts"),
     [("motion", "266 pictures, 265 .*266 of"), ("levels_db", "266 pictures, 266 .*265 of"), ("clips", "0 pictures")],
@@ -189,16 +177,6 @@ def test_far_from_all_footage_it_is_as_at_its_edge(fitted: motion_map.MotionMap)
         assert (predicted > wanted.min(axis=0) - margin).all()
         assert (predicted < wanted.max(axis=0) + margin).all()
         assert fitted.predict(motion(further)) == pytest.approx(predicted, abs=1e-4)
-
-
-def test_short_footage_is_trusted_less(fitted: motion_map.MotionMap) -> None:
-    """What footage does not say is the mean picture: coefficients shrink as frames become few."""
-    sizes = []
-    for frames in (30, 300, FRAMES):
-        values, wanted = poses(frames), pictured(poses(frames))
-        found = fitted if frames == FRAMES else motion_map.fit_motion_map(values, CHANNELS, wanted)
-        sizes.append((found.predict(motion(values)).std(axis=0)[:3] / wanted.std(axis=0)[:3]).mean())
-    assert sizes[0] < 0.6 < sizes[1] < sizes[2] < 1.01
 
 
 def test_motion_that_cannot_be_learned_from() -> None:

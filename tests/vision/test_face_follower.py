@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lipmotion_faces.tracking import face_follower, mediapipe, trackers
 from lipmotion_faces.tracking import face_follower as follow
-from vision.scripted import Opened
+from vision.scripted import Opened, StandIn
 
 HEIGHT, WIDTH = 240, 320
 EYES = [trackers.TRACKED_POINTS.index(index) for index in trackers.EYE_CORNERS]
@@ -58,17 +58,10 @@ class Finder(Opened):
         return [trackers.FaceBox(x, y, 2 * unit, 0.9) for _, x, y, unit in Mesh.shown]
 
 
-class Shown(trackers.LandmarkTracker):
+class Shown(StandIn):
     """Finds the faces of the frame that is being shown."""
 
-    def list_versions(self) -> dict[str, str]:
-        return {}
-
-    def open_point_finder(self, most: int = 1) -> Mesh:
-        return Mesh(most)
-
-    def open_box_finder(self) -> Finder:
-        return Finder()
+    mesh, finder = Mesh, Finder
 
 
 class SmallMesh:

@@ -80,14 +80,6 @@ def ramp(width: int, height: int) -> np.ndarray:
     return image
 
 
-def test_the_eyes_of_the_turned_head_become_level():
-    angle = np.deg2rad(20)
-    half = 45 * np.array([np.cos(angle), np.sin(angle)])
-    crop = head_pose.crop_mouth(ramp(256, 200), head_pose.map_eyes(np.array([130, 80]) + np.stack([-half, half])))
-    along = np.diff(crop[28].astype(int), axis=0).mean(axis=0)
-    np.testing.assert_allclose(along[:2], [np.cos(angle), np.sin(angle)], atol=0.03)
-
-
 def nodding(frames: int = 12) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """A head that nods, turns and comes nearer while it speaks: points in its own frame, then where it is."""
     column = {index: n for n, index in enumerate(trackers.TRACKED_POINTS)}
