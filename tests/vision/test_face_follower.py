@@ -35,8 +35,7 @@ def points(face: Face) -> NDArray[np.float64]:
     return found
 
 
-SMALL_FACE_PX = 40
-"""A face with a smaller distance between the eyes is found by the detector alone."""
+SMALL_FACE_PX = 40  # a face with a smaller distance between the eyes is found by the detector alone
 
 
 class Mesh(Opened):

@@ -19,8 +19,7 @@ from vision.variants import write_frames
 OPENINGS = 0.1 + 0.05 * np.sin(np.arange(20) / 3)
 MOVES = np.stack([0.5 * np.arange(20), np.sin(np.arange(20) / 4), np.zeros(20)], axis=1)
 FACES = [face(opening) + move for opening, move in zip(OPENINGS, MOVES, strict=True)]
-JUMP_PX = 90
-"""More than a face of 60 px between the eyes moves from frame to frame."""
+JUMP_PX = 90  # more than a face of 60 px between the eyes moves from frame to frame
 
 
 def levels(frames) -> list[int]:

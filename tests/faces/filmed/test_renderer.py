@@ -13,8 +13,7 @@ from lipmotion_faces.filmed.renderer import BATCH, Background, Stitcher, Stitchi
 from testing.toy import toy_motion, toy_sentences
 from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, toy_chin_px, toy_frames, toy_places
 
-FRAMES = 24
-"""More than one batch."""
+FRAMES = 24  # more than one batch
 MOUTH_ALONE = StitchingOptions(jaw=False)
 
 

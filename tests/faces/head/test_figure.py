@@ -162,8 +162,7 @@ def test_closed_lips_are_those_of_the_rest_pose(mesh: Mesh) -> None:
     assert np.abs(change[:, 0] - change[:, 1]).max() < 1e-6
 
 
-MEET, FRONT = 4, 15
-"""The point of the cross-section where the lips meet, and the rings before the wall of the mouth."""
+MEET, FRONT = 4, 15  # the point of the cross-section where the lips meet, and the rings before the wall of the mouth
 PAIRS = [(k, COLUMNS - k) for k in range(1, 40)]
 """Columns of the upper lip, and the column of the lower lip at the same place."""
 SHARES = st.floats(0, 1)
