@@ -27,22 +27,17 @@ FACING = ((13, 14), (82, 87), (312, 317), (81, 178), (311, 402))
 
 @dataclass(frozen=True, eq=False)
 class MouthTemplate:
-    """Lip and jaw points at rest.
+    """Lip and jaw points at rest."""
 
-    points   : numbers of the 52 points, in the order of the rows
-    places   : [shape=(52, 3)], eye distances
-    upper, lower, corner, jaw, inner : which rows are what [shape=(52,), bool]; a corner is neither upper nor lower
-    mirrored : the row of the point on the other side [shape=(52,)]
-    """
-
-    points: tuple[int, ...]
-    places: NDArray[np.float64]
+    points: tuple[int, ...]  # numbers of the 52 points, in the order of the rows
+    places: NDArray[np.float64]  # [shape=(52, 3)], eye distances
+    # which rows are what [each shape=(52,)]; a corner is neither upper nor lower
     upper: NDArray[np.bool_]
     lower: NDArray[np.bool_]
     corner: NDArray[np.bool_]
     jaw: NDArray[np.bool_]
     inner: NDArray[np.bool_]
-    mirrored: NDArray[np.int64]
+    mirrored: NDArray[np.int64]  # the row of the point on the other side [shape=(52,)]
 
     def row(self, point: int) -> int:
         """Return the row of a point."""

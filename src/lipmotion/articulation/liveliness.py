@@ -78,24 +78,16 @@ CALM = UpperFace()
 
 @dataclass(frozen=True, eq=False)
 class Liveliness:
-    """Movements beside the mouth's, in F frames.
+    """Movements beside the mouth's, in F frames; all of them follow from ``given``, where that says it."""
 
-    lids  : how far the eyes are closed, 0 to 1 [shape=(F,)]
-    brows : how far the brows are raised, in eye distances [shape=(F,)]
-    gaze  : of the eyes against the head, to the character's left and upwards, in radians [shape=(F, 2)]
-    turn  : of the head to its left, upwards and to its left shoulder, in radians [shape=(F, 3)]
-    units : what a mood does to brows, lids, cheeks and nose: those action units of
-            ``UPPER_FACE_UNITS`` that it asks for, 0 to 1 [each shape=(F,)]; where blendshapes are given, also 12 and
-            15, the corners of the lips
-    given : weights that the motion itself has for blendshapes beside the mouth, by ARKit's names, 0 to 1
-            [each shape=(F,)]; all of the above follows from them, where they say it
-    """
-
-    lids: Curve
-    brows: Curve
-    gaze: Curve
-    turn: Curve
+    lids: Curve  # how far the eyes are closed, 0 to 1 [shape=(F,)]
+    brows: Curve  # how far the brows are raised, in eye distances [shape=(F,)]
+    gaze: Curve  # of the eyes against the head, to the character's left and upwards, in radians [shape=(F, 2)]
+    turn: Curve  # of the head to its left, upwards and to its left shoulder, in radians [shape=(F, 3)]
+    # what a mood does to brows, lids, cheeks and nose: its action units of ``UPPER_FACE_UNITS``, 0 to 1
+    # [each shape=(F,)]; where blendshapes are given, also 12 and 15, the corners of the lips
     units: Mapping[int, Curve] = field(default_factory=dict)
+    # weights that the motion itself has for blendshapes beside the mouth, by ARKit's names, 0 to 1 [each shape=(F,)]
     given: Mapping[str, Curve] = field(default_factory=dict)
 
     @property

@@ -59,33 +59,23 @@ DRAWN = ("opening", "width", "outer", "y_152", *GESTURES)  # the channels of mot
 
 @dataclass(frozen=True, eq=False)
 class SpokenMouth:
-    """The mouth in F frames; each curve has the shape (F,).
+    """The mouth in F frames; each curve has the shape (F,)."""
 
-    rate_hz    : frames per second; frame n is at ``n / rate_hz`` seconds
-    gap        : distance between the inner lips; 0 where they touch, else at least ``contact.MIN_GAP``
-    width      : distance of the lip corners, relative to the rest pose
-    fullness   : thickness of the lips, relative to the rest pose
-    jaw        : drop of the chin
-    tongue, tuck, protrusion, spread, press, teeth : the articulatory channels, 0 to 1 (docs/articulation.md)
-    pursed     : how far protruded lips leave only a small hole, as in w, 0 to 1
-    oval       : how far the opening is tall and narrow, as in aa, 0 to 1
-    smile, frown, stretched, upper_raise, chin_raise, tight : what a mood does to corners, lips and chin, 0 to 1, as
-                 far as the phones leave it free (``articulation.expression``)
-    """
-
-    rate_hz: float
-    gap: Curve
-    width: Curve
-    fullness: Curve
-    jaw: Curve
+    rate_hz: float  # frames per second; frame n is at ``n / rate_hz`` seconds
+    gap: Curve  # distance between the inner lips; 0 where they touch, else at least ``contact.MIN_GAP``
+    width: Curve  # distance of the lip corners, relative to the rest pose
+    fullness: Curve  # thickness of the lips, relative to the rest pose
+    jaw: Curve  # drop of the chin
+    # the articulatory channels, 0 to 1 (docs/articulation.md)
     tongue: Curve
     tuck: Curve
     protrusion: Curve
     spread: Curve
     press: Curve
     teeth: Curve
-    pursed: Curve
-    oval: Curve
+    pursed: Curve  # how far protruded lips leave only a small hole, as in w, 0 to 1
+    oval: Curve  # how far the opening is tall and narrow, as in aa, 0 to 1
+    # what a mood does to corners, lips and chin, 0 to 1, as far as phones leave it free (``articulation.expression``)
     smile: Curve
     frown: Curve
     stretched: Curve

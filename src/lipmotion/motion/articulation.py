@@ -60,20 +60,13 @@ HALF_FAMILIAR_COUNT = 1.0  # occurrences in training after which a context count
 
 @dataclass(frozen=True, eq=False)
 class ArticulationPrior:
-    """The table of articulations in the range of one speaker, for phones in contexts that training saw little of.
+    """The table of articulations in the range of one speaker, for phones in contexts that training saw little of."""
 
-    centre   : the pose of which the table gives deviations: the median in speech [shape=(Q,)]
-    matrix   : change of the motion space with each articulator, per standard deviation of the speaker [shape=(8, Q)]
-    contexts : occurrences in training of each phone between its neighbours; pauses count as silence
-    weight   : of the table beside a model's own means, in a context that training never saw
-    known_voice_share : share of that weight for a voice that training knows
-    """
-
-    centre: Array
-    matrix: Array
-    contexts: Mapping[Context, int]
-    weight: float = TABLE_WEIGHT
-    known_voice_share: float = 1.0
+    centre: Array  # the pose of which the table gives deviations: the median in speech [shape=(Q,)]
+    matrix: Array  # change of the motion space with each articulator, per deviation of the speaker [shape=(8, Q)]
+    contexts: Mapping[Context, int]  # occurrences in training of each phone between its neighbours
+    weight: float = TABLE_WEIGHT  # beside a model's own means, in a context that training never saw
+    known_voice_share: float = 1.0  # share of that weight for a voice that training knows
 
     def familiarity(self, units: Timeline[Unit], frames: int) -> Array:
         """Return how well training knows each phone between its neighbours, and rest, 0 to 1 [shape=(frames,)]."""

@@ -22,16 +22,11 @@ anything."""
 
 @dataclass(frozen=True, eq=False)
 class Closure:
-    """The opening of closed lips, and how the other dimensions of motion change with the opening.
+    """The opening of closed lips, and how the other dimensions of motion change with the opening."""
 
-    column : of the opening in the motion space
-    closed : the opening at which the lips touch, as the tracker measures it, in eye distances
-    follow : float array [shape=(Q,)], change of each dimension per unit of opening (regression through the mean)
-    """
-
-    column: int
-    closed: float
-    follow: NDArray[np.float64]
+    column: int  # of the opening in the motion space
+    closed: float  # the opening at which the lips touch, as the tracker measures it, in eye distances
+    follow: NDArray[np.float64]  # change of each dimension per unit of opening (regression) [shape=(Q,)]
 
 
 def is_never_negative(channel: Channel) -> bool:

@@ -74,25 +74,16 @@ TARGETS = {
 @final
 @dataclass(frozen=True, eq=False)
 class PosteriorNetwork(Predictor):
-    """A network from posteriors and spectra to motion.
+    """A network from posteriors and spectra to motion."""
 
-    network     : its outputs are Q standardised dimensions of motion
-    mean, basis : of the logarithms of the posteriors [shape=(K,)], and from them to the inputs [shape=(K, 120)]
-    centre, scale : mean and standard deviation of the motion in training [each shape=(Q,)]
-    variances   : of the error of static value, Δ and Δ² in training [shape=(3, Q)]
-    source      : name, version and digest of the phone recogniser (``TokenPosteriors.source``)
-    recurrent   : for voices that training knows, from the same inputs to the same outputs (None: an example of the
-                  training had no spectrum, or the model is an earlier one)
-    """
-
-    network: ConvolutionalNetwork
-    mean: NDArray[np.float32]
-    basis: NDArray[np.float32]
-    centre: Array
-    scale: Array
-    variances: Array
-    source: str
-    recurrent: RecurrentNetwork | None = None
+    network: ConvolutionalNetwork  # its outputs are Q standardised dimensions of motion
+    mean: NDArray[np.float32]  # of the logarithms of the posteriors [shape=(K,)]
+    basis: NDArray[np.float32]  # from them to the inputs [shape=(K, 120)]
+    centre: Array  # mean of the motion in training [shape=(Q,)]
+    scale: Array  # its standard deviation [shape=(Q,)]
+    variances: Array  # of the error of static value, Δ and Δ² in training [shape=(3, Q)]
+    source: str  # name, version and digest of the phone recogniser (``TokenPosteriors.source``)
+    recurrent: RecurrentNetwork | None = None  # for known voices; None: an example had no spectrum
     name: ClassVar[str] = "posteriors"
     needs: ClassVar[str] = "posteriors"
     ARRAYS: ClassVar[Mapping[str, ArraySpec]] = SHAPE.specs | TARGETS | RECURRENT.specs

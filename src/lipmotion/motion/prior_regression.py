@@ -131,21 +131,14 @@ PRIOR_ARRAYS = {
 @final
 @dataclass(frozen=True, eq=False)
 class PriorRegression(Predictor):
-    """Ridge regression of motion on the output of another model (``Speech.prior``), the phones, and the sound.
+    """Ridge regression of motion on the output of another model (``Speech.prior``), the phones, and the sound."""
 
-    sizes        : number of regressors of each of ``KINDS``
-    mean, scale  : of the regressors [each shape=(R,)]
-    coefficients : float32 array [shape=(704, Q)]
-    centre       : mean of the motion [shape=(Q,)]
-    variances    : of the error of static value, Δ and Δ², in cross-validation [shape=(3, Q)]
-    """
-
-    sizes: tuple[int, ...]
-    mean: NDArray[np.float32]
-    scale: NDArray[np.float32]
-    coefficients: NDArray[np.float32]
-    centre: Array
-    variances: Array
+    sizes: tuple[int, ...]  # number of regressors of each of ``KINDS``
+    mean: NDArray[np.float32]  # of the regressors [shape=(R,)]
+    scale: NDArray[np.float32]  # their standard deviation [shape=(R,)]
+    coefficients: NDArray[np.float32]  # [shape=(R, Q)]
+    centre: Array  # mean of the motion [shape=(Q,)]
+    variances: Array  # of the error of static value, Δ and Δ², in cross-validation [shape=(3, Q)]
     name: ClassVar[str] = "prior"
     ARRAYS: ClassVar[Mapping[str, ArraySpec]] = PRIOR_ARRAYS
     uses_prior: ClassVar[bool] = True

@@ -31,22 +31,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class SpeakerMap:
-    """The map from the mean person's motion to one person's: ``offset + gain · motion``, and ``rest`` in silence.
+    """The map from the mean person's motion to one person's: ``offset + gain · motion``, and ``rest`` in silence."""
 
-    channels : the P channels
-    gain     : the person's range as a multiple of the mean person's [shape=(P,)]
-    offset   : in the units of the channels [shape=(P,)]
-    rest     : what is added in silence away from speech, so that rest pose maps onto rest pose [shape=(P,)]
-    habits   : how the mean person's poses in each of the V visemes are changed before they are mapped [shape=(V, P)]
-    lips     : openings of the mean person's lips up to which habits do not show, and from which on they do wholly
-    """
-
-    channels: tuple[Channel, ...]
-    gain: Array
-    offset: Array
-    rest: Array
-    habits: Array
-    lips: tuple[float, float]
+    channels: tuple[Channel, ...]  # the P channels
+    gain: Array  # the person's range as a multiple of the mean person's [shape=(P,)]
+    offset: Array  # in the units of the channels [shape=(P,)]
+    rest: Array  # what is added in silence away from speech, so that rest pose maps onto rest pose [shape=(P,)]
+    habits: Array  # how poses in each of the V visemes are changed before they are mapped [shape=(V, P)]
+    lips: tuple[float, float]  # the mean person's openings up to which habits do not show, and from which on wholly
 
     def shift(self, values: NDArray[np.floating[Any]], visemes: Array) -> Array:
         """Return by how much the mean person's poses are changed by this person's habits [shape=(T, P)].
