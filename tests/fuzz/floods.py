@@ -7,11 +7,10 @@ import zlib
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from PIL import Image
 
 from fuzz.inputs import Files
-from meshes.gltf import document, glb, packed_attributes, textured_document
+from meshes.gltf import document, glb, textured_document
 from robustness.motion_cases import GOOD
 
 Change = Callable[[dict[str, Any]], None]
@@ -88,18 +87,6 @@ def _expressions(binds: int) -> Change:
         content["extensions"] = {"VRMC_vrm": {"expressions": {"custom": custom}}}
 
     return change
-
-
-def _packed(count: int, mode: str, stride: int) -> Files:
-    """Return a view of many elements in few bytes."""
-    extra = packed_attributes(np.zeros((4, 12), np.uint8)) if mode == "ATTRIBUTES" else b"\xe1" + b"\0" * 40
-
-    def change(content: dict[str, Any]) -> None:
-        place = {"buffer": 0, "byteOffset": content["buffers"][0]["byteLength"], "byteLength": len(extra)}
-        packed = place | {"mode": mode, "count": count, "byteStride": stride}
-        content["bufferViews"][0]["extensions"] = {"EXT_meshopt_compression": packed}
-
-    return _gltf(change, extra)
 
 
 def _png(width: int, height: int, colour: int = 6, bits: int = 8) -> bytes:
@@ -179,9 +166,6 @@ CHARACTER_FLOODS: dict[str, Callable[[], Files]] = {
     "too many vertices without bytes": lambda: _gltf(_zeros(10**9)),
     "100,000 binds": lambda: _gltf(_expressions(100_000)),
     "9,000 binds": lambda: _gltf(_expressions(9_000)),
-    "compressed zeros": lambda: _packed(4_000_000, "ATTRIBUTES", 12),
-    "too many compressed zeros": lambda: _packed(500_000_000, "ATTRIBUTES", 12),
-    "compressed triangles": lambda: _packed(12_000_000, "TRIANGLES", 4),
     "a picture of 8192 by 8192": lambda: _pictured(_png(8192, 8192, 2)),
     "20 textures of one picture": lambda: _pictured(_png(8192, 8192, 2), 20),
     "20 pictures of 8192 by 8192": lambda: _pictured(_png(8192, 8192, 2), 20, copies=True),

@@ -10,8 +10,10 @@ import logging
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from itertools import pairwise
 from statistics import median
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,8 @@ from numpy.typing import NDArray
 from lipmotion.articulation.liveliness import find_phrases
 from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.paths import find_segments
+from lipmotion.motion.closure import frames_within
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import CurveEdit, Generation, Hold, Motion, Span, Timeline, Unit
 from lipmotion.types.edits import Locked
 from lipmotion.types.values import parse_clock, parse_number
@@ -111,8 +115,7 @@ def list_frame_shapes(sheet: CueSheet) -> list[str]:
     return shapes
 
 
-@dataclass(frozen=True)
-class PhoneShapes:
+class PhoneShapes(NamedTuple):
     """The shapes that suit a share of a phone's duration: those that suit best, and those that are acceptable."""
 
     share: float
@@ -120,41 +123,23 @@ class PhoneShapes:
     allowed: str = ""
 
 
-_PHONE_SHAPES: tuple[tuple[str, tuple[PhoneShapes, ...]], ...] = (
-    ("sil sp", (PhoneShapes(1, "X", "A"),)),
-    ("p b m", (PhoneShapes(1, "A"),)),
-    ("em", (PhoneShapes(0.4, "BC", "E"), PhoneShapes(0.6, "A"))),
-    ("f v", (PhoneShapes(1, "G"),)),
-    ("l el", (PhoneShapes(1, "H", "BCE"),)),
-    ("w", (PhoneShapes(1, "F", "E"),)),
-    ("uw uh", (PhoneShapes(1, "F", "E"),)),
-    ("ow", (PhoneShapes(0.6, "E", "CF"), PhoneShapes(0.4, "F", "E"))),
-    ("ao", (PhoneShapes(1, "E", "CD"),)),
-    ("oy", (PhoneShapes(0.6, "E", "C"), PhoneShapes(0.4, "B", "C"))),
-    ("er axr", (PhoneShapes(1, "E", "BC"),)),
-    ("aa", (PhoneShapes(1, "D"),)),
-    ("ay", (PhoneShapes(0.6, "D", "C"), PhoneShapes(0.4, "B", "C"))),
-    ("aw", (PhoneShapes(0.6, "D", "C"), PhoneShapes(0.4, "E", "F"))),
-    ("ae eh ah", (PhoneShapes(1, "C", "D"),)),
-    ("ey", (PhoneShapes(0.6, "C", "BD"), PhoneShapes(0.4, "B", "C"))),
-    ("iy ih ix ax y", (PhoneShapes(1, "B", "C"),)),
-    ("r", (PhoneShapes(1, "BE", "F"),)),
-    ("sh zh ch jh", (PhoneShapes(1, "BF", "E"),)),
-    ("s z t d th dh", (PhoneShapes(1, "B", "CEF"),)),
-    ("n en k g ng", (PhoneShapes(1, "B", "CEF"),)),
-)
-PHONE_SHAPES: dict[str, tuple[PhoneShapes, ...]] = {
-    phone: looks for phones, looks in _PHONE_SHAPES for phone in phones.split()
-}
-ANY_OPEN: tuple[PhoneShapes, ...] = (PhoneShapes(1, "BCDEF"),)
-"""For hh and phones of another inventory: the motion alone decides, the lips stay open."""
-ANY_SHAPE: tuple[PhoneShapes, ...] = (PhoneShapes(1, "ABCDEF"),)
-"""For speech without known phones: the motion alone decides, also whether the lips are open."""
+@cache
+def read_phone_shapes() -> dict[str, list[PhoneShapes]]:
+    """Return the table ``phone_shapes.csv``: the shapes that suit each part of a phone, one after the other."""
+    shapes: dict[str, list[PhoneShapes]] = {}
+    for row in read_shipped_table("lipmotion.articulation", "phone_shapes.csv"):
+        for phone in row["phones"].split():
+            shapes.setdefault(phone, []).append(PhoneShapes(float(row["share"]), row["best"], row["allowed"]))
+    return shapes
 
 
-def list_phone_shapes(phone: str) -> tuple[PhoneShapes, ...]:
-    """Return the shapes that suit each part of a phone; an empty text stands for an unknown phone."""
-    return PHONE_SHAPES.get(phone, ANY_OPEN) if phone else ANY_SHAPE
+def list_phone_shapes(phone: str) -> list[PhoneShapes]:
+    """Return the shapes that suit each part of a phone.
+
+    For hh and phones of another inventory the motion alone decides, and the lips stay open; where no phone is known
+    (empty), it also decides whether they are open.
+    """
+    return read_phone_shapes().get(phone, [PhoneShapes(1, "BCDEF" if phone else "ABCDEF")])
 
 
 COST_RATE_HZ = 24.0
@@ -235,8 +220,7 @@ def _hold_costs(cost: Array, edits: Sequence[CurveEdit], fps: float) -> Array:
 
 def _find_least_open_s(span: Span[Unit], motion: Motion) -> float:
     """Return the time in a phone at which the mouth is least open; without an opening, the middle of the phone."""
-    first, last = np.ceil(span.start_s * motion.rate_hz - 1e-6), np.floor(span.end_s * motion.rate_hz + 1e-6)
-    first, stop = int(max(first, 0)), int(min(last + 1, len(motion.values)))
+    first, stop = frames_within(span.start_s, span.end_s, motion.rate_hz, len(motion.values))
     if "opening" not in motion.names or first >= stop:
         return max((span.start_s + span.end_s) / 2, 0.0)
     return float((first + int(motion["opening"][first:stop].argmin())) / motion.rate_hz + 1e-9)
@@ -319,14 +303,14 @@ def choose_cues(
     return replace(sheet, words=Timeline(tuple(span for span in group_words(generation.units) if span.label)))
 
 
-_OCULUS = "sil:X PP:A FF:G TH:B DD:B kk:B CH:B SS:B nn:B RR:B aa:D E:C ih:B oh:E ou:F I:B O:E U:F"
-_FLEMING_DOBBS = "mbp:A nltdr:B fv:G th:B gk:B sh:F o:E ehsz:C aa:D iy:B rest:X"
-FLEMING_DOBBS = dict(pair.split(":") for pair in _FLEMING_DOBBS.split())
+FLEMING_DOBBS = {"mbp": "A", "fv": "G", "sh": "F", "o": "E", "ehsz": "C", "aa": "D", "rest": REST}
+FLEMING_DOBBS |= dict.fromkeys(("nltdr", "th", "gk", "iy"), "B")
 PHONES = {"rest": REST, "hh": "C"} | {
-    f"{phone}{stress}": parts[0].best[0] for phone, parts in PHONE_SHAPES.items() for stress in ("", 0, 1, 2)
+    f"{phone}{stress}": parts[0].best[0] for phone, parts in read_phone_shapes().items() for stress in ("", 0, 1, 2)
 }
 """Shapes by the names of other sets, for which Moho and Papagayo have switches."""
-OCULUS = {name.lower(): shape for name, _, shape in (pair.partition(":") for pair in _OCULUS.split())}
+OCULUS = {"sil": REST, "pp": "A", "ff": "G", "aa": "D", "e": "C", "oh": "E", "o": "E", "ou": "F", "u": "F"}
+OCULUS |= dict.fromkeys("th dd kk ch ss nn rr ih i".split(), "B")
 """Shapes by the names of Meta's 15 visemes (``viseme_PP``), old and new."""
 PREFIX = "viseme_"
 CHARTS = (BLAIR, LETTERS, FLEMING_DOBBS, OCULUS, PHONES)

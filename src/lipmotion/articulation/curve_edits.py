@@ -145,18 +145,12 @@ def weigh_edits(time_s: Curve, edits: Sequence[CurveEdit]) -> Curve:
 
 
 class MotionStretch(NamedTuple):
-    """Motion of N frames that takes the place of other motion.
-
-    frames   : which these are, at 100 Hz
-    share    : how far it takes its place, 0 to 1 [shape=(N, 1)]
-    values   : of all P channels [shape=(N, P)]
-    variance : [shape=(N, P)]
-    """
+    """Motion of N frames at 100 Hz that takes the place of other motion."""
 
     frames: slice
-    share: Curve
-    values: NDArray[np.floating[Any]]
-    variance: NDArray[np.floating[Any]]
+    share: Curve  # how far it takes its place, 0 to 1 [shape=(N, 1)]
+    values: NDArray[np.floating[Any]]  # of all P channels [shape=(N, P)]
+    variance: NDArray[np.floating[Any]]  # [shape=(N, P)]
 
 
 def cut_locked_stretch(generation: Generation, start_s: float, end_s: float) -> MotionStretch:

@@ -152,6 +152,12 @@ def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES, *, 
     return text
 
 
+@cache
+def read_shipped_table(package: str, name: str) -> list[dict[str, str]]:
+    """Return the rows of a table that is a file of a package: fields by the names of their columns."""
+    return list(csv.DictReader(resources.files(package).joinpath(name).read_text(encoding="ascii").splitlines()))
+
+
 def check_source(path: Path, kind: str) -> None:
     """Raise InputError unless ``path`` is a file that is not empty; ``kind`` is what it should be, for the message."""
     check_regular(path, kind)

@@ -26,17 +26,12 @@ class VideoFrame:
 
 @dataclass(frozen=True, eq=False)
 class OpenVideo:
-    """An open video.
-
-    stated_rates_hz : the frame rates that the container states, the most reliable first
-    stated_s        : the duration that the container states, 0 if none
-    damage          : a reason for every packet or picture that was left out so far
-    """
+    """An open video."""
 
     frames: Iterator[VideoFrame]
-    stated_rates_hz: tuple[float, ...]
-    stated_s: float
-    damage: list[str]
+    stated_rates_hz: tuple[float, ...]  # the frame rates that the container states, the most reliable first
+    stated_s: float  # the duration that the container states, 0 if none
+    damage: list[str]  # a reason for every packet or picture that was left out so far
 
 
 @dataclass(frozen=True)
@@ -51,10 +46,8 @@ WHOLE = VideoSpan()
 SEEK_MARGIN_S = 1.0
 """Decoding starts at the key frame before the span by this much: containers that seek by the time of decoding are late
 by the pictures that wait for others."""
-ROUNDING_S = 1e-4
-"""A picture belongs to a span that begins this much later: times of the container are whole ticks."""
-SHORT_S = 0.5
-"""Pictures that end more than this before the stated duration are reported."""
+ROUNDING_S = 1e-4  # a picture belongs to a span that begins this much later: times of the container are whole ticks
+SHORT_S = 0.5  # pictures that end more than this before the stated duration are reported
 MIN_SIDE_PX, LONGEST_SIDE_PX = 16, 8192
 """Bounds of a picture's width and height, px: a smaller one shows no face, a larger one fills the memory."""
 

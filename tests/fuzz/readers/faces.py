@@ -38,7 +38,7 @@ from lipmotion_faces.mesh import MeshStage
 from lipmotion_faces.rendering.drawn_surface import prepare_surface
 from lipmotion_faces.tracking.frames import find_nominal_rate, open_video
 from meshes import flame, gltf
-from meshes.gltf import data_uri, document, glb, packed_attributes, textured_document, with_colours
+from meshes.gltf import data_uri, document, glb, textured_document, with_colours
 from meshes.heads import head, lip_points, write_glb, write_obj
 from meshes.live_link_app import write_take
 from meshes.speech import motion, units
@@ -214,9 +214,6 @@ def _whole() -> list[Files]:
     colours = np.linspace(0, 255, 16).reshape(4, 4).astype(np.uint8)
     moved = {"KHR_texture_transform": {"offset": [0.5, 0.25], "scale": [2, 2], "rotation": 0.3}}
     content, binary = with_colours(*textured_document(_picture(), extension=moved), colours, normalised=True)
-    packed = packed_attributes(np.frombuffer(binary[:48], np.uint8).reshape(4, 12))
-    place = {"buffer": 0, "byteOffset": len(binary), "byteLength": len(packed), "byteStride": 12, "count": 4}
-    content["bufferViews"][0]["extensions"] = {"KHR_meshopt_compression": place | {"mode": "ATTRIBUTES"}}
     content["bufferViews"].append({"buffer": 0, "byteOffset": 0, "byteLength": 16})
     rows = {"bufferView": len(content["bufferViews"]) - 1, "componentType": 5121}
     content["accessors"][2] |= {"sparse": {"count": 1, "indices": rows, "values": {"bufferView": 0}}}
@@ -236,8 +233,8 @@ def _whole() -> list[Files]:
     content["animations"] = [{"channels": [], "samplers": []}]
     linked = content | {"buffers": [{"uri": "head.bin", "byteLength": len(binary)}]}
     linked["images"] = [{"uri": "skin.png"}]
-    files = {"head.gltf": json.dumps(linked).encode(), "head.bin": binary + packed, "skin.png": _picture()}
-    return [{"head.vrm": glb(content, binary + packed)}, files]
+    files = {"head.gltf": json.dumps(linked).encode(), "head.bin": binary, "skin.png": _picture()}
+    return [{"head.vrm": glb(content, binary)}, files]
 
 
 def _picture() -> bytes:

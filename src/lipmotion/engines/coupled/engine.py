@@ -173,13 +173,12 @@ def _list_channel_values(
 ) -> Mapping[str, ChannelValue]:
     """Return values and standard deviations of the channels of a stream, by name, from means and variances."""
     space = model.space
-    values, variance = np.zeros((1, space.dimensions)), np.full((1, space.dimensions), np.nan)
+    values, variance = (np.zeros((1, space.dimensions)) for _ in range(2))
     values[:, stream.columns], variance[:, stream.columns] = means, variances
-    motion, variance_of_motion = space.restore(values, variance)
-    channels = zip(space.channels, motion[0].tolist(), np.sqrt(variance_of_motion[0]).tolist(), strict=True)
-    return {
-        channel.name: ChannelValue(value, deviation) for channel, value, deviation in channels if np.isfinite(deviation)
-    }
+    motion, deviations = space.restore(values)[0].tolist(), np.sqrt(variance @ space.mixing)[0].tolist()
+    missing = np.asarray(np.delete(space.mixing, stream.columns, axis=0).max(axis=0, initial=0) > 0)  # of other streams
+    channels = zip(space.channels, motion, deviations, missing.tolist(), strict=True)
+    return {channel.name: ChannelValue(value, deviation) for channel, value, deviation, gone in channels if not gone}
 
 
 ENCODING_SHARE = 0.8
