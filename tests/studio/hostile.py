@@ -13,7 +13,7 @@ from study.served import attacked
 FOREIGN = "nobody may read this"
 LINES = ("1", "2", "0", "-1", "01", "1.0", "9" * 500, "../1", "%2e%2e", "1/../../foreign", "é", "1%00", "true")
 LINE_PARTS = (
-    " /edits /undo /redo /settle /transcript /mark /export /video /sound.wav /recorded /votes /versions /versions/back "
+    " /edits /undo /redo /settle /transcript /mark /export /video /sound.wav /recorded /versions /versions/back "
     "/versions/forget /motion /weights /picture /why /doubts /../../project.json /edits/../../../foreign.txt /remove/x"
 ).split(" ")
 PATHS = (
@@ -21,7 +21,7 @@ PATHS = (
         "/ /../project.json /project.json /studio.html /vendor/../../project.json //etc/passwd "
         "/%2e%2e/%2e%2e/etc/passwd /page/studio.html /edits/line.edits.json /sounds/line.wav /lexicon.txt "
         "/foreign.txt /api /api/ /api/project /api/progress /api/lexicon /api/export /api/understand "
-        "/api/training /api/training/again /api/training/restore /api/training/../../foreign.txt /api/voice "
+        "/api/training /api/training/again /api/training/../../foreign.txt /api/voice "
         "/voices/../../foreign.txt /api/faces/../../foreign.txt.glb /api/faces/head.glb/.. "
         "/api/faces/%2e%2e%2fforeign.glb /api/faces/portrait.glb /api/lines?name=../../foreign.txt "
         "/api/lines?name=%00.wav /static /%ff%fe /api/lines/1/sound.wav?key=0 /application.py"
@@ -48,7 +48,6 @@ BODIES = (
         {"revision": "0", "steps": "phone 1 is p"}, {"revision": 0, "count": -1}, {"mark": "../../foreign"},
         {"mark": ["approved"]}, {"text": "\ud800", "revision": 0, "start_s": 0, "end_s": 1},
         {"text": "mama", "revision": 0, "start_s": 1e300, "end_s": -1},
-        {"shown": ["a", "../../foreign"], "better": "a"}, {"shown": ["a"] * 3, "better": {}},
         {"start_s": 0, "end_s": 1, "face": "head", "by": "other"}, {"preset": "../x"},
         {"files": ["/../../foreign.txt", ".csv"]}, {"files": [".csv/../../../foreign"]}, {"files": [".%05d.png"]},
         {"preset": 3, "only": {}}, {"lines": [99]}, {"kind": "voice", "name": "../../foreign", "lines": [1]},

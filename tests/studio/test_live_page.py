@@ -19,14 +19,13 @@ from lipmotion.live.face import LiveCharacter
 from lipmotion_faces.characters.gltf_document import read_gltf_document, write_container
 from meshes.heads import renamed, write_glb
 from pipeline.made import read_welcome
-from study.browser import check_screens
-from study.firefox import BOTH
+from study.browser import NEEDED, browser, check_screens
 
 pytest.importorskip("websockets", reason="the extra 'live' is not installed")
 
 from lipmotion_studio.live.talking_head import TalkingHead
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, NEEDED]
 SCREENS = ((1200, 800, "light"), (900, 700, "dark"), (320, 560, "light"))
 WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--autoplay-policy=no-user-gesture-required")
 LIMIT_S = 240.0
@@ -55,12 +54,11 @@ def is_connected(window):
         return False
 
 
-@pytest.mark.parametrize("opens", BOTH)
-def test_the_head_speaks_in_step_with_its_sound(opens, tmp_path):
+def test_the_head_speaks_in_step_with_its_sound(tmp_path):
     command = [*LIPMOTION, "live", "-i", "-", "--rate", 16000, "--to", "window:0", "--to", tmp_path / "a.csv"]
     sound = (read_welcome().samples[: 16000 * SPOKEN_S] * 32767).astype("<i2").tobytes()
     (tmp_path / "home").mkdir()
-    with opens(tmp_path / "home", *WEBGL) as window:
+    with browser(tmp_path / "home", *WEBGL) as window:
         with child(command, stdin=PIPE, stderr=PIPE) as process:
             assert isinstance(process.stderr, TextIOWrapper)
             assert isinstance(process.stdin, TextIOWrapper)
@@ -94,7 +92,7 @@ def test_the_head_speaks_in_step_with_its_sound(opens, tmp_path):
 
 
 @contextmanager
-def open_page(opens, folder, package, capsys):
+def open_page(folder, package, capsys):
     """Give a window with a package's page, which is told the server that was opened; a folder's files lie beside it."""
     place = address_in(capsys.readouterr().err).removeprefix("ws://").rstrip("/")
     modules, name = programs.node_package(package), package.rpartition("/")[2] + ".html"
@@ -104,7 +102,7 @@ def open_page(opens, folder, package, capsys):
     for each in (programs.FOLDER / name, *beside):
         (folder / each.name).symlink_to(each)
     served = partial(SimpleHTTPRequestHandler, directory=str(folder))
-    with ThreadingHTTPServer(("127.0.0.1", 0), served) as server, opens(folder, *WEBGL) as window:
+    with ThreadingHTTPServer(("127.0.0.1", 0), served) as server, browser(folder, *WEBGL) as window:
         Thread(target=server.serve_forever, daemon=True).start()
         window.open(f"http://127.0.0.1:{server.server_port}/{name}?{place}")
         yield window
@@ -113,13 +111,12 @@ def open_page(opens, folder, package, capsys):
     assert problems == []
 
 
-@pytest.mark.parametrize("opens", BOTH[:1])
-def test_talking_head_takes_sound_and_blendshapes(opens, tmp_path, capsys):
+def test_talking_head_takes_sound_and_blendshapes(tmp_path, capsys):
     audio = read_welcome()
     stream, about, frames = Stream(audio.rate_hz), LiveSound(audio.rate_hz), []
     with (
         open_consumer("talkinghead:0", print, about) as head,
-        open_page(opens, tmp_path, "@met4citizen/talkinghead", capsys) as window,
+        open_page(tmp_path, "@met4citizen/talkinghead", capsys) as window,
     ):
         assert isinstance(head, TalkingHead)
         wait_until(lambda: window.run("return globalThis.called?.includes('streamStart')"), LIMIT_S)
@@ -153,12 +150,11 @@ def write_vrm(path):
     write_container(path, document.json, bytes(document.buffers[0]))
 
 
-@pytest.mark.parametrize("opens", BOTH[:1])
-def test_three_vrm_takes_the_curves_of_a_character(opens, tmp_path, capsys):
+def test_three_vrm_takes_the_curves_of_a_character(tmp_path, capsys):
     write_vrm(tmp_path / "head.vrm")
     audio, character = read_welcome(), LiveCharacter(tmp_path / "head.vrm")
     first, *frames = map(character, Stream(audio.rate_hz).push(audio.samples[: 2 * audio.rate_hz]))
-    with open_consumer("websocket:0", print) as take, open_page(opens, tmp_path, "@pixiv/three-vrm", capsys) as window:
+    with open_consumer("websocket:0", print) as take, open_page(tmp_path, "@pixiv/three-vrm", capsys) as window:
         wait_until(lambda: (take(first), window.run("return globalThis.shown?.['0.00']"))[1], LIMIT_S)
         for frame in frames:
             take(frame)

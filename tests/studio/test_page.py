@@ -17,14 +17,11 @@ from lipmotion.pipeline.model import find_shipped
 from studio.served import served
 from studio.test_recorded_videos import shifted
 from study import browser
-from study.firefox import BOTH, Opens
-from study.small_study import sha256_of
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
-from lipmotion_studio.votes import read_votes
 from testing.toy import write_film
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, browser.NEEDED]
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 SCREENS = ((1440, 900, "light"), (900, 800, "dark"), (320, 640, "light"))
 WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--autoplay-policy=no-user-gesture-required")
@@ -41,17 +38,6 @@ ASKED = """return performance.getEntriesByType("resource").map(({ name }) => new
   .map(({ searchParams }) => ["of", "names", "by"].map((name) => searchParams.get(name)).join(" "))"""
 """Which curves were asked for: of which kind, by which model."""
 NOT_SHOWN = "studio.store.recording.channels.find(({ name }) => !studio.store.channels.includes(name)).name"
-SLOW = """const { player: { audio }, stage: { head } } = studio;
-const frame = requestAnimationFrame, posed = head.pose.bind(head);
-window.requestAnimationFrame = (act) => setTimeout(() => frame(act), 250);
-window.ends_s = [];
-window.shown = [];
-audio.addEventListener("ended", () => window.ends_s.push(audio.currentTime), { capture: true });
-head.pose = (...given) => {
-  window.shown.push({ time_s: given[1], comparing: studio.store.comparing });
-  posed(...given);
-};"""
-"""From now on frames are slow; which ones are shown is noted, and when the sound ends."""
 FOLLOWS = """const [off_s] = arguments, { store, stage: { recorded } } = studio, { video } = recorded;
 const here_s = store.time_s + recorded.begins_s;
 let sought_s = null;
@@ -125,21 +111,21 @@ class Page:
 
 
 @contextmanager
-def shown(opens: Opens, folder: Path, source: Path = WELCOME, *options: Path | str) -> Iterator[Page]:
+def shown(folder: Path, source: Path = WELCOME, *options: Path | str) -> Iterator[Page]:
     """Give the page of a studio of one recording, or of a project, in a browser; its project is in the folder."""
     (folder / "home").mkdir()
     place = () if source == folder / "project" else ("-o", folder / "project")
     studio = served(source, folder / "errors.txt", *place, *options, limit_s=browser.WINDOW_S)
-    with studio as server, opens(folder / "home", *WEBGL) as window:
+    with studio as server, browser.browser(folder / "home", *WEBGL) as window:
         window.open(f"http://127.0.0.1:{server.port}/#{server.token}")
         page = Page(window, folder / "project")
         page.ready()
         yield page
 
 
-@pytest.fixture(scope="module", params=BOTH)
-def opened(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    with shown(request.param, tmp_path_factory.mktemp("studio")) as page:
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    with shown(tmp_path_factory.mktemp("studio")) as page:
         yield page
 
 
@@ -311,10 +297,9 @@ def test_an_edit_waits_for_a_border_that_is_on_its_way(page):
     page.wait_for_steps(len(before))
 
 
-@pytest.mark.parametrize("opens", BOTH)
-def test_a_dropped_line_is_read_corrected_and_exported(opens, tmp_path):
+def test_a_dropped_line_is_read_corrected_and_exported(tmp_path):
     said = WELCOME.with_suffix(".txt").read_text(encoding="utf-8")
-    with shown(opens, tmp_path) as page:
+    with shown(tmp_path) as page:
         window = page.window
         window.run(
             """studio.server.bytes(`lines/${studio.store.recordingId}/sound.wav`).then((sound) => studio.add(
@@ -371,7 +356,6 @@ def test_versions_are_kept_compared_and_gone_back_to(page):
     window.click("#compare-keep")
     wait_until(lambda: page.of("Boolean(studio.store.other?.weights)"), LIMIT_S)
     kept = page.of("studio.store.other.motion.values.join()")
-    assert page.of("document.getElementById('compare-blind').disabled")  # it is what is shown
     page.choose(12)
     page.edit(lambda: window.press(browser.ENTER, *"uw", browser.ENTER), "phone 12 is uw")
     page.reload()
@@ -511,8 +495,7 @@ def test_every_screen(page):
     window.show_as(1200, 900)
 
 
-@pytest.mark.parametrize("opens", BOTH)
-def test_the_real_video_beside_and_comparisons(opens, tmp_path, filmed_face_file):
+def test_the_real_video_beside_and_comparisons(tmp_path, filmed_face_file):
     sound = Path(shutil.copy(WELCOME, tmp_path))
     pictures = (np.full((64, 96, 3), 40 + number % 200, np.uint8) for number in range(100))
     write_film(tmp_path / "in step.mp4", pictures, sound)
@@ -520,7 +503,7 @@ def test_the_real_video_beside_and_comparisons(opens, tmp_path, filmed_face_file
     other = tmp_path / find_shipped().name  # another file, of the same name
     model = load_model()
     save_model(replace(model, about={**model.about, "seed": "another"}), other)
-    with shown(opens, tmp_path, sound, "--against", other, "--face", filmed_face_file) as page:
+    with shown(tmp_path, sound, "--against", other, "--face", filmed_face_file) as page:
         window = page.window
         window.press("x")
         wait_until(lambda: page.of("document.querySelector('.recorded').readyState") >= 2, LIMIT_S)
@@ -552,22 +535,7 @@ def test_the_real_video_beside_and_comparisons(opens, tmp_path, filmed_face_file
         )
         assert len(set(icons)) == len(icons) == 6
         window.show_as(1440, 900, "light", mobile=False)
-        window.run(SLOW)
-        window.run("studio.store.set({ span: { start_s: 0.5, end_s: 0.8 }, looping: true })")
-        window.click("#compare-blind")
-        assert page.of("studio.store.heads") == "one"
-        wait_until(lambda: page.of("studio.store.blind.asked"), LIMIT_S)
-        assert page.of("window.ends_s") == pytest.approx([0.8, 0.8], abs=1e-3)
-        assert page.of("[...new Set(window.shown.map(({ comparing }) => comparing))].length") == 2
-        assert page.of("Math.max(...window.shown.map(({ time_s }) => time_s))") <= 0.8 + 1e-6
-        wait_until(lambda: not page.of("document.getElementById('blind-better-A').disabled"), LIMIT_S)
-        window.click("#blind-better-A")
-        wait_until(lambda: "A was" in window.text("#blind-told"), LIMIT_S)
-        (vote,) = read_votes(tmp_path / "project" / "votes.json")
-        assert vote.better == 0
-        assert {side.model for side in vote.shown} == {sha256_of(path) for path in (other, find_shipped())}
-        is_other, told = vote.shown[0].model == sha256_of(other), window.text("#blind-told")
-        assert (f"{other.stem} ({sha256_of(other)[:8]})" in told.partition(", B was")[0]) == is_other
+        window.run("studio.store.set({ span: { start_s: 0.5, end_s: 0.8 } })")
         window.click("#film")
         wait_until(lambda: page.of("document.querySelector('#stage .film').readyState") >= 2, LIMIT_S)
         window.run("studio.player.seek(0.7)")  # the video is that of the selection, from 0.5 s on

@@ -34,7 +34,7 @@ from lipmotion.storage.archive import take_array
 from lipmotion.storage.json_text import from_json
 from lipmotion.types import Outlook, Span, Timeline, Unit
 from lipmotion_studio.application import TOKEN_HEADER
-from lipmotion_studio.folder import PROJECT, VOTES, ProjectFolder
+from lipmotion_studio.folder import PROJECT, ProjectFolder
 from lipmotion_studio.live import servers, vtube
 from lipmotion_studio.project import (
     EditVersion,
@@ -49,7 +49,6 @@ from lipmotion_studio.study.application import create_application
 from lipmotion_studio.study.manifest import MANIFEST, check_videos, read_study
 from lipmotion_studio.study.store import StudyStore
 from lipmotion_studio.trainer import Trainer
-from lipmotion_studio.votes import read_votes
 from pipeline.made import write_sound
 from pipeline.session.test_session import SENTENCES
 from studio.open_studio import HOST, TOKEN, open_studio
@@ -140,13 +139,10 @@ def seed_settings(_: Good) -> list[Files]:
     recording = replace(recording, versions=(EditVersion(1, SENTENCES),))
     project = Project(model="voices/a.lipmotion", characters={"a": "b.glb"}, recordings="r")
     project = project.with_recordings([recording])
-    side = {"name": "a", "model": DIGEST, "edits": DIGEST}
-    votes = [{"line": "a", "shown": [side, side | {"name": "b", "model": ""}], "better": 1}]
-    votes.append({"line": "a", "shown": ["x", "y"], "better": "x", "edits": DIGEST})
     answers = "r1,mos,0,hi,natural,a,,4,3.5,1,0,\n"
-    found = {"job.json": json.dumps(JOB), PROJECT: json.dumps(describe_project(project)), VOTES: json.dumps(votes)}
+    found = {"job.json": json.dumps(JOB), PROJECT: json.dumps(describe_project(project))}
     found |= {"job.toml": "".join(f"[{name}]\n{_toml(table)}" for name, table in JOB.items())}
-    found |= {TRAINING: json.dumps({"format": "lipmotion.training", "version": 1, "made": [TRAINED], **TRAINED})}
+    found |= {TRAINING: json.dumps({"format": "lipmotion.training", "version": 1, **TRAINED})}
     found |= {"answers.csv": ",".join(COLUMNS) + "\n" + answers}
     with TemporaryDirectory() as made:
         folder = Path(made) / "study"
@@ -171,10 +167,8 @@ def check_settings(folder: Path, _: Good) -> None:
 def _read_one(path: Path, name: str, folder: Path) -> None:
     if name == MANIFEST:
         read_study(folder)
-    elif name == VOTES:
-        read_votes(path)
     elif name == TRAINING:
-        with TemporaryDirectory() as own:  # a good copy is put beside the file
+        with TemporaryDirectory() as own:  # a damaged file gets another name
             (Path(own) / TRAINING).parent.mkdir()
             copyfile(path, Path(own) / TRAINING)
             Trainer(ProjectFolder(Path(own))).describe()
@@ -203,7 +197,6 @@ def _read_one(path: Path, name: str, folder: Path) -> None:
 
 
 LINE = "/api/lines/1"
-SIDES = [{"by": ""}, {"by": "version-1"}]
 REQUESTS: dict[str, tuple[str, Any]] = {
     "edits": (f"{LINE}/edits", {"revision": 0, "steps": ["set intensity 1.2", "hold from 0.1 to 0.2"], "instead": 0}),
     "undo": (f"{LINE}/undo", {"revision": 0, "count": 1}),
@@ -211,7 +204,6 @@ REQUESTS: dict[str, tuple[str, Any]] = {
     "versions": (f"{LINE}/versions", {"revision": 0}),
     "back": (f"{LINE}/versions/back", {"revision": 0, "version": "version-1", "name": "version-1"}),
     "mark": (f"{LINE}/mark", {"revision": 0, "mark": "redo"}),
-    "votes": (f"{LINE}/votes", {"revision": 0, "shown": SIDES, "better": 1}),
     "understand": ("/api/understand", {"lines": [2, 3]}),
     "export": ("/api/export", {"only": "approved", "files": [".json"], "preset": "", "face": ""}),
     "lexicon": ("/api/lexicon", {"word": "zoe", "phones": ["z", "ow", "iy"]}),
@@ -221,7 +213,7 @@ REQUESTS: dict[str, tuple[str, Any]] = {
     "raters": ("/api/raters", {"agrees": True}),
     "motion": (f"{LINE}/motion", {"query": {"of": "motion", "start_s": "0.1", "end_s": "0.3", "names": "opening"}}),
     "why": (f"{LINE}/why", {"query": {"time": "0.2"}}),
-    "project": ("/api/project", {"query": {"from": "0", "count": "20", "order": "name", "status": "", "mark": ""}}),
+    "project": ("/api/project", {"query": {"from": "0", "count": "20"}}),
 }
 
 
