@@ -1,10 +1,9 @@
-"""The studio measured: how long an edit takes, kills, hostile requests, a thousand edits and back.
+"""The studio measured: how long an edit takes, kills, hostile requests, two clients, a crowd.
 
 python benchmarks/studio.py times RECORDING [SECONDS ...]     processor time from an edit to the weights of the head
 python benchmarks/studio.py browser RECORDING [SECONDS ...] [--count 20]  from a key to the moved face in Chromium
 python benchmarks/studio.py kills RECORDING [--count 100]     of the server while its line is edited
 python benchmarks/studio.py hostile RECORDING [--count 2000]
-python benchmarks/studio.py undo RECORDING [--count 1000]
 python benchmarks/studio.py clients RECORDING [--count 2000]  steps of two clients; sounds are those of the toy corpus
 python benchmarks/studio.py crowd RECORDING [--count 1000]    edits beside so many connections without a request
 
@@ -53,15 +52,13 @@ from lipmotion_studio.folder import open_folder  # noqa: E402
 from lipmotion_studio.recording import OpenRecording, analyse_recording, open_recording  # noqa: E402
 from meshes.heads import head, write_glb  # noqa: E402
 from studio.hostile import attack  # noqa: E402
-from studio.served import Served, lost_edits, served, undone_edits  # noqa: E402
+from studio.served import Served, lost_edits, served  # noqa: E402
 from studio.two_clients import walk  # noqa: E402
 from testing.toy import toy_sentences  # noqa: E402
 
 RECOGNISED_S = 100.0
 """In longer recordings phones are repeated, not recognised."""
 STEPS_OF_A_WALK = 80
-UNDO_LIMIT_S = 7200.0
-"""How long a server may be asked for edits, until it is ended."""
 EDITS, FEW_EDITS = 40, 10
 """Edits of which the time is taken, after some that load what they need; of longer recordings fewer."""
 
@@ -223,14 +220,6 @@ def hostile(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     return {"requests": count, "statuses": sorted(statuses), "foreign files": 0, "tracebacks": tracebacks}
 
 
-def undo(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
-    """Make random edits over HTTP, take all back after a restart, and make all again: the bytes are the same."""
-    started_s, errors = time.monotonic(), sound.with_name("errors.txt")
-    found = undone_edits(sound, errors, options.count or 1000, seed=options.seed, limit_s=UNDO_LIMIT_S)
-    tracebacks = errors.read_text(encoding="utf-8").count("Traceback")
-    return found | {"tracebacks": tracebacks, "minutes": round((time.monotonic() - started_s) / 60, 1)}
-
-
 def clients(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     """Let two clients change a project that is changed behind their backs; an AssertionError: something was lost."""
     started_s, count = time.monotonic(), options.count or 2000
@@ -303,15 +292,7 @@ def hold(port: int, count: int, sent: bytes) -> NoReturn:
         time.sleep(0.05)  # so that the machine is not busy with the crowd alone
 
 
-WHAT = {
-    "crowd": crowd,
-    "times": times,
-    "browser": in_browser,
-    "kills": kills,
-    "hostile": hostile,
-    "undo": undo,
-    "clients": clients,
-}
+WHAT = {"crowd": crowd, "times": times, "browser": in_browser, "kills": kills, "hostile": hostile, "clients": clients}
 
 if __name__ == "__main__":
     main()

@@ -11,7 +11,7 @@ import av
 import numpy as np
 import pytest
 
-from lipmotion import load_model, read_motion, save_model, units
+from lipmotion import load_model, save_model, units
 from lipmotion.pipeline.edits import FORMS
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
@@ -308,14 +308,11 @@ def test_lines_that_are_not_used_are_closed_and_open_again_as_they_were(studio, 
 
 
 @pytest.mark.long
-def test_the_weights_of_the_page_are_those_of_the_file(studio):
+def test_weights_of_a_part_are_those_of_the_whole(studio):
     studio.edit("phone 3 is p", "pin jawOpen 0.7 at 1.0")
     reply = studio.ask("/api/lines/1/weights?face=head")
     names = json.loads(reply.headers["x-lipmotion-names"])
     weights = np.frombuffer(reply.body, "<f4").reshape(-1, len(names))
-    done = studio.ask("/api/lines/1/export", {"preset": "web"}).content
-    read, _ = read_motion(studio.folder.path / done["exported"][0]["files"][0])
-    assert weights[:, names.index("jawOpen")] == pytest.approx(read["jawOpen"], abs=1e-5)
     part = np.frombuffer(studio.ask("/api/lines/1/weights?face=head&start_s=0.8&end_s=1.2").body, "<f4")
     assert part.reshape(-1, len(names)) == pytest.approx(weights[80:121], abs=0.01)
     assert studio.ask(f"/api/faces/{reply.headers['x-lipmotion-mesh']}.glb").body[:4] == b"glTF"

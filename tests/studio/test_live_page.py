@@ -1,4 +1,4 @@
-"""Live frames in a real browser: the page of the window, TalkingHead's own module, and three-vrm."""
+"""Live frames in a real browser: the page of the window, and TalkingHead's own module."""
 
 import csv
 from contextlib import contextmanager
@@ -15,9 +15,6 @@ import programs
 from children import LIPMOTION, PIPE, child, wait_until
 from lipmotion import Stream
 from lipmotion.live.consumers import LiveSound, open_consumer
-from lipmotion.live.face import LiveCharacter
-from lipmotion_faces.characters.gltf_document import read_gltf_document, write_container
-from meshes.heads import renamed, write_glb
 from pipeline.made import read_welcome
 from study.browser import NEEDED, browser, check_screens
 
@@ -33,10 +30,6 @@ SPOKEN_S = 3
 CONNECTED = "return Boolean(globalThis.live?.state.isConnected)"
 CLOCK = (programs.FOLDER / "live_clock.js").read_text("utf-8")
 SHOWN = CLOCK + "return weightsAt(arguments[0]);"
-EXPRESSIONS = {
-    "jawOpen": "aa", "mouthStretchLeft": "ih", "mouthPucker": "ou", "mouthSmileLeft": "ee", "mouthFunnel": "oh"
-}  # fmt: skip
-"""Shapes of the head, and the expressions of VRM that they stand for."""
 
 
 def address_in(text):
@@ -134,33 +127,3 @@ def test_talking_head_takes_sound_and_blendshapes(tmp_path, capsys):
     assert len(queued) > 100
     assert [time for time, _ in queued] == pytest.approx([20.0 * number for number in range(len(queued))], abs=0.2)
     assert [jaw for _, jaw in queued] == pytest.approx([frame["jawOpen"] for frame in frames[first:]], abs=1e-3)
-
-
-def write_vrm(path):
-    """Write the head as a character of VRM 1.0, whose shapes are known by its expressions alone."""
-    write_glb(path, renamed({shape: f"of {name}" for shape, name in EXPRESSIONS.items()}))
-    document = read_gltf_document(path)
-    place = next(place for place, node in enumerate(document.json["nodes"]) if "mesh" in node)
-    shapes = document.json["meshes"][document.json["nodes"][place]["mesh"]]["extras"]["targetNames"]
-    bind = {name: {"node": place, "index": shapes.index(f"of {name}"), "weight": 1} for name in EXPRESSIONS.values()}
-    expressions = {"preset": {name: {"morphTargetBinds": [bind[name]]} for name in bind}}
-    meta = {"name": "head", "authors": ["lipmotion"], "licenseUrl": "https://vrm.dev/licenses/1.0/"}
-    document.json["extensions"] = {"VRMC_vrm": {"specVersion": "1.0", "meta": meta, "expressions": expressions}}
-    document.json["extensionsUsed"] = ["VRMC_vrm"]
-    write_container(path, document.json, bytes(document.buffers[0]))
-
-
-def test_three_vrm_takes_the_curves_of_a_character(tmp_path, capsys):
-    write_vrm(tmp_path / "head.vrm")
-    audio, character = read_welcome(), LiveCharacter(tmp_path / "head.vrm")
-    first, *frames = map(character, Stream(audio.rate_hz).push(audio.samples[: 2 * audio.rate_hz]))
-    with open_consumer("websocket:0", print) as take, open_page(tmp_path, "@pixiv/three-vrm", capsys) as window:
-        wait_until(lambda: (take(first), window.run("return globalThis.shown?.['0.00']"))[1], LIMIT_S)
-        for frame in frames:
-            take(frame)
-        wait_until(lambda: window.run("return shown[arguments[0]]", f"{frames[-1].time_s:.2f}"), LIMIT_S)
-        shown = window.run("return shown")
-    for name in EXPRESSIONS.values():
-        told = [frame.weights[name] for frame in frames]
-        assert max(told) > 0.02, name
-        assert [shown[f"{frame.time_s:.2f}"][f"of {name}"] for frame in frames] == pytest.approx(told, abs=1e-3)
