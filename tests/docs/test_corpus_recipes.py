@@ -1,24 +1,16 @@
-"""The recipes for published corpora: three commands each, and that these do what the pages say."""
+"""The recipes for published corpora: three commands each."""
 
-import json
 import re
 import shlex
 from pathlib import Path
 
-import pytest
-
 from docs.test_links import broken
-from lipmotion import Corpus, load_model
 from lipmotion.cli.command_line import parser
-from lipmotion.types import Track
-from pipeline.made import replace_tracking, write_sound
-from testing.toy import toy_utterances
 
 FOLDER = Path(__file__).parents[2] / "recipes"
 INDEX = FOLDER / "README.md"
 PAGES = sorted(page for page in FOLDER.glob("*.md") if page != INDEX)
 MAX_LINES = 40
-PEOPLE = ("6331559613336179781", "anna", "ben")
 
 
 def commands(page: Path) -> list[list[str]]:

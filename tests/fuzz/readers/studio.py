@@ -33,7 +33,7 @@ from lipmotion.pipeline.job import check_outputs, open_face
 from lipmotion.storage.archive import take_array
 from lipmotion.storage.json_text import from_json
 from lipmotion.types import Outlook, Span, Timeline, Unit
-from lipmotion_studio.folder import PROJECT, VOTES, ProjectFolder
+from lipmotion_studio.folder import PROJECT, ProjectFolder
 from lipmotion_studio.live import servers, vtube
 from lipmotion_studio.project import (
     EditVersion,
@@ -46,7 +46,6 @@ from lipmotion_studio.project import (
 from lipmotion_studio.study.answers import COLUMNS, read_answers
 from lipmotion_studio.study.manifest import MANIFEST, read_study
 from lipmotion_studio.trainer import Trainer
-from lipmotion_studio.votes import read_votes
 from pipeline.session.test_session import SENTENCES
 from study.small_study import small_study
 
@@ -134,13 +133,10 @@ def seed_settings(_: Good) -> list[Files]:
     recording = replace(recording, versions=(EditVersion(1, SENTENCES),))
     project = Project(model="voices/a.lipmotion", characters={"a": "b.glb"}, recordings="r")
     project = project.with_recordings([recording])
-    side = {"name": "a", "model": DIGEST, "edits": DIGEST}
-    votes = [{"line": "a", "shown": [side, side | {"name": "b", "model": ""}], "better": 1}]
-    votes.append({"line": "a", "shown": ["x", "y"], "better": "x", "edits": DIGEST})
     answers = "r1,mos,0,hi,natural,a,,4,3.5,1,0,\n"
-    found = {"job.json": json.dumps(JOB), PROJECT: json.dumps(describe_project(project)), VOTES: json.dumps(votes)}
+    found = {"job.json": json.dumps(JOB), PROJECT: json.dumps(describe_project(project))}
     found |= {"job.toml": "".join(f"[{name}]\n{_toml(table)}" for name, table in JOB.items())}
-    found |= {TRAINING: json.dumps({"format": "lipmotion.training", "version": 1, "made": [TRAINED], **TRAINED})}
+    found |= {TRAINING: json.dumps({"format": "lipmotion.training", "version": 1, **TRAINED})}
     found |= {"answers.csv": ",".join(COLUMNS) + "\n" + answers}
     with TemporaryDirectory() as made:
         folder = Path(made) / "study"
@@ -164,10 +160,8 @@ def check_settings(folder: Path, _: Good) -> None:
 def _read_one(path: Path, name: str, folder: Path) -> None:
     if name == MANIFEST:
         read_study(folder)
-    elif name == VOTES:
-        read_votes(path)
     elif name == TRAINING:
-        with TemporaryDirectory() as own:  # a good copy is put beside the file
+        with TemporaryDirectory() as own:  # a damaged file gets another name
             (Path(own) / TRAINING).parent.mkdir()
             copyfile(path, Path(own) / TRAINING)
             Trainer(ProjectFolder(Path(own))).describe()
