@@ -84,13 +84,12 @@ def detect_english(audio: Audio) -> bool | None:
     audio : at 16 kHz
     The network writes every language with the phones of English: it cannot say which other one it is.
     """
-    name = find_installed_recogniser()
-    if name is None:
+    if find_installed_recogniser() is None:
         return None
     part = analysed(Audio(audio.samples[: int(PART_S * audio.rate_hz)], audio.rate_hz))
     tokens = [
         token
-        for _, posteriors in find_stretches(name, part)
+        for _, posteriors in find_stretches(part)
         for token in (*(each.token for each in posteriors.best_tokens), WORD_BOUNDARY)
     ]
     words = (list(group) for ends, group in groupby(tokens, WORD_BOUNDARY.__eq__) if not ends)
