@@ -5,10 +5,11 @@ from formats.examples import of_motion
 from lipmotion.articulation import expression, liveliness
 from lipmotion.articulation.liveliness import compute_liveliness
 from lipmotion.articulation.mouth import EXPRESSED, ROUND_WIDTH, find_mouth
-from lipmotion.pipeline.outputs.deliver import FACTORS, deliver, with_manners
+from lipmotion.pipeline.outputs.deliver import FACTORS, deliver, with_detected, with_manners
 from lipmotion.storage.sources import read_shipped_table
-from lipmotion.types import Channel, Generation, Motion, Prosody, Span, Timeline, Unit
-from lipmotion.types.delivery import MANNERS, MOODS, NEUTRAL, PLAIN, Delivery, MoodKey, parse_moods
+from lipmotion.types import Channel, Generation, Motion, Prosody, Span, Timeline, Unit, VoiceEvent
+from lipmotion.types.audio import BREATH, LAUGHTER
+from lipmotion.types.delivery import MANNERS, MOODS, NEUTRAL, PLAIN, Delivery, MoodKey, format_moods, parse_moods
 from meshes.speech import motion, units
 
 MINUTE = Motion(np.full((6001, 1), 0.05), 100.0, (Channel("opening"),))
@@ -217,3 +218,18 @@ def test_a_manner_holds_until_the_next_and_moods_do_not_count(generation: Genera
     before, delivery = generation.motion.values.copy(), Delivery(mood="shout, happy at 1.1")
     assert not np.array_equal(deliver(generation, delivery).motion.values[:, : before.shape[1]], before)
     assert np.array_equal(generation.motion.values, before)
+
+
+@pytest.mark.parametrize(
+    ("asked", "shown"),
+    [
+        ("", "happy at 3, neutral at 4"),
+        ("sad", "sad at 0"),
+        ("plain", "plain at 0, happy at 3, neutral at 4"),
+        ("mumble at 1, angry at 2", "mumble at 1, angry at 2"),
+    ],
+)
+def test_what_is_detected_is_shown_where_nothing_of_its_kind_is_asked_for(asked: str, shown: str) -> None:
+    kinds = ((3, LAUGHTER, 0.9), (4.5, BREATH, 1))
+    events = [VoiceEvent(start_s, start_s + 1, kind, strength) for start_s, kind, strength in kinds]
+    assert format_moods(with_detected(parse_moods(asked), events)) == shown

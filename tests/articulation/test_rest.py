@@ -6,7 +6,8 @@ from lipmotion.articulation import rest
 from lipmotion.articulation.contact import CLOSED_OPENING
 from lipmotion.articulation.mouth import find_mouth
 from lipmotion.articulation.rest import REST, rest_in_pauses
-from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit
+from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit, VoiceEvent
+from lipmotion.types.audio import BREATH, LAUGHTER
 from meshes.speech import said
 
 SILENCE = Timeline((Span(0.0, 0.2, Unit("sil")), Span(0.2, 1.0, Unit("aa"))))
@@ -99,23 +100,33 @@ def test_short_pauses_are_shared_by_the_phones_beside_them():
     assert shared[2] == LINE[2]
 
 
-BREATH = (0.8, 1.2)
+LAUGH = VoiceEvent(0.4, 1.4, LAUGHTER, 0.9, ((0.5, 1.0), (0.7, 0.5), (1.3, 0.5)))
 QUIET = said((0, 2.0, "sil"), (2.0, 2.6, "aa"), (2.6, 3.0, "sil"))
 
 
 def test_a_breath_that_is_detected_parts_the_lips_and_they_close_after_it():
-    opening = rest_in_pauses(generation(QUIET), REST, breaths=[BREATH]).motion["opening"]
+    opening = rest_in_pauses(generation(QUIET), REST, events=[VoiceEvent(0.8, 1.2, BREATH, 1.0)]).motion["opening"]
     assert opening[90:111] == pytest.approx(rest.INHALING_GAP)
     assert opening[[60, 140]].max() <= CLOSED_OPENING
     assert np.abs(np.diff(opening[60:140])).max() < 0.01
 
 
-def test_what_opens_with_the_mouth_in_speech_opens_with_it_in_a_breath():
+def test_laughter_opens_the_mouth_with_its_calls_and_leaves_speech_alone():
+    opening = rest_in_pauses(generation(QUIET), REST, events=[LAUGH]).motion["opening"]
+    assert opening[50] == pytest.approx(rest.LAUGH_GAP, rel=0.02)
+    assert opening[100] == pytest.approx(rest.LAUGH_SHARE * rest.LAUGH_GAP, rel=0.02)
+    assert opening[100] < opening[70] < opening[50]
+    assert opening[160] <= CLOSED_OPENING
+    assert opening[210:250] == pytest.approx(0.1)
+    assert rest_in_pauses(generation(LINE), REST, events=[LAUGH]).motion["opening"][45:95] == pytest.approx(0.1)
+
+
+def test_what_opens_with_the_mouth_in_speech_opens_with_it_in_laughter():
     plain = generation(QUIET)
     values = plain.motion.values.copy()
     values[:, 0] = np.where((TIME_S > 2.1) & (TIME_S < 2.5), 0.2, 0.0)
     values[:, 1] = 0.6 - 0.5 * values[:, 0]
     moving = of_motion(Motion(values, 100.0, plain.motion.channels), QUIET)
-    moved = rest_in_pauses(moving, REST, breaths=[BREATH]).motion
-    assert moved["width"][100] == pytest.approx(0.6 - 0.5 * moved["opening"][100], abs=1e-6)
-    assert rest_in_pauses(moving, rest.NATURAL, breaths=[BREATH]) is moving
+    moved = rest_in_pauses(moving, REST, events=[LAUGH]).motion
+    assert moved["width"][50] == pytest.approx(0.6 - 0.5 * moved["opening"][50], abs=1e-6)
+    assert rest_in_pauses(moving, rest.NATURAL, events=[LAUGH]) is moving

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 import lipmotion
-from lipmotion import Delivery, FilmedFace, Outputs, cues, read_motion, write, write_cues
+from lipmotion import Delivery, FilmedFace, Outputs, Request, animate, cues, read_motion, write, write_cues
 from lipmotion.articulation.contact import find_closures
 from lipmotion.articulation.cue_sheets import list_frame_shapes
 from lipmotion.articulation.delivery import close_on_frame_grid
+from lipmotion.articulation.rest import LAUGH_GAP
 from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.outputs import output
 from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
@@ -29,6 +30,7 @@ from lipmotion_faces.outputs.scenes import build_scene
 from lipmotion_faces.outputs.shown_faces import ShownPerson, shown_face
 from meshes.heads import head, write_glb
 from pipeline.made import performed, read_character
+from speech.made_voices import laugh, pulses, recording, said, vowels
 from testing.toy import toy_sentences
 
 
@@ -345,3 +347,22 @@ def test_vowels_have_expressions_of_moods_that_leave_the_lips_closed(generation)
     pressed = curves["closed"] > 0
     assert pressed.any()
     assert curves["surprised"][pressed] == pytest.approx(0)
+
+
+def test_a_face_laughs_where_laughter_is_detected_and_asked_for(toy_model):
+    audio = recording((0.5, vowels(pulses(1.0, 120))), (2.0, laugh(6)))
+    request = Request(audio, units=said(audio.duration_s, (0.5, 1.5)))
+    laughing = animate(request, model=toy_model)
+    (event,) = laughing.events
+    assert event.kind == "laughter"
+    opening = laughing.motion["opening"]
+    loudest_s = max(event.calls, key=lambda call: call[1])[0]
+    assert opening[round(loudest_s * 100)] == pytest.approx(LAUGH_GAP, rel=0.1)
+    happy = deliver(laughing, Delivery()).motion["mood_happy"]
+    assert happy[round(loudest_s * 100)] > 0.7
+    assert not happy[:150].any()
+    assert "mood_happy" not in deliver(laughing, Delivery(mood="neutral")).motion.names
+    plain = animate(replace(request, manner="asked"), model=toy_model)
+    assert not plain.events
+    assert plain.motion["opening"][200:].max() < 0.05
+    assert np.array_equal(plain.motion.values[50:150], laughing.motion.values[50:150])

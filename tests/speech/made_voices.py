@@ -1,4 +1,4 @@
-"""Sounds that are made: pulses or noise through resonances, phones in time for them, a scene in a room."""
+"""Sounds that are made: pulses or noise through resonances, laughter, phones in time for them, a scene in a room."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,16 @@ def vowels(source: Samples, tilt: float = 0.0) -> Samples:
 def pulses(duration_s: float, hertz: float | Samples) -> Samples:
     phase = np.arange(round(duration_s * RATE_HZ)) * hertz / RATE_HZ
     return np.diff(np.floor(phase), prepend=0.0)
+
+
+def laugh(calls: int = 8, apart_s: float = 0.2) -> Samples:
+    """Return calls of 80 ms, the voice falling, with breath between them."""
+    found = 0.03 * noise(calls * apart_s)
+    for number in range(calls):
+        first = round(number * apart_s * RATE_HZ)
+        call = vowels(pulses(0.08, 320 - 8 * number))
+        found[first : first + len(call)] += call * np.hanning(len(call)) * 0.93**number
+    return found
 
 
 def recording(*parts: tuple[float, Samples]) -> Audio:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import CLOSED_OPENING, smooth_step
 from lipmotion.errors import InputError
-from lipmotion.types import EYE_DISTANCE, Generation, Motion, Span, Timeline, Unit
+from lipmotion.types import EYE_DISTANCE, Generation, Motion, Span, Timeline, Unit, VoiceEvent
+from lipmotion.types.audio import BREATH, LAUGHTER
 from lipmotion.units import SILENCE, is_silent, mark_closing_phones
 
 Curve = NDArray[np.float64]
@@ -76,7 +77,11 @@ BREATH_GAP, BREATH_S = 0.03, 0.04
 MIN_BREATH_S: Final = 0.4  # pauses in which a breath is taken last at least so long
 INHALING_GAP = 0.05
 """The lips are parted by this for a breath that is detected, as GRID speaker 1 does (docs/expression.md)."""
-INHALING_EDGE_S = 0.08  # the lips part so long before such a breath, and close as long after it
+LAUGH_GAP, LAUGH_SHARE = 0.18, 0.4
+"""In laughter the lips are parted by the first length in the loudest call, by this share of it between calls."""
+CALL_S, EVENT_EDGE_S = 0.05, 0.08
+"""How long a call of laughter opens the mouth (a standard deviation); laughter and breaths part the lips so long before
+and let them close so long after."""
 PINNED_S: Final = 0.15  # within this time of a pin the motion stays as it is
 
 
@@ -129,13 +134,13 @@ def share_short_pauses(units: Timeline[Unit]) -> Timeline[Unit]:
 
 
 def rest_in_pauses(
-    generation: Generation, style: str, pinned_s: Sequence[float] = (), breaths: Sequence[tuple[float, float]] = ()
+    generation: Generation, style: str, pinned_s: Sequence[float] = (), events: Sequence[VoiceEvent] = ()
 ) -> Generation:
     """Return generated motion whose mouth is in its rest pose in pauses, with closed lips.
 
     style    : ``rest``; or ``natural``, which leaves the motion as it is
     pinned_s : times of pins, around which the motion stays as it is
-    breaths  : start and end in seconds of those that are detected: the mouth opens for them, where it rests else
+    events   : breaths and laughter that are detected: the mouth opens for them, where it rests else
     Before phrases after a longer pause the lips part for a breath; where p, b or m is first they stay closed, for they
     would shut again within a few pictures. The motion may have any channels; without phones it stays as it is.
     """
@@ -155,8 +160,8 @@ def rest_in_pauses(
     if "opening" in motion.names and motion.channels[motion.column("opening")].unit == EYE_DISTANCE:
         column = motion.column("opening")
         values[:, column] = _begin_phrases(units, time_s, values[:, column].astype(np.float64), weight, free)
-        if breaths:
-            lacking = np.maximum(_open_for_breaths(breaths, time_s) * weight - values[:, column], 0)
+        if events:
+            lacking = np.maximum(_open_for_events(events, time_s) * weight - values[:, column], 0)
             # by how much each channel changes with the opening, on average; motion that hardly opens the mouth says
             # nothing of that: the opening changes alone, and with it the outer lips
             centred = motion.values.astype(np.float64) - motion.values.astype(np.float64).mean(axis=0)
@@ -192,11 +197,17 @@ def _begin_phrases(units: Timeline[Unit], time_s: Curve, opening: Curve, weight:
     return opening
 
 
-def _open_for_breaths(breaths: Sequence[tuple[float, float]], time_s: Curve) -> Curve:
-    """Return the least opening for breaths in pauses, in eye distances [shape=(T,)]."""
+def _open_for_events(events: Sequence[VoiceEvent], time_s: Curve) -> Curve:
+    """Return the least opening for what is detected in pauses, in eye distances [shape=(T,)]."""
     opening = np.zeros(len(time_s))
-    for start_s, end_s in breaths:
-        near = slice(*np.searchsorted(time_s, (start_s - INHALING_EDGE_S, end_s + INHALING_EDGE_S)))
-        inside = np.minimum(time_s[near] - start_s, end_s - time_s[near]) + INHALING_EDGE_S
-        opening[near] = np.maximum(opening[near], smooth_step(inside / (2 * INHALING_EDGE_S)) * INHALING_GAP)
+    for event in events:
+        if event.kind not in (BREATH, LAUGHTER):
+            continue
+        near = slice(*np.searchsorted(time_s, (event.start_s - EVENT_EDGE_S, event.end_s + EVENT_EDGE_S)))
+        inside = np.minimum(time_s[near] - event.start_s, event.end_s - time_s[near]) + EVENT_EDGE_S
+        gap = smooth_step(inside / (2 * EVENT_EDGE_S)) * (INHALING_GAP if event.kind == BREATH else LAUGH_GAP)
+        if event.kind == LAUGHTER:
+            calls = [loud * np.exp(-np.square((time_s[near] - call_s) / CALL_S) / 2) for call_s, loud in event.calls]
+            gap *= LAUGH_SHARE + (1 - LAUGH_SHARE) * np.max(calls, axis=0, initial=0)
+        opening[near] = np.maximum(opening[near], gap)
     return opening

@@ -91,8 +91,8 @@ def generate_motion(
         pinned_s = [pin.time_s - start_s for pin in constraints.pins] if constraints else []
         if request.onto is None:
             generation = replace(generation, motion=make_symmetrical(generation.motion, request.asymmetry))
-        breaths = [(begin_s - start_s, end_s - start_s) for begin_s, end_s in analysis.breaths]
-        return rest_in_pauses(generation, request.pauses, pinned_s, breaths)
+        events = [event.shifted(-start_s) for event in analysis.events]
+        return rest_in_pauses(generation, request.pauses, pinned_s, events)
 
     speech, fit = analysis.speech, analysis.fit
     generation = generate_for(person, model.engine, model.learned, speech, constraints, finish)
@@ -100,6 +100,7 @@ def generate_motion(
     return replace(
         generation,
         moods=time_moods(analysis.tags, speech.units),
+        events=analysis.events,
         about=model.about,
         knowledge=SpeechKnowledge(speech.voice, float(np.mean(speech.confidence)), fits),
         outlook=predict_outlook(request, analysis),

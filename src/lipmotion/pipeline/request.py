@@ -75,7 +75,7 @@ class Request(Configuration):
                  only one
     pauses     : ``rest``: lips close softly in pauses from 0.25 s, and part no earlier than 0.12 s before a phrase;
                  ``natural``: the mouth does in pauses what the model learned
-    manner     : ``detected``: the mouth opens for breaths in the sound (docs/expression.md); ``asked``: not
+    manner     : ``detected``: the mouth opens for laughter and breaths (docs/expression.md); ``asked``: not
     asymmetry  : 0 to 1: the share that is left of the difference between both sides of the speaker's own mouth, in the
                  lip and jaw points; the mouth of another person (``onto``) stays as it is
     model      : the model file, where no other model is given beside the request; None: the shipped one
@@ -154,7 +154,7 @@ class Request(Configuration):
         "detected",
         Rule(choices=get_args(Manner)),
         omit_default=True,
-        help="detected: breaths in the sound open the mouth (default); asked: none does",
+        help="detected: laughter and breaths in the sound move the mouth (default); asked: none does",
     )
     asymmetry: float = option(
         0.0,

@@ -414,7 +414,7 @@ class Session:
             def make() -> Generation:
                 plain = self._recording
                 speech = self._cache.cached("segment", place, lambda: cut_speech(plain.speech, excerpt.frames))
-                segment = replace(plain, speech=self._with_units(speech, phones), tags=(), breaths=())
+                segment = replace(plain, speech=self._with_units(speech, phones), tags=(), events=())
                 return generate_motion(self.request, self.speaker, self.model, segment, constraints)
 
             return self._cache.cached("excerpt", (place, phones, constraints), make)

@@ -26,7 +26,7 @@ __all__ = [
     "Item", "JoinedRows", "Monitor", "Motion", "NamedProbability", "Outlook", "ParallelMap", "Pin", "PriorOutput",
     "Progress", "Prosody", "ReducedVariance", "Rule", "SlopedPin", "Span", "Speech",
     "SpeechKnowledge", "SpeechPart", "SpokenText", "Staging", "StateTrace", "TimedTranscript", "TimedWord", "Timeline",
-    "TokenPosteriors", "Track", "TranscriptLine", "Unit", "Utterance", "check_curves",
+    "TokenPosteriors", "Track", "TranscriptLine", "Unit", "Utterance", "VoiceEvent", "check_curves",
     "check_magnitude", "frame_of", "frames_of", "from_sixteen_bits", "option", "silent_monitor", "sort_lines",
     "sub_monitor", "to_sixteen_bits", "with_progress",
 ]  # fmt: skip

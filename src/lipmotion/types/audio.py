@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import Any
 
@@ -14,6 +14,7 @@ from lipmotion.types.timeline import Span
 
 SPEECH_RATE_HZ = 16_000  # of all speech that is analysed
 FULL_SCALE = 32_768  # the 16-bit value of a sample of 1, which is one more than there is
+LAUGHTER, BREATH = "laughter", "breath"
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +58,29 @@ class Prosody:
 
     level_db: NDArray[np.floating[Any]]
     log_f0: NDArray[np.floating[Any]]
+
+
+@dataclass(frozen=True)
+class VoiceEvent:
+    """Something detected in a voice beside its words (``speech.sound.voice_events``).
+
+    start_s, end_s : seconds
+    kind     : ``LAUGHTER`` (a bout) or ``BREATH`` (drawn in, in a pause)
+    strength : 0 to 1: how sure laughter is; of a breath, how far it stands out of the noise of the recording
+    calls    : of laughter, the time in seconds of each "ha", and its loudness beside the loudest one, 0 to 1: half of
+               it 10 dB lower
+    """
+
+    start_s: float
+    end_s: float
+    kind: str
+    strength: float
+    calls: tuple[tuple[float, float], ...] = ()
+
+    def shifted(self, offset_s: float) -> VoiceEvent:
+        """Return the event with ``offset_s`` seconds added to all times."""
+        calls = tuple((time_s + offset_s, loudness) for time_s, loudness in self.calls)
+        return replace(self, start_s=self.start_s + offset_s, end_s=self.end_s + offset_s, calls=calls)
 
 
 FRAME_RATE_HZ = 100.0  # frames per second of all models; frame n is centred at n / FRAME_RATE_HZ seconds

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.types.audio import Audio
+from lipmotion.types.audio import Audio, VoiceEvent
 from lipmotion.types.delivery import MoodKey
 from lipmotion.types.edits import CurveEdit
 from lipmotion.types.motion import Motion, interpolate_rows
@@ -103,6 +103,7 @@ class Generation:
     stepped : channels of held poses, which change at once: formats that can say so do
     curve_edits : edits of curves that follow from the motion, as ``jawOpen``, wherever these are made; and what is held
     moods  : what the words say of the mood, over time, in the order of their times
+    events : what is detected in the voice beside words; manners and moods of them are shown where none is asked for
     about  : corpus, licence and attribution of the model, by name, as ``Model.about``; empty: not from ``animate``
     knowledge : of voice and phones, from which ``confidence`` follows (None: not from ``animate``)
 
@@ -122,6 +123,7 @@ class Generation:
     stepped: tuple[str, ...] = ()
     curve_edits: tuple[CurveEdit, ...] = ()
     moods: tuple[MoodKey, ...] = ()
+    events: tuple[VoiceEvent, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)
     knowledge: SpeechKnowledge | None = None
 

@@ -31,12 +31,11 @@ from lipmotion.speech.recognition.recognised_speech import (
     measure_level_range,
     place_units,
     select_reliable,
-    silence_units,
 )
 from lipmotion.speech.recognition.recogniser import Recogniser, open_recogniser, uses_network
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.sound.breaths import find_breaths
 from lipmotion.speech.sound.speaker_similarity import rate_knowledge
+from lipmotion.speech.sound.voice_events import find_voice_events, silence_units
 from lipmotion.storage.sources import is_file
 from lipmotion.types import (
     FRAME_RATE_HZ,
@@ -54,9 +53,11 @@ from lipmotion.types import (
     Timeline,
     TranscriptLine,
     Unit,
+    VoiceEvent,
     frames_of,
     silent_monitor,
 )
+from lipmotion.types.audio import LAUGHTER
 from lipmotion.types.delivery import MoodTag
 from lipmotion.types.languages import ENGLISH
 from lipmotion.units import SILENCE, UNKNOWN_PHONES, check_phones, check_text, close_gaps, is_silent
@@ -91,7 +92,7 @@ class SpeechAnalysis:
     range_db    : decibels between the loud and the quiet moments of the recording
     fit         : of the transcript; None where there was none, or it was not compared with the sound
     tags        : the moods that tags in the transcript ask for
-    breaths     : start and end in seconds of each that is detected; empty: none, or they were not asked for
+    events      : what is detected in the voice beside words; empty: nothing, or it was not asked for
     """
 
     speech: Speech
@@ -99,7 +100,7 @@ class SpeechAnalysis:
     range_db: float
     fit: TranscriptFit | None = None
     tags: tuple[MoodTag, ...] = ()
-    breaths: tuple[tuple[float, float], ...] = ()
+    events: tuple[VoiceEvent, ...] = ()
 
     @property
     def is_without_speech(self) -> bool:
@@ -131,11 +132,11 @@ def analyse_speech(
     analysis = _find_phones(model, request, audio, _report_progress(each, audio.duration_s, monitor))
     speech, recognition = analysis.speech, analysis.recognition
     tones = [(first / FRAME_RATE_HZ, end / FRAME_RATE_HZ) for first, end in audio.tones]
-    breaths = find_breaths(audio, speech.units) if request.manner == DETECTED else ()
-    units = silence_units(speech.units, tones)
+    events = find_voice_events(audio, speech.units) if request.manner == DETECTED else ()
+    units = silence_units(speech.units, [*tones, *((e.start_s, e.end_s) for e in events if e.kind == LAUGHTER)])
     speech = with_units(speech, units) if units != speech.units else speech
-    analysis = replace(analysis, speech=speech, breaths=breaths)
-    if analysis.is_without_speech and not breaths:
+    analysis = replace(analysis, speech=speech, events=events)
+    if analysis.is_without_speech and not analysis.events:
         LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
     elif tones:
         from lipmotion.pipeline.analysis.transcribe import format_places

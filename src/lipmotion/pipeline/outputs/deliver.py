@@ -24,12 +24,25 @@ from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes, with_m
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, to_arkit
 from lipmotion.pipeline.outputs.curve_sets import show_edited_curves, with_curves
-from lipmotion.types import Generation, Prosody
-from lipmotion.types.delivery import PLAIN, MoodKey, Staging, sort_moods
+from lipmotion.types import Generation, Prosody, VoiceEvent
+from lipmotion.types.audio import LAUGHTER
+from lipmotion.types.delivery import NEUTRAL, PLAIN, MoodKey, Staging, sort_moods
 from lipmotion.types.motion import RADIAN
 
 FACTORS: Final = {PLAIN: 1.0, "whisper": 0.65, "shout": 1.5, "mumble": 0.5}
 """How large the movements of the mouth are in each manner, beside those of plain speech."""
+
+LAUGHING: Final = "happy"
+"""The mood of a face that laughs: cheeks and corners of the lips are raised; ``articulation.rest`` opens the jaw."""
+
+
+def with_detected(asked: Sequence[MoodKey], events: Sequence[VoiceEvent]) -> tuple[MoodKey, ...]:
+    """Return moods and manners over time: those that are asked for, and where no mood is, that of laughter."""
+    keys = list(asked)
+    for event in events if all(key.is_manner for key in asked) else ():
+        if event.kind == LAUGHTER:
+            keys += [MoodKey(event.start_s, LAUGHING), MoodKey(event.end_s, NEUTRAL)]
+    return sort_moods(keys)
 
 
 def with_manners(generation: Generation, keys: Sequence[MoodKey], *, in_place: bool = False) -> Generation:
@@ -52,10 +65,11 @@ def deliver(generation: Generation, delivery: Delivery) -> Generation:
     """Return generated motion with its mood, intensity, anticipation and offset; held poses come last (``hold_poses``).
 
     Moods of the delivery at time 0 are those before the first one of the generation, and later ones are added to these;
-    without any, motion keeps the moods that it has. So do manners of speaking.
+    without any, motion keeps the moods that it has. So do manners of speaking. Where no mood is asked for, that of
+    laughter counts.
     Raises InputError: the offset leaves nothing.
     """
-    keys = sort_moods((*delivery.moods, *generation.moods))
+    keys = with_detected(sort_moods((*delivery.moods, *generation.moods)), generation.events)
     if has_moods := not all(key.is_manner for key in keys):
         generation = generation.selected([name for name in generation.motion.names if not is_mood(name)])
         generation = generation.with_motion(with_moods(generation.motion, keys))

@@ -319,19 +319,6 @@ def select_reliable(units: Timeline[Unit], confidence: float) -> Timeline[Unit]:
     return Timeline(tuple(map(rate, units)))
 
 
-def silence_units(units: Timeline[Unit], others: Sequence[tuple[float, float]]) -> Timeline[Unit]:
-    """Return recognised phones in time which are silence where something else is heard; known phones stay.
-
-    others : from when to when, in seconds
-    """
-    spans = []
-    for span in units:
-        inside_s = sum(max(min(span.end_s, end_s) - max(span.start_s, start_s), 0.0) for start_s, end_s in others)
-        is_word = span.label.confidence is None or inside_s < span.duration_s / 2
-        spans.append(span if is_word else replace(span, label=Unit(SILENCE, confidence=span.label.confidence)))
-    return Timeline(tuple(spans))
-
-
 def label_words(
     aligned: AlignedWords, stretch: Stretch, believed: NDArray[np.bool_], first_word: int
 ) -> Iterator[LabelledStretch]:
