@@ -25,6 +25,7 @@ from lipmotion.types.values import parse_number, parse_whole
 _VERBS = "animate batch live speak render edit explain cues train"
 _PLACES = {name: f"lipmotion.cli.verbs.{name}:add" for name in _VERBS.split()}
 _PLACES |= {name: f"lipmotion.cli.verbs.about:add_{name}" for name in "addon info cite doctor completion".split()}
+_PLACES["words"] = "lipmotion.cli.verbs.explain:add_words"
 _PLACES["adapt"] = "lipmotion.cli.verbs.train:add_adapt"
 VERBS: Registry[Callable[[Any], None]] = Registry("verb", "lipmotion.verbs", _PLACES)
 """What adds each verb to the parser; those of faces, studio and lab are entry points."""
