@@ -96,7 +96,7 @@ OPTIONS = ("--machine-readable", "--machineReadable")
 STATUS_VERBS, LINES_VERBS = (
     ("cues",),
     (
-        *("animate", "batch", "render", "edit", "face", "speak", "corpus", "train"),
+        *("animate", "batch", "render", "edit", "face", "speak", "words", "corpus", "train"),
         *("evaluate", "compare", "experiment", "study", "doctor"),
     ),
 )
