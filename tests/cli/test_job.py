@@ -211,7 +211,7 @@ def test_what_edit_refuses(run, speech, toy_model_file, tmp_path):
         (["edit", file, "phone 3 is p"], "no such file; begin one: lipmotion edit"),
         (["render", file, "-o", tmp_path / "a.csv"], "a.edits.json: cannot be read"),
         (["animate", speech, "--edits", file, "-o", tmp_path / "a.csv"], "a.edits.json: no such edits file"),
-        (["edit", tmp_path / "a.csv", *of], "ends in one of: .json, .toml"),
+        (["edit", tmp_path / "a.csv", *of], "a file of edits is called .json"),
         (["edit", file, *of], ""),
         (["edit", file, "--of", speech], "exists; add edits without --of"),
         (["edit", file, "--undo", 2], "2 edits to take back, required 0 to 0"),
