@@ -24,6 +24,7 @@ from lipmotion.speech.features.mfcc import (
     mfcc_of_warps,
     spectrum,
 )
+from lipmotion.speech.sound.noise_reduction import reduce_noise
 from lipmotion.speech.sound.voice_activity import (
     SEPARATE_FRAMES,
     SOFTEST_DROP,
@@ -113,6 +114,8 @@ class AnalysedAudio(Audio):
             if len(samples) < WINDOW:
                 continue
             energy = log_energy(samples)
+            if (clean := reduce_noise(samples, energy)) is not samples:
+                samples, energy = clean, log_energy(clean)
             tones = find_tones(samples, energy)
             passages = [] if tones else find_passages(energy)
             cuts = _find_silences(passages, samples)
