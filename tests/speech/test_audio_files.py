@@ -62,13 +62,12 @@ GUID = bytes.fromhex("000000001000800000aa00389b71")
 WAVE64 = bytes.fromhex("f3acd3118cd100c04f8edb8a")
 
 
-def samples(valid: int, container: int, high_first: bool = False) -> bytes:
+def samples(valid: int, container: int) -> bytes:
     """Samples of so many bits, at the left of containers of so many, with zeros behind them."""
     whole = np.round(TONE * 2.0 ** (valid - 1)).astype(np.int64) << (container - valid)
     if container == 8:
         return (whole + 128).astype(np.uint8).tobytes()
-    bytes_of_each = whole.astype("<i8").view(np.uint8).reshape(-1, 8)[:, : container // 8]
-    return bytes_of_each[:, :: -1 if high_first else 1].tobytes()
+    return whole.astype("<i8").view(np.uint8).reshape(-1, 8)[:, : container // 8].tobytes()
 
 
 def form(bits: int = 16, *, coding: int = PCM, block: int | None = None, per_second: int | None = None) -> bytes:
@@ -94,14 +93,6 @@ def wave64(*chunks: tuple[bytes, bytes]) -> bytes:
     for name, content in chunks:
         body += name + WAVE64 + struct.pack("<Q", 24 + len(content)) + content + bytes(-len(content) % 8)
     return b"riff" + bytes.fromhex("2e91cf11a5d628db04c10000") + struct.pack("<Q", 24 + len(body)) + body
-
-
-def aifc(kind: bytes, bits: int, content: bytes) -> bytes:
-    rate = bytes.fromhex("400cfa00000000000000")
-    common = struct.pack(">HIH", 1, len(TONE), bits) + rate + kind + bytes(2)
-    parts = (b"COMM", common), (b"SSND", bytes(8) + content)
-    body = b"AIFC" + b"".join(name + struct.pack(">I", len(part)) + part for name, part in parts)
-    return b"FORM" + struct.pack(">I", len(body)) + body
 
 
 def wide(length: int) -> bytes:
@@ -137,9 +128,6 @@ FORMS = {
         chunk(b"fmt ", form()), chunk(b"data", S16[2000:])),
     "Wave64": wave64((b"fmt ", form()), (b"data", S16)),
     "Wave64, 24 in 32": wave64((b"fmt ", long_form(24, 32)), (b"data", S24_IN_32)),
-    "AIFC sowt": aifc(b"sowt", 16, S16),
-    "AIFC fl32": aifc(b"fl32", 32, TONE.astype(">f4").tobytes()),
-    "AIFC of 20 bits": aifc(b"NONE", 20, samples(20, 24, high_first=True)),
 }  # fmt: skip
 
 

@@ -257,14 +257,6 @@ def test_long_phones_are_judged_by_their_sound(sentences: list[ToySentence]) -> 
     assert missing("m", gain=0.003) == ()
 
 
-def test_places_near_one_another_are_one_stretch() -> None:
-    assert agreement._join([(0.0, 1.0), (1.4, 2.0), (3.0, 3.5)]) == ((0.0, 2.0), (3.0, 3.5))
-    fit = agreement.TranscriptFit(-1.0, ((0.0, 2.0), (3.0, 3.5)), 10.0)
-    assert fit.missing_s == pytest.approx(2.5)
-    assert fit.share == pytest.approx(0.75)
-    assert agreement.TranscriptFit(agreement.DOUBTFUL_SCORE - 0.1, (), 10.0).share == 0  # of something else
-
-
 @pytest.mark.recordings
 def test_a_part_of_a_transcript_is_noticed_and_a_whole_one_is_not(recordings: Path) -> None:
     """Docs/robustness.md."""
