@@ -197,12 +197,6 @@ def test_names_elsewhere_are_names_without_a_recording(tmp_path: Path) -> None:
     assert sorted(found.problems) == ["-etc-passwd", "..", "..-name1", "name1"]
 
 
-def test_long_lists_of_many_recordings(tmp_path: Path) -> None:
-    (tmp_path / "train.txt").write_text("".join(f"name{i}\n" for i in range(200)))
-    found = source_recordings.assign_splits(recordings(50), tmp_path)
-    assert (len(found.recordings), len(found.problems)) == (50, 150)
-
-
 def test_a_list_of_another_folder_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "val.txt").write_text("".join(f"other{i}\n" for i in range(MAX_MISSING_NAMES + 1)))
     with pytest.raises(CorpusError, match=f"name {MAX_MISSING_NAMES + 1} recordings .* at most {MAX_MISSING_NAMES}"):

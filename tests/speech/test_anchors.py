@@ -91,13 +91,6 @@ def found_words(*starts: int, fits: Sequence[float] | None = None) -> list[Place
     return [silence, *words]
 
 
-def test_words_that_begin_or_end_with_their_window_are_pressed():
-    windows = Windows(np.array([0, 100, 200]), np.array([150, 300, 500]))
-    for starts, pressed in (((20, 120, 250), []), ((20, 100, 250), [1]), ((20, 150, 300), [0, 1])):
-        found = anchors.find_pressed_words(found_words(*starts), windows, 500)
-        assert np.flatnonzero(found).tolist() == pressed
-
-
 class Search:
     """A search that finds the words at true places, as far as their windows allow; elsewhere they fit badly."""
 

@@ -79,28 +79,11 @@ def moved(found: list[voice_activity.Stretch], frames: int) -> list[voice_activi
     return [voice_activity.Stretch(first + frames, end + frames) for first, end in found]
 
 
-@pytest.mark.parametrize(
-    ("before_s", "after_s", "units"), [(0, 0, 0), (5, 0, 0), (0, 5, 0), (20, 20, 0), (60, 60, 0), (5, 5, 1), (5, 5, 4)]
-)
-def test_a_passage_is_the_same_whatever_silence_is_around_it(before_s: float, after_s: float, units: float) -> None:
-    """But for the frames whose windows reach into the silence."""
-    (alone,) = moved(passages(hiss(0.5, 0), spoken(0), hiss(0.5, 0)), -50)
-    (found,) = moved(passages(hiss(before_s, units), spoken(0), hiss(after_s, units)), -round(100 * before_s))
-    assert found == pytest.approx(alone, abs=3)
-    if before_s and after_s and not units:
-        assert found == alone
-
-
 def test_a_noise_as_loud_as_the_room_may_be_its_margin_and_nothing_more() -> None:
     (found,) = moved(passages(hiss(5, 25), spoken(0), hiss(5, 25)), -500)
     sound = np.flatnonzero(find_spoken_frames(mfcc.log_energy(spoken(0))))
     assert sound[0] - voice_activity.PASSAGE_MARGIN - 2 <= found.first <= sound[0] - 10
     assert sound[-1] + 10 <= found.end <= sound[-1] + voice_activity.PASSAGE_MARGIN + 3
-
-
-def test_a_passage_is_the_same_at_any_level() -> None:
-    samples = spoken(0)
-    assert [passages(louder(samples, decibels)) for decibels in (-40, -20, -6)] == [passages(samples)] * 3
 
 
 def test_a_pause_within_a_line_does_not_divide_it() -> None:

@@ -24,11 +24,6 @@ ANY = st.one_of(st.integers(32, 126), st.integers(0, 0xD7FF), st.integers(0xE000
 """Any character. The tables by which Hypothesis chooses one by its kind take a second and 200 MB."""
 
 
-def test_quotation_marks_are_not_spoken() -> None:
-    for text in ("say 'hello'.", "say ‘Hello’", "say hello'", "say 'hello", "say “hello”", "SAY «HELLO»"):
-        assert units.split_words(text) == ("say", "hello")
-
-
 def test_a_text_without_words_is_refused() -> None:
     for text in ("", "   \n", "...", "—", "'", "’’", "🙂", "_"):
         with pytest.raises(InputError, match="holds no word; give the words that are spoken"):
@@ -37,10 +32,7 @@ def test_a_text_without_words_is_refused() -> None:
 
 def test_numbers() -> None:
     for digits, words in (
-        ("0", "zero"), ("10", "ten"), ("19", "nineteen"), ("20", "twenty"), ("99", "ninety nine"),
-        ("100", "one hundred"), ("101", "one hundred one"), ("1000", "one thousand"), ("1001", "one thousand one"),
-        ("110000", "one hundred ten thousand"), ("2000000", "two million"), ("1000000001", "one billion one"),
-        ("1000000000000", "one" + " zero" * 12), ("00", "zero zero"),
+        ("0", "zero"), ("1000000001", "one billion one"), ("1000000000000", "one" + " zero" * 12), ("00", "zero zero"),
     ):  # fmt: skip
         assert " ".join(spell_number(digits)) == words
     assert units.split_words("7" * 10_000) == ("seven",) * 10_000  # numbers of any length are digits

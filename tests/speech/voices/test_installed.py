@@ -202,11 +202,6 @@ def test_a_program_that_fails_is_refused(
 
 
 @needs_scripts
-def test_a_program_reads_what_it_is_given(tmp_path: Path) -> None:
-    assert synthesiser.run_program([str(_program(tmp_path, "exec cat"))], "a-package", stdin="Helló\n") == "Helló\n"
-
-
-@needs_scripts
 def test_what_a_program_started_ends_with_it(tmp_path: Path) -> None:
     synthesiser.run_program([str(_program(tmp_path, "(sleep 0.3; touch $0.d/late) &"))], "a-package")
     time.sleep(0.6)
