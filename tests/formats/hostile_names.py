@@ -126,13 +126,6 @@ def _seen(text: str) -> str:
     return plain if is_line(plain) else printable(plain)
 
 
-def _of_xml(text: str) -> list[str]:
-    found = ElementTree.fromstring(text)  # noqa: S314 (written by the package)
-    assert [each.text for each in found.iter("mouthCue")] == ["X", "A"]
-    assert found.findtext("metadata/soundFile", "").startswith("x")
-    return []
-
-
 def _of_pgo(text: str) -> list[str]:
     lines = text.split("\n")
     assert [line.count("\t") for line in lines] == [0, 0, 0, 0, 0, 1, 1, 1, 2, 2, 2, 2, 3, 4, 0]
@@ -140,15 +133,6 @@ def _of_pgo(text: str) -> list[str]:
     assert (int(first), int(last), int(shapes)) == (1, int(lines[3]) - 1, 1)
     assert lines[6].strip("\t") == lines[8].strip("\t") == word
     return ["".join(lines[1].split()), word]
-
-
-def _of_json(text: str) -> list[str]:
-    return [json.loads(text)["metadata"]["soundFile"]]
-
-
-def _of_rows(text: str) -> list[str]:
-    assert [line.split()[-1] for line in text.splitlines()[-3:]] in (["X", "A", "X"], ["rest", "MBP", "rest"])
-    return []
 
 
 def _usda(folder: Path, name: str) -> None:
@@ -204,8 +188,7 @@ def _bibtex(_: Path, name: str) -> None:
 WRITERS: dict[str, Callable[[Path, str], None]] = {
     **{suffix: _motion_file(suffix) for suffix in ("json", "csv", "npz", "c3d")}, "fap": _fap,
     "blender.py": _script, ".TextGrid": _labels(".TextGrid", _of_textgrid), ".vtt": _labels(".vtt", _of_webvtt),
-    **{form: _cues(form, _of_rows) for form in ("tsv", "dat")}, "rhubarb xml": _cues("xml", _of_xml),
-    "rhubarb json": _cues("json", _of_json), "pgo": _cues("pgo", _of_pgo),
+    "pgo": _cues("pgo", _of_pgo),
     **{"usda": _usda, "glb": _glb, "reports": _report, "xmp": _xmp, "bibtex": _bibtex},
 }  # fmt: skip
 """By format: writes a name into a file of a folder, and reads it back; asserts that it is the same."""

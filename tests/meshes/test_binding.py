@@ -206,17 +206,6 @@ def test_named_points_are_checked():
             lip_placement.place_lips_by_points(mesh, build_surface(mesh), named)
 
 
-def test_of_a_dense_mesh_some_vertices_are_compared(monkeypatch):
-    mesh = head()
-    surface = build_surface(mesh)
-    whole = lip_placement.place_lips_by_shape(mesh, surface)
-    monkeypatch.setattr(lip_placement, "MAX_PAIRS", 1500)
-    thinned = lip_placement.place_lips_by_shape(mesh, surface)
-    assert (thinned.vertices != whole.vertices).any()
-    assert _offsets(mesh, thinned) < 2 * GRID
-    assert thinned.scale == pytest.approx(whole.scale, rel=0.2)
-
-
 def _shapes_of(mesh):
     return character_files.find_face_shapes(mesh, lip_placement.place_lips_by_shape(mesh, build_surface(mesh)))
 

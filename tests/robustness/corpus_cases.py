@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robustness.case import Bench, case, declared, npy
 from robustness.motion_cases import GOOD
@@ -104,23 +103,6 @@ _array("cut off", "audio", lambda content: content[:-20])
 _array("of texts", "motion", lambda _: npy(np.array(["a"] * 50)), "holds <U1, required")
 _array("of a trillion numbers declared", "features", lambda _: declared("(1000000000000,)"))
 _array("of pickled objects", "seen", lambda _: npy(np.array([{}], object)))
-
-
-def _remade(name: str, array: str, remake: Callable[[NDArray[Any]], NDArray[Any]], *messages: str, verb: str) -> None:
-    @_damaged(f"{array} {name}: {verb}", 4, *AGAIN, *messages, verb=verb)
-    def _(corpus: Path) -> None:
-        for folder in (corpus / "utterances").iterdir():
-            path = folder / f"{array}.npy"
-            np.save(path, remake(np.load(path, allow_pickle=False)))
-
-
-_remade("times 1e6", "motion", lambda a: a * 1e6, "required within", verb="evaluate")
-_remade("times 1e6", "motion", lambda a: a * 1e6, "required within", verb="experiment hofer2008")
-_remade("times 1e6", "features", lambda a: a * 1e6, "required -1000 to 1000", verb="train")
-_remade("of NaN", "features", lambda a: a * np.nan, "not finite", verb="train")
-_remade("in 32 bits", "audio", lambda a: a.astype(np.float32), "holds float32", verb="train")
-_remade("a frame shorter", "seen", lambda a: a[1:], "seen of shape", verb="train")
-_remade("a channel narrower", "motion", lambda a: a[:, 1:], "motion of shape", verb="train")
 
 
 @_damaged("an utterance that is a link", 0, verb="corpus info")

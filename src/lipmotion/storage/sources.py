@@ -224,7 +224,8 @@ def _read_kinds() -> list[tuple[str, str, int, bytes]]:
     """
     lines = resources.files(__package__).joinpath("file_kinds.csv").read_text(encoding="ascii").splitlines()
     rows = csv.reader(lines[1:])
-    return [(*row[:2], int(row[2]), row[3].encode().decode("unicode_escape").encode("latin-1")) for row in rows]
+    marks = ((group, name, int(at), mark.encode().decode("unicode_escape")) for group, name, at, mark in rows)
+    return [(group, name, at, mark.encode("latin-1")) for group, name, at, mark in marks]
 
 
 def check_kind(path: Path, wanted: str, kind: str = "") -> None:

@@ -247,23 +247,11 @@ def _skinned() -> tuple[dict, bytes]:
     """The square on a neck, a head and a jaw."""
     content, binary = document()
     joints, weights = np.tile(np.array([0, 1, 2, 0], np.uint8), (4, 1)), np.full((4, 4), 0.25, "<f4")
-    content["nodes"] = [
-        {"mesh": 0, "skin": 0},
-        {"name": "Neck", "children": [2]},
-        {"name": "Head", "children": [3]},
-        {"name": "JawBone"},
-    ]
+    names = [{"name": "Neck", "children": [2]}, {"name": "Head", "children": [3]}, {"name": "JawBone"}]
+    content["nodes"] = [{"mesh": 0, "skin": 0}, *names]
     content["scenes"], content["skins"] = [{"nodes": [0, 1]}], [{"joints": [1, 2, 3]}]
-    views: list[dict] = [{"buffer": 0, "byteOffset": len(binary), "byteLength": 16}]
-    views.append({"buffer": 0, "byteOffset": len(binary) + 16, "byteLength": 64})
-    content["bufferViews"] += views
-    content["accessors"] += [
-        {"bufferView": 4, "componentType": 5121, "count": 4, "type": "VEC4"},
-        {"bufferView": 5, "componentType": 5126, "count": 4, "type": "VEC4"},
-    ]
-    content["meshes"][0]["primitives"][0]["attributes"] |= {"JOINTS_0": 4, "WEIGHTS_0": 5}
     del content["meshes"][0]["extras"]
-    return content, binary + joints.tobytes() + weights.tobytes()
+    return content, gltf.with_skin(content, binary, joints, weights)
 
 
 def check_character(folder: Path, _: Good) -> None:

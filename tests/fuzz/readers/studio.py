@@ -1,6 +1,5 @@
 """Readers of what people and programs send: lists, jobs, edits, projects, studies, requests, live sound and replies."""
 
-import asyncio
 import copy
 import json
 import math
@@ -8,16 +7,14 @@ import os
 import shutil
 import socket
 import tempfile
-from collections.abc import Callable, Generator
-from contextlib import ExitStack, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from shutil import copyfile
 from tempfile import TemporaryDirectory
-from types import SimpleNamespace
 from typing import Any
-from unittest import mock
 
 import numpy as np
 from websockets.sync.client import connect
@@ -34,7 +31,7 @@ from lipmotion.storage.archive import take_array
 from lipmotion.storage.json_text import from_json
 from lipmotion.types import Outlook, Span, Timeline, Unit
 from lipmotion_studio.folder import PROJECT, ProjectFolder
-from lipmotion_studio.live import servers, vtube
+from lipmotion_studio.live import servers
 from lipmotion_studio.project import (
     EditVersion,
     ExportRecord,
@@ -189,13 +186,6 @@ def _read_one(path: Path, name: str, folder: Path) -> None:
             file.edits.staging()
 
 
-REPLIES: dict[str, dict[str, Any]] = {
-    "AuthenticationRequest": {"data": {"authenticated": True}},
-    "AuthenticationTokenRequest": {"data": {"authenticationToken": "token"}},
-    "InputParameterListRequest": {"data": {"defaultParameters": [{"name": "MouthOpen"}], "customParameters": []}},
-    "ParameterCreationRequest": {"data": {"parameterName": "JawOpen"}},
-    "InjectParameterDataRequest": {"data": {}},
-}
 WORDS = [["baby", 0.1, 0.4], ["", 0.4, 0.5], ["<b>two</b>", 0.5, 0.9]]
 UPGRADE = "upgrade: websocket\r\nconnection: Upgrade\r\nsec-websocket-version: 13\r\n"
 REQUEST = f"GET / HTTP/1.1\r\nhost: localhost\r\n{UPGRADE}sec-websocket-key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
@@ -209,8 +199,7 @@ def seed_live(good: Good) -> list[Files]:
             np.save(Path(folder) / f"{name}.npy", samples)
         arrays = [{path.name: path.read_bytes()} for path in sorted(Path(folder).iterdir())]
     raw = (sound * 32767).astype("<i2").tobytes()
-    replies = {kind: {"requestID": "ID", "messageType": kind} | reply for kind, reply in REPLIES.items()}
-    texts = {"words.json": WORDS, "phones.json": [["b", 0.1, 0.2], ["ey1", 0.2, 0.4]], "replies.json": replies}
+    texts = {"words.json": WORDS, "phones.json": [["b", 0.1, 0.2], ["ey1", 0.2, 0.4]]}
     found = [{name: json.dumps(content).encode()} for name, content in texts.items()]
     return [*found, *arrays, {"sound.raw": raw}, {"client.http": REQUEST.encode() + FRAME}]
 
@@ -221,8 +210,6 @@ def check_live(folder: Path, good: Good) -> None:
     content = path.read_bytes()
     if path.suffix == ".http":
         _send(content)
-    elif path.name == "replies.json":
-        asyncio.run(_converse(_decoded(from_json, content)))
     else:
         stream, frames = copy.deepcopy(_stream()), list[LiveFrame]()
         if path.suffix == ".json":
@@ -265,44 +252,6 @@ def _send(content: bytes) -> None:
                 pass
         with connect(f"ws://{host}:{port}/", proxy=None) as other:
             require(other.recv(timeout=10) == "hello", "a server that no longer greets")
-
-
-class _Studio:
-    """A connection to a VTube Studio whose replies are given; the second connection ends the conversation."""
-
-    def __init__(self, replies: Any) -> None:
-        self._replies, self._asked, self._connections = replies, list[dict[str, Any]](), 0
-
-    def __await__(self) -> Generator[None, None, "_Studio"]:
-        self._connections += 1
-        if self._connections > 1:
-            raise asyncio.CancelledError
-        return self
-        yield
-
-    async def close(self) -> None:
-        self.transport = SimpleNamespace(abort=self._asked.clear)
-
-    async def send(self, text: str) -> None:
-        self._asked.append(json.loads(text))
-
-    async def recv(self) -> str:
-        if not self._asked or len(self._asked) > 20:
-            raise OSError("it has ended")
-        question = self._asked.pop()
-        kind = question["messageType"]
-        reply = self._replies.get(kind) if isinstance(self._replies, dict) else self._replies
-        return json.dumps(reply).replace('"ID"', json.dumps(question["requestID"]))
-
-
-async def _converse(replies: Any) -> None:
-    with tempfile.TemporaryDirectory() as folder, ExitStack() as patches:
-        studio, connection = vtube.VTubeStudio("ws://nowhere", Path(folder) / "token"), _Studio(replies)
-        patches.enter_context(mock.patch("websockets.asyncio.client.connect", return_value=connection))
-        patches.enter_context(mock.patch("lipmotion_studio.live.vtube.AGAIN_S", 0.0))
-        studio(copy.deepcopy(_stream()).push(np.zeros(8000, np.float32))[-1])
-        with suppress(asyncio.CancelledError, TimeoutError):
-            await asyncio.wait_for(studio.work(), 0.05)
 
 
 READERS = {
