@@ -126,8 +126,8 @@ def _compare_pair(reference: _Side, other: _Side) -> dict[str, Any]:
         closures = asdict(measure_closures(generated, recorded, threshold, rate_hz))
         figures["closures"] = closures | {"closed_under": threshold}
     if points:
-        axes = [axis for parts in points.values() for axis in parts]
-        places = [[_select_values(side, axes).reshape(count, -1, 3) * MILLIMETRES] for side in (made, original)]
+        every = [axis for parts in points.values() for axis in parts]
+        places = [[_select_values(side, every).reshape(count, -1, 3) * MILLIMETRES] for side in (made, original)]
         figures["points"] = {"points": len(points), "landmark_distance_mm": curves.measure_landmarks(*places)}
     return figures
 

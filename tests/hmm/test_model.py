@@ -69,13 +69,6 @@ def test_names_of_states_say_the_neighbour_that_counts():
     assert TABLE.name("b", "sil", "ih", 2) == "sil.2"
 
 
-def test_only_seen_contexts_have_densities_of_their_own():
-    assert TABLE.names[TABLE.density("b", 0, "ih")] == "b.0<ih"
-    assert TABLE.names[TABLE.density("b", 2, "sil")] == "b.2>sil"
-    for state, neighbour in ((0, "sil"), (2, "ih"), (1, "ih"), (0, None), (0, "unknown")):
-        assert TABLE.names[TABLE.density("b", state, neighbour)] == f"b.{state}"
-
-
 INVENTORY = (SILENCE, "a", "b")
 
 

@@ -93,9 +93,7 @@ def test_without_recorded_silence_the_mouth_rests(engine) -> None:
 @pytest.mark.parametrize(
     ("name", "damage"),
     [
-        ("recorded_motion", lambda values: values[:0]),  # nothing is stored
         ("recorded_rows", lambda values: values + 10**5),
-        ("unit_times", lambda values: values * 1e3),
         ("recording_first", lambda values: np.concatenate([values[:-1], values[-1:] + 10**7])),  # silence without end
         ("recorded_rows", None),
     ],

@@ -313,14 +313,6 @@ def test_phones_by_another_name_move_the_same_to_the_bit(tmp_path, acoustic_regr
 
 
 @named
-def test_trees_ask_about_units_of_the_set(name):
-    _, model = trained(name)
-    classes = set(load_unit_set(name).classes().values())
-    for tree in model.emission.forest.values():
-        assert {question.members for question in tree.questions} == classes
-
-
-@named
 def test_the_timeline_names_units_in_context(name):
     units = load_unit_set(name)
     phones = ["sil", *(span.label.phone for span in SPOKEN.units), "sil"]

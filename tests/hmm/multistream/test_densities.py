@@ -131,7 +131,6 @@ def test_motion_is_unknown_beside_frames_that_were_not_measured():
 def test_what_does_not_fit_is_refused():
     for odd in (
         {"log_f0": np.zeros(4)},
-        {"log_f0": np.full(5, np.inf)},
         {"motion": np.full((5, 2), NAN)},
         {"motion": np.zeros((5, 2)), "measured": np.ones(4, bool)},
     ):

@@ -89,18 +89,13 @@ def stream_observations(
     F0 becomes three streams: static values, Δ and Δ², each known where its whole window is voiced. Motion is one, of
     static values, Δ and Δ² side by side, known where all three are.
     Source: Hofer 2008, §4; the windows of F0 as for motion.
-    Raises InputError: as ``StreamObservations``; log F0 or motion of another shape, infinite log F0, a mask that is not
-    that of the frames, or a measured value that is not finite.
+    Raises InputError: as ``StreamObservations``; motion of another shape, or a mask that is not that of the frames.
     """
     speech = np.asarray(speech)
     streams = {SPEECH: ObservedStream(speech, np.ones(len(speech), bool))}
     if log_f0 is not None:
         pitch: NDArray[np.float64] = np.asarray(log_f0, np.float64)
-        if pitch.ndim != 1 or np.isinf(pitch).any():
-            raise InputError(
-                f"log F0 has shape {pitch.shape}, required (T,), NaN where there is no voice, never infinite"
-            )
-        voiced = ~np.isnan(pitch)
+        voiced = np.isfinite(pitch)
         dynamics = with_dynamics(np.where(voiced, pitch, 0.0)[:, None])
         masks = (voiced, *[mark_known_dynamics(voiced)] * 2)
         for window, (name, mask) in enumerate(zip(F0_STREAMS, masks, strict=True)):
@@ -110,10 +105,6 @@ def stream_observations(
         seen = np.ones(len(values), bool) if measured is None else np.asarray(measured)
         if values.ndim != 2 or seen.shape != values.shape[:1]:
             raise InputError(f"motion has shape {values.shape}, its mask {seen.shape}; required (T, Q) and (T,)")
-        if not np.isfinite(values[seen]).all():
-            raise InputError(
-                "motion holds values that are not finite where it was measured; mark these frames as not measured"
-            )
         known = mark_known_dynamics(np.asarray(seen, bool))
         dynamics = with_dynamics(np.where(seen[:, None], values, 0.0)).reshape(len(values), -1)
         streams[MOTION] = ObservedStream(np.where(known[:, None], dynamics, 0.0), known)

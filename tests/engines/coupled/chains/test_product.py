@@ -175,16 +175,6 @@ def test_no_other_tables_have_a_higher_expected_likelihood(kind, sets, limit):
         assert other <= value + 1e-6 * abs(value)
 
 
-def test_rows_without_data_stay():
-    transitions = tiny.chains().transitions
-    counts = random_counts(transitions)
-    without_data = transitions.product.arc_from == 3
-    counts[without_data] = 0
-    best = transitions.reestimated(counts)
-    for chain in range(2):
-        assert best.advance[chain][best.rows[chain][3]] == transitions.advance[chain][transitions.rows[chain][3]]
-
-
 def test_rare_joint_states_share_the_rows_of_their_own_state_and_lead():
     transitions = tiny.chains().transitions
     product, frames = transitions.product, np.zeros(len(transitions.product.joint_states))
