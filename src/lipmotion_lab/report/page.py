@@ -2,13 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.motion.eigenlips import MOUTH_HEIGHT, MOUTH_WIDTH
+from lipmotion.types import Channel, Motion, Timeline, Unit
+from lipmotion_faces import Staging, stage_face
 from lipmotion_lab.report.html import Html, add_caption, build_page, element, joined
 from lipmotion_lab.report.section import Section
+
+FPS = 25.0
+STAGING = Staging(size=640, blinks=False, gaze=False, brows=False, head=False)
+"""Only the mouth moves, so that nothing else differs between systems."""
+LOWER_FACE = (slice(340, 340 + 4 * MOUTH_HEIGHT), slice(176, 176 + 4 * MOUTH_WIDTH))
+"""The part of the drawn picture that is shown."""
+
+
+def draw_mouths(
+    values: NDArray[np.float64], channels: Sequence[str], silence: Timeline[Unit]
+) -> Iterator[NDArray[np.uint8]]:
+    """Yield pictures of a drawn face's mouth, ``FPS`` a second, for values of some channels [shape=(T, P)]."""
+    motion = Motion(values, FPS, tuple(map(Channel, channels)))
+    return (picture[LOWER_FACE] for picture in stage_face("woman", STAGING).render(motion, silence, fps=FPS))
+
 
 FOLDED = 3  # more tables than these are folded together
 QUICK_WARNING = (
