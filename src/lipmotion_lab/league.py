@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from lipmotion.corpora import Corpus
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError, shorten
@@ -29,13 +30,13 @@ from lipmotion.motion.frame_labels import is_away_from_speech
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.train import label_phones
 from lipmotion.speech.recognition.recogniser import open_recogniser
-from lipmotion.storage.files import make_folder
+from lipmotion.storage.files import atomic_file, make_folder
 from lipmotion.storage.json_text import as_json, from_json, replace_nan
-from lipmotion.types import Audio, Monitor, Utterance, silent_monitor, sub_monitor, with_progress
+from lipmotion.types import Audio, Monitor, Span, Timeline, Unit, Utterance, silent_monitor, sub_monitor, with_progress
 from lipmotion.types.motion import interpolate_rows
 from lipmotion.units import Lexicon, is_silent
 from lipmotion_lab.evaluation.evaluate import BILABIAL, ClipStatistic, divide_sums
-from lipmotion_lab.report.page import FinishedPart, write_html
+from lipmotion_lab.report.page import FPS, FinishedPart, draw_mouths, write_html
 from lipmotion_lab.report.section import Column, Section, Table, warn_of_few, write_text
 
 Array = NDArray[np.float64]
@@ -415,9 +416,10 @@ def split_choices(reported: int, choosing: int) -> Iterator[tuple[list[int], lis
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """What one rival did: its figures, and what was chosen of it in every fold."""
+    """What one rival did: its motion of each recording, its figures, and what was chosen of it in every fold."""
 
     rival: Rival
+    made: Sequence[Array]
     figures: Mapping[str, ClipStatistic]
     chosen: Sequence[Mapping[str, Any]]
 
@@ -437,7 +439,8 @@ def play(
             answer = tried[choice.setting][n]
             motion = prepare_weights(answer, choice.smoothing_s) @ choice.coefficients
             done[n] = synchronise(recordings[n], motion, choice.lag_s, sync_s), choice.shut, answer.seconds
-    return Standing(rival, measure(recordings[:reported], [done[n] for n in range(reported)]), chosen)
+    made = [done[n] for n in range(reported)]
+    return Standing(rival, [motion for motion, *_ in made], measure(recordings[:reported], made), chosen)
 
 
 @dataclass(frozen=True, eq=False)
@@ -516,7 +519,8 @@ HOW_TO_READ = (
     "recordings that are not reported here. What answers in opening and width is taken as it is. Small: 95 % "
     "bootstrap intervals over recordings."
 )
-PART = "league"  # folder of the report
+PART, INSTANTS, SHOWN_S = "league", 6, 6.0
+"""Folder of the report; pictures of each system, and the length of what is shown."""
 
 
 def describe_league(league: League) -> Section:
@@ -548,7 +552,7 @@ def describe_league(league: League) -> Section:
 
 
 def write_league(league: League, folder: Path) -> dict[str, Any]:
-    """Write the page of a league, with all figures, to a folder; return the figures."""
+    """Write the page of a league, with its pictures and all figures, to a folder; return the figures."""
     section, part = describe_league(league), folder / PART
     names = [each.utterance.name for each in league.recordings]
     accs = {each.rival.title: [acc for acc, _ in each.figures["acc"].sums] for each in league.standings}
@@ -564,10 +568,32 @@ def write_league(league: League, folder: Path) -> dict[str, Any]:
     figures: dict[str, Any] = replace_nan(content)
     section.write_tables(part / "tables")
     write_text(part / "figures.json", as_json(figures) + "\n")
-    record = {"pictures": [], "stamp": league.about}
+    record = {"pictures": list(_draw_mouths(league, part)), "stamp": league.about}
     finished = [FinishedPart(PART, record, section)]
     page = write_html(
         "The league", league.about, finished, league.absent, league.failed, subtitle=SUBTITLE, how_to_read=HOW_TO_READ
     )
     write_text(folder / "index.html", page)
     return figures
+
+
+def _draw_mouths(league: League, folder: Path) -> Iterator[dict[str, str]]:
+    """Write a strip of mouths for the speaker and each system, at wide and closed lips where most p, b and m are."""
+    counts = {
+        (number, begin_s): sum(begin_s <= start and end <= begin_s + SHOWN_S for start, end in lips)
+        for number, lips in enumerate(each.list_spans(lips=True) for each in league.recordings)
+        for begin_s in (0.0, *(start for start, _ in lips))
+    }
+    number, begin_s = max(counts, key=lambda place: counts[place])
+    recording = league.recordings[number]
+    seen = np.flatnonzero((recording.time_s >= begin_s) & (recording.time_s < begin_s + SHOWN_S))
+    extremes = (np.argmax, np.argmin)
+    parts = [part for part in np.array_split(seen, INSTANTS) if len(part)]
+    frames = [part[extremes[n % 2](recording.original[part, 0])] for n, part in enumerate(parts)]
+    silence = Timeline((Span(0.0, len(frames) / FPS, Unit("sil")),))
+    made = {each.rival.title: each.made[number] for each in league.standings}
+    for place, (name, values) in enumerate(({"recorded": recording.original} | made).items()):
+        pictures = list(draw_mouths(values[frames], CHANNELS, silence))[: len(frames)]
+        with atomic_file(folder / f"{place}.png") as unfinished:
+            Image.fromarray(np.concatenate(pictures, axis=1)).reduce(2).save(unfinished, format="png")
+        yield {"file": f"{place}.png", "caption": name}

@@ -86,6 +86,7 @@ def test_the_best_settings_map_and_lag_are_chosen_on_other_recordings(adapters, 
     assert figures["rivals"]["OURS"]["acc_gain_95"][0] > 0
     page = (tmp_path / "report" / "index.html").read_text()
     assert all(title in page for title in ("LATE", "NOISE", "OURS"))
+    assert (tmp_path / "report" / "league" / "3.png").stat().st_size > 1000
     assert json.loads((tmp_path / "report" / "league" / "figures.json").read_text()) == json.loads(json.dumps(figures))
 
 

@@ -193,8 +193,14 @@ def _write_part(part: FinishedPart) -> Html:
     ]
     videos = [
         add_caption(
-            element("video", controls=True, preload="metadata", src=f"{part.name}/{each['file']}",
-                    aria_label=each["caption"]), each["caption"]
+            element(
+                "video",
+                controls=True,
+                preload="metadata",
+                src=f"{part.name}/{each['file']}",
+                aria_label=each["caption"],
+            ),
+            each["caption"],
         )
         for each in part.record.get("videos", ())
     ]
