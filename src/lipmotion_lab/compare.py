@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,18 +14,23 @@ from lipmotion.errors import InputError
 from lipmotion.formats.c3d import MILLIMETRES
 from lipmotion.measures import curves
 from lipmotion.measures.closures import find_threshold, measure_closures
-from lipmotion.meshes.model.shape_names import to_arkit
+from lipmotion.measures.curves import measure_modulation_distance
+from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, to_arkit
 from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.storage.json_text import replace_nan
 from lipmotion.storage.sources import VIDEO_SUFFIXES
 from lipmotion.types import WEIGHT, Generation, Monitor, Motion, Track, silent_monitor, with_progress
 from lipmotion_faces.tracking.track import track
+from lipmotion_faces.tracking.trackers import LIP_POINTS
 
 Source = str | Path | Motion | Track | Generation
 Array = NDArray[np.float64]
 OPENING = "opening"
-HIGHEST_RATE_HZ = 120.0  # motion of a higher rate is compared at this one
-MIN_FRAMES = 4  # without them there is no third difference
+HIGHEST_RATE_HZ = 120.0
+"""Motion of a higher rate is compared at this one."""
+MIN_FRAMES = 4
+"""Without them there is no third difference."""
+UPPER_FACE = tuple(name for name in ARKIT_OTHERS if name.startswith(("brow", "eyeBlink", "eyeSquint", "eyeWide")))
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,9 +131,11 @@ def _compare_pair(reference: _Side, other: _Side) -> dict[str, Any]:
         closures = asdict(measure_closures(generated, recorded, threshold, rate_hz))
         figures["closures"] = closures | {"closed_under": threshold}
     if points:
-        every = [axis for parts in points.values() for axis in parts]
-        places = [[_select_values(side, every).reshape(count, -1, 3) * MILLIMETRES] for side in (made, original)]
-        figures["points"] = {"points": len(points), "landmark_distance_mm": curves.measure_landmarks(*places)}
+        figures["points"] = _measure_points(made, original, points)
+    if upper := [name for name in UPPER_FACE if name in names]:  # weights, which are 0 at rest
+        generated, recorded = ([_select_values(side, upper)[:, :, None]] for side in (made, original))
+        deviation = curves.measure_upper_face(generated, recorded, rest=np.zeros((len(upper), 1)))
+        figures["upper_face"] = {"curves": len(upper), "deviation": deviation}
     return figures
 
 
@@ -168,6 +175,7 @@ def _measure_channels(
         "nrmse": curves.measure_nrmse(generated, reference),
         "variance": curves.measure_variance_ratio(generated, reference),
         "jerk": curves.measure_jerk_ratio(generated, reference),
+        "modulation_db": measure_modulation_distance(generated, reference, rate_hz),
     }
     moves = curves.select_moving(reference, [channel.unit for channel in channels])
     rows = {
@@ -180,3 +188,24 @@ def _measure_channels(
         if moves[column]
     }
     return rows, [name for name in names if name not in rows]
+
+
+def _measure_points(made: Motion, original: Motion, points: Mapping[str, tuple[str, ...]]) -> dict[str, Any]:
+    """Return the figures of points in mm (None: no points); at rest, points above the eyes are at their median."""
+
+    def select(side: Motion, wanted: Sequence[str]) -> list[Array]:
+        coordinates = _select_values(side, [axis for point in wanted for axis in points[point]])
+        return [coordinates.reshape(len(coordinates), -1, 3) * MILLIMETRES]
+
+    lips = [point for point in points if point.isdecimal() and int(point) in LIP_POINTS]
+    upper = [point for point in points if np.median(original[f"y_{point}"]) > 0]
+    everything, of_lips, of_upper = ((select(made, some), select(original, some)) for some in ([*points], lips, upper))
+    rest = np.median(of_upper[1][0], axis=0)
+    return {
+        "points": len(points),
+        "lip_points": len(lips),
+        "upper_points": len(upper),
+        "landmark_distance_mm": curves.measure_landmarks(*everything),
+        "lip_vertex_error_mm": curves.measure_lip_error(*of_lips) if lips else None,
+        "upper_face_deviation_mm": curves.measure_upper_face(*of_upper, rest) if upper else None,
+    }

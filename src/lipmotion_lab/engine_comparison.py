@@ -132,6 +132,7 @@ def compare_engines(
         free = system.engine.without_closures()
         unpinned = clips if free == system.engine else generate_compared(known, speech, free, system.learned)
         made[condition][name] = clips, unpinned
+        settings.receive(name, condition, recordings, clips)
     about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed}
     about |= {"closed_under": recordings.closed_under, "reference": REFERENCE_ENGINE}
     about["models"] = {

@@ -60,6 +60,8 @@ def run_learning_curve(
             row = {"names": count} | _make_row(corpus, result, settings.seed)
             if rival:
                 row[BLSTM] = _compare_network(corpus, result, validation, part)
+            for condition, clips in result.clips.items():
+                settings.receive(f"{count} recordings", condition, result.recordings, clips)
             arrays = {_ROW: np.array(json.dumps([result.recordings.closed_under, row]))}
             checkpoint.save(str(count), arrays)
         closed_under, row = json.loads(str(arrays[_ROW]))

@@ -64,6 +64,7 @@ def test_what_is_given_wins_over_what_the_joint_engine_recognises(run, toy_corpu
     own = ["--units", "eVis", "--set", "recognise_units=true", "--set", "mixtures=1"]
     assert run("train", toy_corpus.path, "-o", "m", "--engine", "joint", *own).code == 0
     assert load_model(here / "m").engine.name == "joint"
+    assert "motion: " in "\n".join(run("info", "m", "--structure").out)
     told = {"alone": [], "right": ["--transcript", "see bob papa mama"]}
     for name, options in (told | {"again": ["--units", "alone.json"]}).items():
         assert run("animate", toy_speech, "--model", "m", "-o", f"{name}.json", *options).code == 0

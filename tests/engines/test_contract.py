@@ -99,3 +99,10 @@ def test_pins_at_both_ends_are_inside(trained):
     last_s = (len(spoken.features.values) - 1) / types.FRAME_RATE_HZ
     result = trained.generate(spoken, types.Pin(-0.004, "opening", 0.1), types.Pin(last_s + 0.004, "opening", 0.2))
     assert result.motion["opening"][[0, -1]].tolist() == [0.1, 0.2]
+
+
+def test_trees_can_be_read(trained):
+    text = trained.engine.describe(trained.model)
+    assert ("leaf (" in text) is (trained.engine.name in ("trajectory", "joint"))  # the others have no trees
+    assert bool(text) is ("leaf (" in text)
+    assert max(map(len, text.splitlines()), default=0) < 200

@@ -14,14 +14,16 @@ from typing import Any
 
 import pytest
 
-from experiments.conftest import SETTINGS, renamed
+from experiments.conftest import SETTINGS, few_sets, renamed
 from lipmotion import errors, units
 from lipmotion_lab import hofer2008, minnis2000, runner
 from lipmotion_lab.report import report
 from lipmotion_lab.report.section import Column, PaperOrder, PaperPair, Section, Table
 from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES
+from study.browser import BROWSER, DRIVER, MISSING, browser, check_screen
 
 TWO = ("hofer2008", "folds")
+SCREENS = ((1280, 900, "light"), (1280, 900, "dark"), (320, 640, "light"), (320, 640, "dark"))
 
 
 class Links(HTMLParser):
@@ -171,6 +173,26 @@ def test_what_cannot_be_used_is_refused_before_the_work(ran, toy_corpus, tmp_pat
     with pytest.raises(errors.CorpusError, match="'opening', which is not in it"):
         report.write_report(renamed(toy_corpus, tmp_path / "b", "shape 0", "shape 1", "shape 2"), tmp_path / "r")
     assert (ran, sorted(path.name for path in tmp_path.iterdir())) == ([], ["b", "file", "full"])
+
+
+@pytest.mark.long
+@pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING)
+def test_a_browser_shows_a_real_experiment_and_nobody_is_kept_out(toy_corpus, tmp_path):
+    with few_sets():
+        written = report.write_report(toy_corpus, tmp_path / "r", only=["hofer2008"], quick=True, settings=SETTINGS)
+    links = Links(written.page)
+    record = json.loads((written.page.parent / "hofer2008" / "figures.json").read_text())
+    systems = ["eVis, 5 states", "phone, 5 states"]
+    assert [each["caption"] for each in record["videos"]][-3:] == ["a drawn face, recorded motion", *systems]
+    assert all((written.page.parent / file).stat().st_size for file in links.files)
+
+    with browser(tmp_path) as window:
+        for width, height, scheme in SCREENS:
+            window.show_as(width, height, scheme, mobile=width < 400)
+            window.open(written.page.as_uri())
+            window.run("document.querySelectorAll('details').forEach(each => { each.open = true; })")
+            check_screen(window, "report", width, scheme)
+        assert window.problems() == []
 
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"

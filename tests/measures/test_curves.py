@@ -118,16 +118,54 @@ def test_a_constant_with_rounding_is_a_constant():
             assert np.isfinite(measure([still], [wave])).all()
 
 
+TIME_S = np.arange(200) / 25
+WAVES = np.stack([np.sin(2 * np.pi * 3 * TIME_S), np.sin(2 * np.pi * 7 * TIME_S)], axis=1)
+
+
+def test_half_the_movement_is_six_decibels_at_every_frequency_and_at_another_one_far_away() -> None:
+    noise = np.random.default_rng(0).normal(size=(200, 1))
+    assert curves.measure_modulation_distance([noise / 2], [noise], 25.0) == pytest.approx([20 * np.log10(2)])
+    assert curves.measure_modulation_distance([noise[::-1]], [noise], 25.0) == pytest.approx([0.0], abs=1.0)
+    assert (curves.measure_modulation_distance([WAVES[:, ::-1]], [WAVES], 25.0) > 10).all()
+    faster = WAVES[:, :1] + 0.2 * np.sin(2 * np.pi * 30 * np.arange(800) / 100)[::4, None]
+    assert curves.measure_modulation_distance([faster], [WAVES[:, :1]], 25.0) > 1
+
+
+def test_a_channel_that_does_not_move_or_above_speech_has_no_distance_and_one_that_should_a_finite_one() -> None:
+    flat = np.zeros((200, 1))
+    assert np.isnan(curves.measure_modulation_distance([WAVES[:, :1]], [flat], 25.0)).all()
+    assert 20 < curves.measure_modulation_distance([flat], [WAVES[:, :1]], 25.0)[0] < 60
+    time_s = np.arange(800) / 100
+    slow = np.random.default_rng(0).normal(size=(80, 1)).repeat(10, axis=0)
+    nervous = slow + np.sin(2 * np.pi * 40 * time_s)[:, None]
+    assert curves.measure_modulation_distance([nervous], [slow], 100.0) == pytest.approx([0.0], abs=0.1)
+
+
 STILL = np.zeros((4, 3, 3))
 
 
-def test_the_distance_of_landmarks_is_a_mean_over_frames() -> None:
+def test_the_worst_vertex_of_every_frame_counts_and_the_mean_over_frames() -> None:
     made = STILL.copy()
     made[0, 1] = (3, 0, 4)
     made[0, 2] = (0, 1, 0)
     made[1, 0] = (0, 0, 2)
+    assert curves.measure_lip_error([made], [STILL]) == pytest.approx((5 + 2) / 4)
+    assert curves.measure_lip_error([made, STILL[:2]], [STILL, STILL[:2]]) == pytest.approx(
+        (5 + 2) / 6
+    )  # frames, not clips
     assert curves.measure_landmarks([made], [STILL]) == pytest.approx((5 + 1 + 2) / 12)
-    assert curves.measure_landmarks([made, STILL[:2]], [STILL, STILL[:2]]) == pytest.approx((5 + 1 + 2) / 18)
+
+
+def test_upper_face_deviation_is_how_much_more_the_original_varies_about_its_rest() -> None:
+    rest = np.array([[0.0, 1.0, 0.0], [0.0, 2.0, 0.0]])
+    original = np.repeat(rest[None], 4, axis=0)
+    original[:, 0, 1] += (0, 2, 0, 2)  # deviates by 1 from its mean
+    made = np.repeat(rest[None], 4, axis=0)
+    made[:, 0, 2] += (0, -1, 0, -1)  # by a half, elsewhere
+    assert curves.measure_upper_face([made], [original], rest) == pytest.approx((1 - 0.5) / 2)
+    assert curves.measure_upper_face([original], [made], rest) == pytest.approx(-(1 - 0.5) / 2)
+    raised = made + np.array([0, 0.5, 0])  # a face that is held otherwise does not vary
+    assert curves.measure_upper_face([raised[:, 1:]], [made[:, 1:]], rest[1:]) == pytest.approx(0)
 
 
 def acc(generated, original) -> float:

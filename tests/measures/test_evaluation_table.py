@@ -1,3 +1,5 @@
+from typing import Any
+
 from lipmotion_lab.evaluation.table import format_figures
 
 
@@ -9,7 +11,7 @@ def figures():
         "closures_p_b_m": {"recall": 0.131, "intervals": 132, "false_per_minute": 13.3, "original_per_minute": 13.4},
     }
     free = {"channels": {"opening": {"acc": 0.141}}, "opening_acc_95": (0.142, 0.143), "acc": 0.144, **closings}
-    condition = {
+    condition: dict[str, Any] = {
         "channels": {"opening": acc | {"global_variance": 1.14, "jerk": 1.15}},
         "opening_acc_95": (0.151, 0.152),
         **{"acc": 0.153, "amse": 0.1541, "leading": "opening", "lag_ms": 15.5},

@@ -46,6 +46,8 @@ def test_the_question_that_matters_is_asked_first_and_the_tree_can_be_read():
     assert tree.questions[tree.splits[0]] == Question(0, "early", frozenset("ab"))
     assert len(tree.leaves) == 2
     assert tree.frames[0] == 20 * 64
+    leaves = ["  yes: leaf (640 frames)", "  no: leaf (640 frames)"]
+    assert tree.text().splitlines() == ["left is early? (1280 frames)", *leaves]
     assert [tree.name(node) for node in range(3)] == ["any", "left is early", "left is not early"]
 
 
@@ -84,7 +86,7 @@ def test_trees_come_back_from_arrays():
     again = trees_from_arrays(trees_to_arrays(trees))
     assert list(again) == ["one", "two"]
     for name, tree in trees.items():
-        assert again[name].questions == tree.questions
+        assert again[name].text() == tree.text()
         assert [again[name].path(c) for c in CONTEXTS] == [tree.path(c) for c in CONTEXTS]
 
 

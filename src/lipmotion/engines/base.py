@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Generic, TypeVar, cast
+from typing import Any, ClassVar, Generic, Protocol, TypeVar, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,6 +135,45 @@ class Engine(Animator[ModelT]):
     def posteriors(self, model: ModelT, speech: Speech) -> tuple[ChainPosteriors, ...]:  # noqa: ARG002
         """Return, for every chain of hidden states, the posterior probability of each of its units in every frame."""
         return ()
+
+    def describe(self, model: ModelT) -> str:  # noqa: ARG002
+        """Return the decision trees of a model as readable text; empty: there are none."""
+        return ""
+
+
+@dataclass(frozen=True)
+class SourcePiece:
+    """A piece of one recording that says several phones; ``phones_s``: their beginnings in it, by number."""
+
+    recording: str
+    start_s: float
+    end_s: float
+    phones_s: Mapping[int, float]
+
+
+@runtime_checkable
+class SelectsRecordings(Protocol):
+    """An engine whose models know recordings of which pieces, one after the other, say any phones."""
+
+    def recordings(self, model: Any) -> tuple[str, ...]:
+        """Return the names of the recordings."""
+
+    def stand_ins(self, model: Any) -> Mapping[str, str]:
+        """Return the recorded phone in place of each phone that was never recorded."""
+
+    def typical_duration_s(self, model: Any, phone: str) -> float:
+        """Return the median duration of a phone in the recordings."""
+
+    def source_pieces(
+        self, model: Any, units: Timeline[Unit], features: Mapping[str, NDArray[np.floating[Any]]]
+    ) -> tuple[tuple[SourcePiece, ...], Timeline[Unit]]:
+        """Return the pieces of recordings that say some phones best, and the phones with the sources of their units.
+
+        units    : phones in time, from 0 s
+        features : acoustic features of every recording, by its name [each shape=(T, D)]; pieces
+            join where these agree
+        Raises InputError: an unknown phone, or features of other recordings.
+        """
 
 
 def explain_by_trace(generation: Generation, frame: int) -> Explanation:

@@ -1,7 +1,7 @@
 """Measures of the similarity of generated and recorded curves and points, and bootstrap intervals over clips.
 
 A set of clips is a list of arrays at the frame rate of the video, generated and original alike: of curves
-[shape=(T_i, P)], or of places of V landmarks [shape=(T_i, V, D)].
+[shape=(T_i, P)], or of places of V vertices, landmarks or curves [shape=(T_i, V, D)].
 """
 
 from __future__ import annotations
@@ -11,10 +11,28 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.curves import varies
+from lipmotion.stats.curves import measure_modulation_spectrum, varies
 
 Array = NDArray[np.float64]
 Clips = Sequence[Array]
+HIGHEST_HZ = 12.5
+"""Frequencies above it hold noise of trackers rather than speech, and cameras of 25 Hz do not show them."""
+FLOOR = 1e-6  # power under this share of the largest of the original counts as so much: rounding is no movement
+
+
+def measure_modulation_distance(generated: Clips, original: Clips, rate_hz: float) -> Array:
+    """Return the root of the mean squared difference of two log modulation spectra, in dB [shape=(P,)].
+
+    The mean is over frequencies up to ``HIGHEST_HZ``. NaN where the original is constant but for rounding.
+    Source: Takamichi et al. 2016, who show the spectra; the distance is ours.
+    """
+    frequencies, reference = measure_modulation_spectrum(original, rate_hz)
+    _, made = measure_modulation_spectrum(generated, rate_hz)
+    floor = np.where(varies(np.concatenate(original)), FLOOR * reference.max(axis=0), np.nan)
+    difference = 10 * np.log10(np.maximum(made, floor) / np.maximum(reference, floor))
+    return np.sqrt(np.square(difference[frequencies <= HIGHEST_HZ]).mean(axis=0))
+
+
 STILL_SHARE = 0.01  # curves that move by less than this share of the widest of the same unit are rounding or noise
 
 
@@ -121,7 +139,31 @@ def compute_interval(
     return float(low), float(high)
 
 
+def measure_lip_error(generated: Clips, original: Clips) -> float:
+    """Return the mean over frames of the largest distance of a lip vertex (Richard et al. 2021, Fan et al. 2022)."""
+    return float(np.concatenate([each.max(axis=1) for each in _distances(generated, original)]).mean())
+
+
 def measure_landmarks(generated: Clips, original: Clips) -> float:
     """Return the mean distance of landmarks over frames, in the unit of the places (LMD: Chen et al. 2018)."""
-    distances = [np.linalg.norm(g - o, axis=2).mean(axis=1) for g, o in zip(generated, original, strict=True)]
-    return float(np.concatenate(distances).mean())
+    return float(np.concatenate([each.mean(axis=1) for each in _distances(generated, original)]).mean())
+
+
+def measure_upper_face(generated: Clips, original: Clips, rest: Array) -> float:
+    """Return by how much more the vertices of the upper face vary in the original, in the unit of the places.
+
+    rest : their places in a face at rest [shape=(V, D)]
+    The variation of a vertex is the standard deviation over time of its distance from its place at rest; the result is
+    the mean over vertices of the original's less the generated one's: negative where the generated face moves more.
+    Source: Xing et al. 2023 (CodeTalker, FDD).
+    """
+    return float((_variation(original, rest) - _variation(generated, rest)).mean())
+
+
+def _distances(generated: Clips, original: Clips) -> list[Array]:
+    """Return the distances of all vertices [each shape=(T_i, V)]."""
+    return [np.linalg.norm(g - o, axis=2) for g, o in zip(generated, original, strict=True)]
+
+
+def _variation(clips: Clips, rest: Array) -> Array:
+    return np.linalg.norm(np.concatenate(clips) - rest, axis=2).std(axis=0)

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.printable import printable
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays
 
 Context = tuple[str, ...]
@@ -100,6 +101,22 @@ class Tree:
             verb = "is" if following == at + 1 else "is not"
             answers.append(f"{POSITIONS[question.position]} {verb} {question.name}")
         return ", ".join(answers) or "any"
+
+    def text(self) -> str:
+        """Return the tree as readable text: one line for each node, indented by its depth."""
+        lines: list[str] = []
+
+        def write(node: int, depth: int, answer: str) -> None:
+            number = self.splits[node]
+            question = self.questions[number] if number >= 0 else None
+            line = f"{POSITIONS[question.position]} is {question.name}?" if question else "leaf"
+            lines.append(f"{'  ' * depth}{answer}{line} ({self.frames[node]:.0f} frames)")
+            if question:
+                write(node + 1, depth + 1, "yes: ")
+                write(int(self.no[node]), depth + 1, "no: ")
+
+        write(0, 0, "")
+        return "\n".join(map(printable, lines))
 
 
 POSITIONS = ("left", "unit", "right")

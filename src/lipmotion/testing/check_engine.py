@@ -379,6 +379,7 @@ def optional_members_are_kept(trained: TrainedEngine) -> None:
         lips = (slice(78, 93), slice(98, 113))  # p and m
         closed, opening = result.motion["opening"], free.generate(model, spoken).motion["opening"]
         require(all(closed[span].min() <= opening[span].min() + 1e-9 for span in lips), "wider p and m when forced")
+    require(isinstance(engine.describe(model), str), "a description that is no text")
 
 
 ENGINE_CHECKS: dict[str, Callable[[TrainedEngine], None]] = {

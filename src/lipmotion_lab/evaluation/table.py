@@ -97,6 +97,7 @@ COLUMNS = {
     "lag_ms": ("lag ms", "8.1f"),
     "variance": ("variance", "10.2f"),
     "jerk": ("jerk", "7.2f"),
+    "modulation_db": ("modulation dB", "15.1f"),
 }
 """Head and form of every column, by the name of the figure."""
 
@@ -118,5 +119,15 @@ def format_comparison(figures: Mapping[str, Any]) -> str:
         lines += [format_closures(pair["closures"])] if "closures" in pair else []
         if points := pair.get("points"):
             distance = format_figure(points["landmark_distance_mm"], ".2f")
-            lines.append(f"  points: landmark distance {distance} mm over {points['points']}")
+            parts = [f"landmark distance {distance} mm over {points['points']}"]
+            if points["lip_points"]:
+                error = format_figure(points["lip_vertex_error_mm"], ".2f")
+                parts.insert(0, f"lip vertex error {error} mm over {points['lip_points']}")
+            if points["upper_points"]:
+                deviation = format_figure(points["upper_face_deviation_mm"], "+.2f")
+                parts.append(f"upper-face deviation {deviation} mm over {points['upper_points']}")
+            lines.append(f"  points: {', '.join(parts)}")
+        if "upper_face" in pair:
+            deviation = format_figure(pair["upper_face"]["deviation"], "+.4f")
+            lines.append(f"  upper face: deviation {deviation} over {pair['upper_face']['curves']} curves")
     return "\n".join(map(printable, lines))

@@ -19,7 +19,7 @@ from lipmotion.pipeline.training.labels import fingerprint_training
 from lipmotion.storage import files, locks
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.storage.sources import Source, check_apart
-from lipmotion.types import Item
+from lipmotion.types import Item, sub_monitor
 from lipmotion.units import Lexicon
 from lipmotion_lab import hofer2008
 from lipmotion_lab.engine_comparison import compare_engines
@@ -28,7 +28,7 @@ from lipmotion_lab.learning_curve import run_learning_curve
 from lipmotion_lab.minnis2000 import run_minnis2000
 from lipmotion_lab.report import sections
 from lipmotion_lab.report.html import GENERATOR
-from lipmotion_lab.report.page import FinishedPart, write_html
+from lipmotion_lab.report.page import ClipKeeper, FinishedPart, write_html, write_videos
 from lipmotion_lab.report.section import Section, write_text
 from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, Stamp, check_opening, share_out, take_quick_part
 from lipmotion_lab.xie_liu2007 import six_systems
@@ -144,7 +144,7 @@ def write_report(
     quick: bool = False,
     settings: ExperimentSettings = DEFAULT_SETTINGS,
 ) -> WrittenReport:
-    """Run experiments on a corpus, and write a page of what they found, with its tables and pictures.
+    """Run experiments on a corpus, and write a page of what they found, with its tables, pictures and videos.
 
     folder   : of the report, made if need be. What is finished in it is not computed again; a call after a stop goes on
     The page is written anew when an experiment is finished; where nothing is left to do, nothing is written. Every
@@ -267,8 +267,10 @@ class _Writer:
         models = self.folder / "models" / self.make_key("models")[:KEY_DIGITS]  # of other recordings, other models
         with locks.keep_unfinished(self.folder / f"{name}.json") as work:
             stamp, plots = Stamp(), work / "plots" if part.draws and self.can_draw else None
-            figures = part.run(PartRun(self.corpus, self.quick, work, models, plots, settings))
-            section = part.section(figures)
+            keeper = ClipKeeper(work / "motion.json", key)
+            running = replace(settings.narrow(0, 0.95), receive=keeper)
+            figures = part.run(PartRun(self.corpus, self.quick, work, models, plots, running))
+            section, motion = part.section(figures), keeper.collect()
             made_with = stamp.collect(self._build_command([name]), self.corpus, settings)
             shutil.rmtree(target, ignore_errors=True)
             with files.replace_folder(target) as made:
@@ -277,6 +279,10 @@ class _Writer:
                     shutil.move(work / "plots" / file, made / file)
                 pictures = [{"file": file, "caption": caption} for file, caption in captions.items()]
                 record = {"experiment": name, "key": key, "stamp": made_with, "figures": figures, "pictures": pictures}
+                if motion:
+                    drawing = sub_monitor(settings.monitor, 0.95, 1)
+                    record["clip"] = f"{motion['name']}: {' '.join(motion['words'])}"
+                    record["videos"] = write_videos(motion, section.shown, self.corpus, made, drawing)
                 section.write_tables(made / "tables")
                 write_text(made / FIGURES, as_json(record, indent=1) + "\n")
 

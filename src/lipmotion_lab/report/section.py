@@ -144,6 +144,7 @@ class Section:
     verdict  : what was found, in one sentence
     words    : by heading, sentences on what held and what did not
     table    : the most important one
+    shown    : systems whose motion is shown, by the names that ``ExperimentSettings.receive`` gets
     """
 
     title: str
@@ -152,6 +153,7 @@ class Section:
     words: Mapping[str, Sequence[str]]
     table: Table
     more: Sequence[Table] = ()
+    shown: Sequence[str] = ()
 
     @property
     def tables(self) -> list[Table]:

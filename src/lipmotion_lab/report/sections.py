@@ -11,7 +11,7 @@ from lipmotion_lab.evaluation.evaluate import find_sign
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES
 from lipmotion_lab.evaluation.table import format_figure
 from lipmotion_lab.hofer2008 import PAPER_SCORES, PINS, REFERENCE_SET
-from lipmotion_lab.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, VARIANTS
+from lipmotion_lab.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS
 from lipmotion_lab.report.section import Column, PaperOrder, PaperPair, Row, Section, Table, warn_of_few
 from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM, SPLIT
 
@@ -85,7 +85,8 @@ def build_hofer_section(figures: Mapping[str, Any]) -> Section:
             heading = f"{other.caption.removeprefix(SETS)}: {_build_hofer_order(block).judge()}"
             more.append(replace(other, heading=heading))
     title = "Hofer, Yamagishi & Shimodaira 2008, Table 1: unit sets"
-    return Section(title, about, order.judge(), words, table, more)
+    shown = [f"{units}, {states} states" for units in table.rows]
+    return Section(title, about, order.judge(), words, table, more, shown)
 
 
 def _build_hofer_order(block: Mapping[str, Any]) -> PaperOrder:
@@ -187,7 +188,8 @@ def build_minnis_section(figures: Mapping[str, Any]) -> Section:
         f"{' Quick: few epochs, only to see that it runs.' if figures['quick'] else ''}"
     )
     more = [table for table in tables.values() if table is not main]
-    return Section("Minnis & Breen 2000: unit selection", about, verdict, words, main, more)
+    title, compared = "Minnis & Breen 2000: unit selection", (PRINTED, UNGUIDED, EVERYTHING)
+    return Section(title, about, verdict, words, main, more, compared)
 
 
 def _list_effects(rows: Mapping[str, Row], names: Iterable[str]) -> list[str]:
@@ -265,7 +267,7 @@ def build_xie_liu_section(figures: Mapping[str, Any]) -> Section:
     if changed:
         about += " K on val: with the number of Gaussians that was best there; nothing was chosen on test."
     title = "Xie & Liu 2007, Table 3: structures of chains"
-    return Section(title, about, verdict, words, main, more)
+    return Section(title, about, verdict, words, main, more, [name for name in PAPER_FIGURES if name in main.rows])
 
 
 def _build_systems_table(case: str, rows: Mapping[str, Row], size: Mapping[str, Any]) -> Table:
@@ -336,7 +338,7 @@ def build_engines_section(figures: Mapping[str, Any]) -> Section:
         f"recordings of {figures['split']}, with closed lips forced in p, b and m."
         f"{_describe_closings(figures, main.rows[best])}"
     )
-    return Section("The engines of this project", about, verdict, words, main, more)
+    return Section("The engines of this project", about, verdict, words, main, more, list(main.rows))
 
 
 def build_learning_section(figures: Mapping[str, Any]) -> Section:
@@ -373,7 +375,8 @@ def build_learning_section(figures: Mapping[str, Any]) -> Section:
         f"compared on {figures['clips']} of {figures['split']}."
     )
     verdict = f"ACC {low} with {first} recordings, {high} with {last}."
-    return Section("Learning curve", about, verdict, words, main, more)
+    shown = [f"{size} recordings" for size in dict.fromkeys((first, last))]
+    return Section("Learning curve", about, verdict, words, main, more, shown)
 
 
 def build_folds_section(figures: Mapping[str, Any]) -> Section:

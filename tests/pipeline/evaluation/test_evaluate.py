@@ -345,7 +345,9 @@ def test_figures_are_those_of_the_measures():
 def test_points_are_compared_in_millimetres():
     shifted = moved(SPEECH, "x_13", SPEECH["x_13"] + 0.1)
     points = compare(SPEECH, shifted)["others"][0]["points"]
+    assert points["lip_vertex_error_mm"] == pytest.approx(9)
     assert points["landmark_distance_mm"] == pytest.approx(9 / points["points"])
+    assert points["upper_face_deviation_mm"] is None
 
 
 def test_rates_and_lengths_are_brought_together_and_said():
@@ -375,6 +377,12 @@ def test_blendshapes_are_found_however_they_are_spelt():
     (pair,) = compare(reference, other)["others"]
     assert list(pair["channels"]) == ["jawOpen", "browInnerUp"]
     assert "mouthClose" in pair["notes"][0]
+    still = moved(other, "brow_inner_up", np.full(60, 0.2))
+    upper = compare(reference, still)["others"][0]["upper_face"]
+    moving = np.array(reference.values[:, 1:2, None], float)
+    wanted = curves.measure_upper_face([np.zeros((60, 1, 1))], [moving], np.zeros((1, 1)))
+    assert upper == {"curves": 1, "deviation": pytest.approx(wanted)}
+    assert wanted > 0.05
 
 
 def test_what_does_not_move_is_named():

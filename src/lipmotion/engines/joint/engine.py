@@ -257,6 +257,9 @@ class JointEngine(Engine[JointModel]):
         )
         return Generation(motion, variance, with_unit_names(units, model.units), StateTrace(names, path.frames))
 
+    def describe(self, model: JointModel) -> str:  # noqa: D102
+        return model.hmm.text()
+
     def to_arrays(self, model: JointModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         joint = {f"{PREFIX}{name}": array for name, array in joint_to_arrays(model.hmm).items()}
         return motion_to_arrays(model.units, model.space, model.closure, model.prior) | joint

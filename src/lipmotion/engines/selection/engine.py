@@ -11,7 +11,7 @@ from typing import Any, ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
+from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
 from lipmotion.engines.selection.concatenation import Piece, TimeMap, join_motion, list_shown_units, to_pieces
 from lipmotion.engines.selection.costs import JOIN_AFTER, JOIN_BEFORE, Costs, SelectionConfig, Target, select
 from lipmotion.engines.selection.inventory import PHONE_NUMBER, SOURCE, RecordedUnits, find_source, list_windows
@@ -76,16 +76,6 @@ LOG = logging.getLogger("lipmotion")
 NAMED_UNITS = 3  # units that one warning names
 
 
-@dataclass(frozen=True)
-class SourcePiece:
-    """A piece of one recording that says several phones; ``phones_s``: their beginnings in it, by number."""
-
-    recording: str
-    start_s: float
-    end_s: float
-    phones_s: Mapping[int, float]
-
-
 @final
 @dataclass(frozen=True)
 class SelectionEngine(Engine[SelectionModel]):
@@ -129,31 +119,21 @@ class SelectionEngine(Engine[SelectionModel]):
         trace = StateTrace(tuple(find_source(costs.inventory, unit) for unit in shown.tolist()), places.astype(np.intp))
         return Generation(motion, variance, with_sources(speech.units, starts_s, sources), trace)
 
-    def recordings(self, model: SelectionModel) -> tuple[str, ...]:
-        """Return the names of the recordings."""
+    def recordings(self, model: SelectionModel) -> tuple[str, ...]:  # noqa: D102
         return model.inventory.names
 
-    def stand_ins(self, model: SelectionModel) -> Mapping[str, str]:
-        """Return the recorded phone in place of each phone that was never recorded."""
+    def stand_ins(self, model: SelectionModel) -> Mapping[str, str]:  # noqa: D102
         suppressed = self.config.suppressed_phones
         return {phone: other for phone, other in model.costs(self.config).stand_ins.items() if phone not in suppressed}
 
-    def typical_duration_s(self, model: SelectionModel, phone: str) -> float:
-        """Return the median duration of a phone in the recordings."""
+    def typical_duration_s(self, model: SelectionModel, phone: str) -> float:  # noqa: D102
         windows, usable = model.inventory.windows, model.inventory.usable
         alike = usable & (windows.phones == PHONE_NUMBER[phone])
         return float(np.median(windows.durations_s[alike if alike.any() else usable]))
 
-    def source_pieces(
+    def source_pieces(  # noqa: D102
         self, model: SelectionModel, units: Timeline[Unit], features: Mapping[str, NDArray[np.floating[Any]]]
     ) -> tuple[tuple[SourcePiece, ...], Timeline[Unit]]:
-        """Return the pieces of recordings that say some phones best, and the phones with the sources of their units.
-
-        units    : phones in time, from 0 s
-        features : acoustic features of every recording, by its name [each shape=(T, D)]; pieces
-            join where these agree
-        Raises InputError: an unknown phone, or features of other recordings.
-        """
         inventory, lengths = model.inventory, np.diff(model.inventory.first).tolist()
         for name, length in zip(inventory.names, lengths, strict=True):
             if name not in features or len(features[name]) != length:

@@ -35,6 +35,7 @@ from lipmotion.motion.predictors import (
     predictor_to_arrays,
 )
 from lipmotion.motion.space import check_poses
+from lipmotion.printable import printable
 from lipmotion.stats.trees import trees_to_arrays
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.schema import Arrays, check_arrays, format_errors, refuse_undeclared
@@ -105,6 +106,9 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
             with_unit_names(speech.units, model.units),
             StateTrace(tuple(model.emission.source(state, layout) for state in distinct), path),
         )
+
+    def describe(self, model: TrajectoryModel) -> str:  # noqa: D102
+        return "\n\n".join(f"{printable(name)}\n{tree.text()}" for name, tree in model.emission.forest.items())
 
     def to_arrays(self, model: TrajectoryModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         emission, regression = model.emission, model.emission.regression

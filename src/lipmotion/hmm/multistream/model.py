@@ -24,6 +24,7 @@ from lipmotion.hmm.multistream.densities import (
     TiedDensities,
 )
 from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState
+from lipmotion.printable import printable
 from lipmotion.stats.bigram import BIGRAM, Bigram, bigram_from_array
 from lipmotion.stats.mixture import MIXTURES, mixtures_from_arrays
 from lipmotion.stats.trees import (
@@ -106,6 +107,10 @@ class Forest:
         """Return the tree of a leaf and the answers that lead to it, in words."""
         tree = next(name for name in reversed(self._first_leaf) if self._first_leaf[name] <= leaf)
         return f"state {tree}: {self.trees[tree].name(int(self.trees[tree].leaves[leaf - self._first_leaf[tree]]))}"
+
+    def text(self) -> str:
+        """Return all trees as readable text."""
+        return "\n".join(f"state {printable(name)}\n{tree.text()}" for name, tree in self.trees.items())
 
 
 def build_unit_forest(inventory: Inventory, spoken: Sequence[str]) -> Forest:
@@ -288,6 +293,13 @@ class JointHmm:
     def log_move(self) -> NDArray[np.float64]:
         """Log P(leave the state) of every state without context [shape=(R,)]."""
         return np.log(-np.expm1(self.log_stay))
+
+    def text(self) -> str:
+        """Return the trees of all streams as readable text."""
+        forests = {name: model.forest for name, model in self.models.items()}
+        return "\n\n".join(
+            f"{printable(name)}: {forest.size} leaves\n{forest.text()}" for name, forest in forests.items()
+        )
 
 
 NAMES = {

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora import Corpus, quantise
-from lipmotion.engines.selection.engine import SelectionEngine, SourcePiece
+from lipmotion.engines.base import SelectsRecordings, SourcePiece
 from lipmotion.errors import InputError
 from lipmotion.formats.subtitles import is_subtitles, strip_markup
 from lipmotion.kernels.compiler import limit_threads
@@ -45,7 +45,7 @@ def speak_from_corpus(
 
     text    : one sentence or several, in English words that the dictionary or the request's lexicon pronounces
     corpus  : the corpus that the model was trained on
-    model   : of the engine ``selection``
+    model   : of an engine that ``SelectsRecordings`` (``selection``)
     request : the lexicon, and how the motion is made of the sound: speaker, pauses, asymmetry
     The sound is not changed but at the joins, where successive pieces are shifted by up to 8 ms to fit and overlap: how
     fast and how high words are spoken is what was recorded. Phones that were never recorded are replaced by similar
@@ -55,7 +55,7 @@ def speak_from_corpus(
     Source: Minnis & Breen 2000, §2 and §3.
     """
     engine, request = model.engine, request or Request()
-    if not isinstance(engine, SelectionEngine):
+    if not isinstance(engine, SelectsRecordings):
         raise InputError(
             f"a model of the engine {engine.name!r} has no recordings to speak with; train one: --engine selection"
         )
@@ -98,7 +98,7 @@ def speak_from_corpus(
     return SpokenText(audio, animate(request, model=model, constraints=constraints))
 
 
-def _plan_phones(text: str, lexicon: Lexicon, engine: SelectionEngine, model: Model) -> Timeline[Unit]:
+def _plan_phones(text: str, lexicon: Lexicon, engine: SelectsRecordings, model: Model) -> Timeline[Unit]:
     phones: list[tuple[Unit, float]] = []
     for number, sentence in enumerate(split_sentences(text)):
         phones.append((Unit(SILENCE), BETWEEN_S if number else REST_S))
