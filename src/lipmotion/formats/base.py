@@ -134,10 +134,6 @@ def find_suffix(path: Path, known: Collection[str] | None = None) -> str:
 
     The longest known suffix counts: ``take.livelink.csv`` has ``.livelink.csv``, ``take.1.csv`` ``.csv``.
     known : suffixes; None: those of all motion formats
-
-    >>> from pathlib import Path
-    >>> find_suffix(Path("take.1.CSV")), find_suffix(Path("take.fbx"))
-    ('.csv', '')
     """
     suffixes, known = [suffix.lower() for suffix in path.suffixes], list_suffixes() if known is None else known
     endings = ("".join(suffixes[first:]) for first in range(len(suffixes)))

@@ -7,8 +7,10 @@ parameters 1 (viseme) and 2 (expression) have four and six values; they are pass
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping
 from functools import partial
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -26,19 +28,10 @@ STEPS = 1024.0
 MOUTH_TO_NOSE = 0.30
 """The distance from the nose to where the lips meet (MNS0) in a mean face, in eye distances; the width of the mouth
 (MW0) is the template's."""
-PARAMETERS = (
-    (3, "open_jaw", 152, 1, -1, "N"), (4, "lower_t_midlip", 13, 1, -1, "N"), (5, "raise_b_midlip", 14, 1, 1, "N"),
-    (6, "stretch_l_cornerlip", 308, 0, 1, "W"), (7, "stretch_r_cornerlip", 78, 0, -1, "W"),
-    (8, "lower_t_lip_lm", 311, 1, -1, "N"), (9, "lower_t_lip_rm", 81, 1, -1, "N"),
-    (10, "raise_b_lip_lm", 402, 1, 1, "N"), (11, "raise_b_lip_rm", 178, 1, 1, "N"),
-    (12, "raise_l_cornerlip", 308, 1, 1, "N"), (13, "raise_r_cornerlip", 78, 1, 1, "N"),
-    (14, "thrust_jaw", 152, 2, 1, "N"), (15, "shift_jaw", 152, 0, -1, "W"), (16, "push_b_lip", 17, 2, 1, "N"),
-    (17, "push_t_lip", 0, 2, 1, "N"), (51, "lower_t_midlip_o", 0, 1, -1, "N"), (52, "raise_b_midlip_o", 17, 1, 1, "N"),
-    (53, "stretch_l_cornerlip_o", 291, 0, 1, "W"), (54, "stretch_r_cornerlip_o", 61, 0, -1, "W"),
-    (55, "lower_t_lip_lm_o", 269, 1, -1, "N"), (56, "lower_t_lip_rm_o", 39, 1, -1, "N"),
-    (57, "raise_b_lip_lm_o", 405, 1, 1, "N"), (58, "raise_b_lip_rm_o", 181, 1, 1, "N"),
-    (59, "raise_l_cornerlip_o", 291, 1, 1, "N"), (60, "raise_r_cornerlip_o", 61, 1, 1, "N"),
-)  # fmt: skip
+_TABLE = resources.files(__package__).joinpath("fap.csv").read_text(encoding="ascii").splitlines()[1:]
+PARAMETERS = tuple(
+    (int(n), name, int(point), int(axis), int(sign), unit) for n, name, point, axis, sign, unit in csv.reader(_TABLE)
+)
 """The parameters of lips and jaw that points show, left and right the speaker's own: number, name, point, axis (x left,
 y up, z out), sign, unit (N: mouth to nose, W: width of the mouth)."""
 VERSION = "2.1"

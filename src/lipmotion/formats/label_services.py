@@ -79,7 +79,8 @@ SPEECHIFY = Times("starttime", "endtime", "duration", 1000)  # of marks, whose s
 @cache
 def _list_times() -> tuple[Times, ...]:
     lines = resources.files(__package__).joinpath("label_times.csv").read_text(encoding="ascii").splitlines()
-    return tuple(Times(*row[:3], int(row[3]), int(row[4]), row[5]) for row in csv.reader(lines[1:]))
+    rows = csv.reader(lines[1:])
+    return tuple(Times(start, end, length, int(a), int(b), kind) for start, end, length, a, b, kind, _ in rows)
 
 
 TEXTS = (
@@ -347,7 +348,7 @@ def _list_items(item: dict[str, Any], where: str) -> dict[str, Any]:
     for column in COLUMNS:
         name, *pairs = column.split()
         members = dict(pair.split("=") for pair in pairs)
-        lists = [item.get(member) for member in members]
+        lists: list[Any] = [item.get(member) for member in members]
         if not all(isinstance(each, list) for each in lists) or any(isinstance(each, dict) for each in lists[0]):
             continue
         if len({len(each) for each in lists}) > 1:
@@ -357,8 +358,10 @@ def _list_items(item: dict[str, Any], where: str) -> dict[str, Any]:
         return {**{key: each for key, each in item.items() if key not in members}, name: items}
     if isinstance(item.get("phonemealignments"), list):
         rate = require(values.number(1000, 1e6), item.get("samplerate"), f"{where}: the sample rate in hertz")
-        rows = [each if isinstance(each, dict) else {} for each in item["phonemealignments"]]
-        return {"phones": [{"symbol": r.get("phoneme"), "samples": r.get("numsamples"), "rate": rate} for r in rows]}
+        phonemes = [each if isinstance(each, dict) else {} for each in item["phonemealignments"]]
+        return {
+            "phones": [{"symbol": p.get("phoneme"), "samples": p.get("numsamples"), "rate": rate} for p in phonemes]
+        }
     if isinstance(item.get("preddur"), list) and "phonemes" in item:
         letters = f"^{require(_TEXT, item['phonemes'], f'{where}: phonemes')}$"
         if len(item["preddur"]) != len(letters):

@@ -75,11 +75,9 @@ def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise InputError(f"not a motion document: its 'format' must be {FORMAT!r}")
     version = document.get("version")
-    if not isinstance(version, int) or version < 1:
-        raise InputError(f"the motion document has version {version!r}, required {VERSION}; export it again")
-    if version > VERSION:
-        newer = f"the motion document has version {version}"
-        raise InputError(f"{newer}, this lipmotion reads up to {VERSION}: upgrade lipmotion")
+    if version != VERSION:
+        what = f"the motion document has version {version!r}, this lipmotion reads {VERSION}"
+        raise InputError(f"{what}: upgrade lipmotion, or export it again")
     with catch_errors("the motion document"):
         checked = _DOCUMENT(document)
         channels = tuple(Channel(**channel) for channel in checked["channels"])

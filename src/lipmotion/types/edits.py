@@ -89,9 +89,6 @@ class DrawnCurve:
     values  : at equal distances from the start to the end, in the unit of the channel
     Raises InputError: fewer than 2 values, or more than ``MAX_DRAWN``; no numbers; or an end that is not after the
     start.
-
-    >>> DrawnCurve(1.0, 1.5, "opening", (0.0, 0.1, 0.0)).channel
-    'opening'
     """
 
     start_s: float

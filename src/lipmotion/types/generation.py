@@ -60,9 +60,6 @@ class Outlook:
     voice      : 0 (unknown) to 1 (as in the training); None where it was not needed
     range_db   : decibels between loud and quiet moments; under 20 the recording is noisy
     advice     : what would help, the most helpful first
-
-    >>> Outlook("words", 0.66, 0.0, 31.2, ("the words",)).text
-    'words recognised, confidence 0.66; voice 0.00 (1: as in training); levels 31 dB apart; would help most: the words'
     """
 
     words: str

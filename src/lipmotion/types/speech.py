@@ -175,10 +175,6 @@ class TimedTranscript:
     """What is said, in order. Times are as people and recognisers write them: late, early, rounded, overlapping.
 
     tags : the moods that tags in the text ask for
-
-    >>> line = TranscriptLine((TimedWord("hello"), TimedWord("you")), 1.5, 2.5)
-    >>> TimedTranscript((line,)).words, TimedTranscript((line,)).has_times
-    (('hello', 'you'), True)
     """
 
     lines: tuple[TranscriptLine, ...]

@@ -12,23 +12,11 @@ from numpy.typing import NDArray
 
 from lipmotion.types import Motion
 
-ARKIT_MOUTH = (
-    *("jawForward", "jawLeft", "jawRight", "jawOpen", "mouthClose", "mouthFunnel", "mouthPucker"),
-    *("mouthLeft", "mouthRight", "mouthSmileLeft", "mouthSmileRight", "mouthFrownLeft", "mouthFrownRight"),
-    *("mouthDimpleLeft", "mouthDimpleRight", "mouthStretchLeft", "mouthStretchRight", "mouthRollLower"),
-    *("mouthRollUpper", "mouthShrugLower", "mouthShrugUpper", "mouthPressLeft", "mouthPressRight"),
-    *("mouthLowerDownLeft", "mouthLowerDownRight", "mouthUpperUpLeft", "mouthUpperUpRight", "tongueOut"),
-)
-"""ARKit's blendshapes of lips, jaw and tongue, in the order of its documentation."""
-ARKIT_OTHERS = (
-    *("eyeBlinkLeft", "eyeLookDownLeft", "eyeLookInLeft", "eyeLookOutLeft", "eyeLookUpLeft", "eyeSquintLeft"),
-    *("eyeWideLeft", "eyeBlinkRight", "eyeLookDownRight", "eyeLookInRight", "eyeLookOutRight", "eyeLookUpRight"),
-    *("eyeSquintRight", "eyeWideRight", "browDownLeft", "browDownRight", "browInnerUp", "browOuterUpLeft"),
-    *("browOuterUpRight", "cheekPuff", "cheekSquintLeft", "cheekSquintRight", "noseSneerLeft", "noseSneerRight"),
-)
-"""The other 24 of ARKit's 52."""
-ARKIT_52 = (*ARKIT_OTHERS[:14], *ARKIT_MOUTH[:-1], *ARKIT_OTHERS[14:], ARKIT_MOUTH[-1])
-"""All of them, in the order of ARKit's documentation: eyes, jaw and mouth, brows, cheeks, nose, tongue."""
+_ARKIT_TABLE = resources.files(__package__).joinpath("arkit.csv").read_text(encoding="ascii").splitlines()[1:]
+_GROUPS = dict(line.split(",") for line in _ARKIT_TABLE)
+ARKIT_52 = tuple(_GROUPS)  # in the order of ARKit's documentation: eyes, jaw and mouth, brows, cheeks, nose, tongue
+ARKIT_MOUTH = tuple(name for name, group in _GROUPS.items() if group == "mouth")  # lips, jaw and tongue
+ARKIT_OTHERS = tuple(name for name, group in _GROUPS.items() if group != "mouth")  # the other 24
 VISEMES_15 = ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "ih", "oh", "ou")
 """The visemes of Oculus and OpenXR, in their order."""
 VRM_VOWELS = ("aa", "ih", "ou", "ee", "oh")  # the mouth shapes of VRM
