@@ -100,6 +100,11 @@ def test_a_candidate_is_its_eigenlips_and_its_detail_and_a_damaged_picture_is_no
         make_candidates(space, images[7:8])
 
 
+def test_recorded_mouths_stay_where_they_are() -> None:
+    values = mouths()[::5]
+    assert draw_to_recorded(values, values) == pytest.approx(values, abs=0.2)  # they are up to 147 from 0
+
+
 def test_a_mouth_between_recorded_ones_stays_and_one_far_away_comes_nearer() -> None:
     grid = np.stack(np.meshgrid(np.arange(8.0), np.arange(8.0)), axis=-1).reshape(-1, 2).astype(np.float32)
     between, far = draw_to_recorded(np.array([[3.4, 2.7], [3.5, 20.0]], np.float32), grid)

@@ -87,6 +87,12 @@ def test_loud_and_high_moments_raise_the_brows_and_nod_the_head():
         assert difference[soon].mean() > difference[~soon].mean() + 0.005
 
 
+def test_brows_are_level_at_rest_and_never_below():
+    brows = compute_liveliness(frames(25), MINUTE, SILENT, Prosody(np.full(6001, -30.0), np.full(6001, np.nan))).brows
+    assert brows.min() >= 0
+    assert brows.max() < 0.01
+
+
 def test_the_head_moves_slowly_and_less_in_silence():
     turn, silent = (compute_liveliness(frames(100), MINUTE, units, None).turn for units in (SAID, SILENT))
     assert np.abs(np.diff(turn, axis=0)).max() * 100 < 0.8  # radians a second

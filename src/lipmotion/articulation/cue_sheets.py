@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
 from itertools import pairwise
 from statistics import median
@@ -83,26 +83,12 @@ def frame_to_seconds(frame: int, fps: float) -> float:
     return (hundredths + (fps < 100 and int(fps * (hundredths / 100)) < frame)) / 100
 
 
-def count_cue_frames(duration_s: float, fps: float) -> int:
-    """Return the number of frames that begin before the end, which is cut to hundredths of a second."""
-    end_s = round_to_hundredths(duration_s)
+def count_cue_frames(end_s: float, fps: float) -> int:
+    """Return the number of frames that begin before the end, a whole number of hundredths of a second."""
     frames = int(np.ceil(end_s * fps))
     while frames and frame_to_seconds(frames - 1, fps) >= end_s:
         frames -= 1
     return frames
-
-
-def round_to_hundredths(duration_s: float) -> float:
-    """Return a duration cut to hundredths of a second."""
-    return int(duration_s * 100 + 1e-6) / 100
-
-
-def lay_out_cues(segments: Sequence[tuple[int, str]], duration_s: float, fps: float, drawn: str) -> CueSheet:
-    """Return the cue sheet of segments (first frame, shape); without segments, the mouth is at rest."""
-    starts = [frame_to_seconds(frame, fps) for frame, _ in segments] or [0.0]
-    shapes = [shape for _, shape in segments] or [choose_drawn_shape(REST, drawn)]
-    ends = [*starts[1:], round_to_hundredths(duration_s)]
-    return CueSheet(Timeline(tuple(map(Span, starts, ends, shapes))), fps, drawn)
 
 
 def list_frame_shapes(sheet: CueSheet) -> list[str]:
@@ -292,15 +278,20 @@ def choose_cues(
     motion = generation.motion
     drawn = "".join(name for name, shape in SHAPES.items() if not shape.fallback or name in optional)
     duration_s = max(0.0, (len(motion.values) - 1) / motion.rate_hz, *(span.end_s for span in generation.units))
-    frames = count_cue_frames(duration_s, fps)
+    end_s = int(duration_s * 100 + 1e-6) / 100
+    frames = count_cue_frames(end_s, fps)
     cost = np.empty((0, len(drawn)))
     if frames:  # of the drawn shapes: the least cost of those that each one stands for
         costs = compute_frame_costs(generation, frames, fps, intensity)
         groups = [[choose_drawn_shape(other, drawn) == name for other in SHAPES] for name in drawn]
         cost = np.stack([costs[:, group].min(axis=1) for group in groups], axis=1)
     segments = find_segments(cost, hold_frames or choose_hold_frames(fps), CHANGE_COST)
-    sheet = lay_out_cues([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)
-    return replace(sheet, words=Timeline(tuple(span for span in group_words(generation.units) if span.label)))
+    rows = [(frame_to_seconds(frame, fps), drawn[label]) for frame, label in segments]
+    rows = rows or [(0.0, choose_drawn_shape(REST, drawn))]  # no frame: the mouth is at rest
+    ends = [*(start_s for start_s, _ in rows[1:]), end_s]
+    cues = tuple(Span(start_s, stop_s, shape) for (start_s, shape), stop_s in zip(rows, ends, strict=True))
+    words = tuple(span for span in group_words(generation.units) if span.label)
+    return CueSheet(Timeline(cues), fps, drawn, Timeline(words))
 
 
 FLEMING_DOBBS = {"mbp": "A", "fv": "G", "sh": "F", "o": "E", "ehsz": "C", "aa": "D", "rest": REST}

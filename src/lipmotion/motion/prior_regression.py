@@ -119,15 +119,6 @@ KINDS = ("prior", "hidden", "articulation", "spectrum", "encoding")
 of articulation for the phones in time, the spectrum and the encoding of the sound around the frame."""
 
 
-PRIOR_ARRAYS = {
-    "prior_sizes": ArraySpec(np.int32, str(len(KINDS)), 0, 1e5),
-    "prior_inputs": ArraySpec(np.float32, "2 R", -1e6, 1e6),
-    "prior_coefficients": ArraySpec(np.float32, "R Q", -1e4, 1e4),
-    "prior_centre": ArraySpec(np.float64, "Q", -1e6, 1e6),
-    "prior_variances": ArraySpec(np.float64, "3 Q", POSITIVE),
-}
-
-
 @final
 @dataclass(frozen=True, eq=False)
 class PriorRegression(Predictor):
@@ -140,7 +131,13 @@ class PriorRegression(Predictor):
     centre: Array  # mean of the motion [shape=(Q,)]
     variances: Array  # of the error of static value, Δ and Δ², in cross-validation [shape=(3, Q)]
     name: ClassVar[str] = "prior"
-    ARRAYS: ClassVar[Mapping[str, ArraySpec]] = PRIOR_ARRAYS
+    ARRAYS: ClassVar[Mapping[str, ArraySpec]] = {
+        "prior_sizes": ArraySpec(np.int32, str(len(KINDS)), 0, 1e5),
+        "prior_inputs": ArraySpec(np.float32, "2 R", -1e6, 1e6),
+        "prior_coefficients": ArraySpec(np.float32, "R Q", -1e4, 1e4),
+        "prior_centre": ArraySpec(np.float64, "Q", -1e6, 1e6),
+        "prior_variances": ArraySpec(np.float64, "3 Q", POSITIVE),
+    }
     uses_prior: ClassVar[bool] = True
     uses_articulation: ClassVar[bool] = True
 
@@ -206,7 +203,7 @@ class PriorRegression(Predictor):
     @classmethod
     def from_arrays(cls, arrays: Arrays, dimensions: int) -> PriorRegression:
         """Deserialise a regression; as ``Predictor.from_arrays``."""
-        stored = check_arrays(arrays, PRIOR_ARRAYS, Q=dimensions)
+        stored = check_arrays(arrays, cls.ARRAYS, Q=dimensions)
         sizes = tuple(stored["prior_sizes"].tolist())
         around = (2 * ENCODING_REACH + 1) * ENCODING_COMPONENTS
         known = {(len(ARTICULATORS), (2 * WINDOW + 1) * SPECTRUM_BANDS, size) for size in (0, around)}
