@@ -78,13 +78,10 @@ def test_rules_are_kept() -> None:
 
 OFFENCES: list[tuple[Rule, str, list[int]]] = [
     (pickled, "import pickle\n", [1]),
-    (pickled, "from pickle import loads\n", [1]),
-    (pickled, "import joblib\n", [1]),
     (pickled, "from joblib import load\n", [1]),
     (pickled, "from joblib import Parallel, delayed\n", []),
     (pickled, "np.load(path)\n", [1]),
     (pickled, "np.load(path, allow_pickle=False)\njson.load(file)\n", []),
-    (changeable, "@dataclass\nclass A: ...\n", [2]),
     (changeable, "@dataclass(eq=False)\nclass A: ...\n", [2]),
     (changeable, "@dataclass(frozen=True)\nclass A: ...\n", []),
     (printed, "print(1)\n", [1]),

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from random import Random
-from threading import Event, Thread
+from threading import Event, Timer
 from typing import Any, NamedTuple
 
 from children import LIMIT_S, LIPMOTION, Child, child
@@ -93,28 +93,12 @@ def edits_of_all_kinds(chance: Random, state: dict[str, Any]) -> list[str]:
     ]
 
 
-class Editor:
-    """Makes random edits through a server, one after another, and keeps which were acknowledged."""
-
-    def __init__(self, seed: int) -> None:
-        self._chance = Random(seed)
-        self.steps: list[str] = []
-        self.sent: list[str] = []
-        """The edits of the last request that was sent, all of them; it may have been answered or not."""
-
-    def edit(self, server: Served) -> int:
-        """Make one edit, or take one back; return the status of the reply. Raises an error of ``NO_REPLY``."""
-        state = server.ask("/api/lines/1")[1]
-        if self._chance.random() < 0.2 and state["undo"]:
-            self.sent = state["steps"][:-1]
-            status, reply = server.ask("/api/lines/1/undo", {"revision": state["revision"]})
-        else:
-            step = self._chance.choice(edits_of_all_kinds(self._chance, state))
-            self.sent = [*state["steps"], str(parse_step(step))]  # as it is written
-            status, reply = server.ask("/api/lines/1/edits", {"revision": state["revision"], "steps": [step]})
-        if status == 200:
-            self.steps = reply["steps"]
-        return status
+def choose_change(chance: Random, state: dict[str, Any]) -> tuple[str, dict[str, Any], list[str]]:
+    """Return a change of a line in this state: its address and content, and the edits that there are then."""
+    if chance.random() < 0.2 and state["undo"]:
+        return "undo", {}, state["steps"][:-1]
+    step = chance.choice(edits_of_all_kinds(chance, state))
+    return "edits", {"steps": [step]}, [*state["steps"], str(parse_step(step))]  # as it is written
 
 
 def lost_edits(
@@ -131,33 +115,28 @@ def lost_edits(
     each_s : how long it is edited, at most, between two kills
     report : is called with what was found so far, after each kill
     """
-    editor, chance = Editor(seed), Random(seed)
-    found = {"kills": 0, "acknowledged": 0, "lost": 0}
+    chance, found = Random(seed), {"kills": 0, "acknowledged": 0, "lost": 0}
+    steps: list[str] = []  # that were acknowledged
+    sent: list[str] = []  # those of the last request, which may have been answered or not
     while found["kills"] < kills:
         with served(project, errors, *options) as server:
-            state = server.ready()
-            if found["kills"] and state["steps"] not in (editor.steps, editor.sent):
-                found["lost"] += 1
-            ends_s = time.monotonic() + chance.uniform(0.1, each_s)
-            editor.steps = state["steps"]
-            killed = _killed_at(server, ends_s)
+            state, killed = server.ready(), Event()
+            found["lost"] += found["kills"] > 0 and state["steps"] not in (steps, sent)
+            steps = state["steps"]
+
+            def kill(server: Served = server, killed: Event = killed) -> None:
+                killed.set()
+                server.process.kill()
+
+            Timer(chance.uniform(0.1, each_s), kill).start()
             with suppress(*NO_REPLY):
                 while not killed.is_set():
-                    found["acknowledged"] += editor.edit(server) == 200
+                    state = server.ask("/api/lines/1")[1]
+                    what, content, sent = choose_change(chance, state)
+                    status, reply = server.ask(f"/api/lines/1/{what}", {"revision": state["revision"], **content})
+                    if status == 200:
+                        steps, found["acknowledged"] = reply["steps"], found["acknowledged"] + 1
             server.kill()
         found["kills"] += 1
         report(found)
     return found
-
-
-def _killed_at(server: Served, ends_s: float) -> Event:
-    """Kill a server at a time, whatever it does then; return the event that says that it has happened."""
-    killed = Event()
-
-    def kill() -> None:
-        time.sleep(max(ends_s - time.monotonic(), 0))
-        killed.set()
-        server.process.kill()
-
-    Thread(target=kill, daemon=True).start()
-    return killed
