@@ -22,6 +22,7 @@ noise, 2 in an office, 5 to 8 in a babble of voices, which stays."""
 BIAS = 1.3  # the mean power of steady noise beside its 20th percentile, of averages over so many bins and frames:
 AVERAGED = (3, 9)
 SMOOTHED = (3, 5)  # over which power is averaged where it is filtered: single values are mostly chance
+LEAST_REST = 5e-3  # of the power: less is not a voice, but what is left of a tone
 LOWEST_GAIN = 0.1  # of hum, whose level hardly varies, less
 BLOCK, MARGIN, MAX_BLOCKS = 10 * SPEECH_RATE_HZ, 10 * HOP, 12  # filtered at a time, with what is around; judged at most
 
@@ -56,7 +57,7 @@ def reduce_noise(samples: NDArray[np.float32], energy: NDArray[np.float32]) -> N
         mean = uniform_filter(np.square(np.abs(spectrum)), SMOOTHED, mode="nearest")
         gain = np.clip(1 - BIAS * noise / np.maximum(mean, 1e-20), lowest_gain, 1) ** exponent
         result[start : start + BLOCK] = transform.istft(spectrum * gain, k1=len(block))[start - first :][:BLOCK]
-    return result
+    return result if np.square(result).mean() > LEAST_REST * np.square(samples).mean() else samples
 
 
 def _decibels(power: NDArray[np.float64] | float, reference: NDArray[np.float64] | float) -> NDArray[np.float64]:
