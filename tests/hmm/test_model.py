@@ -173,6 +173,11 @@ def test_the_pronunciation_and_the_pauses_that_were_said_are_chosen():
         assert choose(known_hmm(who), features, WORDS) == wanted
 
 
+def test_pronunciations_without_number_are_refused_before_a_network_is_built():
+    with pytest.raises(AlignmentError, match=r"\d+ arcs, required at most 1000600"):
+        choose(random_hmm(2), np.zeros((60, 2), np.float32), [[("a",)] * 800] * 4)
+
+
 def test_words_are_placed_within_their_windows():
     """The same word twice in the sound, and once in the transcript: the window says which."""
     who = speaker()
