@@ -18,7 +18,7 @@ from lipmotion.testing import CHANNELS
 from lipmotion.testing import examples as sentences
 from lipmotion.types import Example, TokenPosteriors, silent_monitor
 from lipmotion_lab import learning_curve as module
-from lipmotion_lab.baselines import REACH, BlstmBaseline, ContextRidge, FrameRegressionModel, MeanPose
+from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, FrameRegressionModel, MeanPose
 from lipmotion_lab.engine_comparison import ENGINES_COMPARED, compare_engines
 from lipmotion_lab.learning_curve import run_learning_curve
 from lipmotion_lab.report.sections import build_learning_section
@@ -142,29 +142,6 @@ def test_the_mean_pose(examples):
     )
     direct = made.motion.column("opening")
     assert made.variance[0, direct] == pytest.approx(valid_motion(examples)[:, direct].var())
-
-
-def with_delayed_opening(examples: list[Example], curve: np.ndarray, late: int) -> list[Example]:
-    """Return the examples with an opening that is twice a column of the features, ``late`` frames later."""
-    made = []
-    for one in examples:
-        values = one.motion.values.copy()
-        values[:, one.motion.column("opening")] = 3 + 2 * np.roll(one.speech.features.values @ curve, late)
-        made.append(replace(one, motion=replace(one.motion, values=values)))
-    return made
-
-
-def error(engine, examples: list[Example]) -> float:
-    model = engine.fit(examples, silent_monitor).model
-    made = engine.generate(model, examples[0].speech).motion["opening"]
-    inner = slice(2 * REACH, -2 * REACH)
-    return float(np.abs(made - examples[0].motion["opening"])[inner].max())
-
-
-def test_the_reach_of_the_acoustic_context(examples):
-    column = np.eye(39)[3]
-    assert error(ContextRidge(), with_delayed_opening(examples[:6], column, REACH)) < 0.2
-    assert error(ContextRidge(), with_delayed_opening(examples[:6], column, REACH + 8)) > 1
 
 
 @pytest.fixture(scope="module")

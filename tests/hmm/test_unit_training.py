@@ -58,19 +58,6 @@ def test_new_sentences_are_recognised(trained):
         assert bounds == pytest.approx(edges, abs=2)
 
 
-def test_the_pronunciation_said_is_learned():
-    """Half of the time a word is not pronounced as the first variant of the lexicon."""
-    who, draw = synthetic.speaker(5), np.random.default_rng(5)
-    variants = (("a", "b"), ("c", "b"))
-    transcribed, said = [], []
-    for number, words in enumerate(synthetic.sentences(5, 30)):
-        said.append(synthetic.within_silence([variants[number % 2], *words]))
-        features, _ = who.say(draw, said[-1])
-        transcribed.append(unit_training.TranscribedUtterance(features, (variants, *((word,) for word in words))))
-    hmm = unit_training.train_hmm(transcribed, synthetic.INVENTORY, CONFIG, silent_monitor)
-    assert [synthetic.chosen_units(hmm, utterance.features, utterance.words) for utterance in transcribed] == said
-
-
 def test_the_bigram_is_that_of_what_was_said_pauses_being_silence(trained):
     hmm, _, _, said, _, _ = trained
     silent = [tuple(synthetic.SILENCE if unit == synthetic.PAUSE else unit for unit in units) for units in said]

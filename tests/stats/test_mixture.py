@@ -44,14 +44,6 @@ def test_log_likelihood_is_that_of_scipy(seed, components):
         assert mixtures.log_likelihood(x)[:, density] == pytest.approx(logsumexp(wanted, axis=1), abs=2e-3)
 
 
-def test_chosen_densities_come_in_the_order_asked_for():
-    mixtures, (x, _) = made(1), random_data(1, 10)
-    chosen = np.array([2, 0, 2])
-    assert mixtures.log_likelihood(x, chosen) == pytest.approx(mixtures.log_likelihood(x)[:, chosen], abs=1e-5)
-    assert np.array_equal(mixtures.select(chosen).log_likelihood(x), mixtures.log_likelihood(x, chosen))
-    assert mixtures.concatenate(mixtures.select(chosen)).size == (6, 2, 3)
-
-
 @given(seed=SEEDS)
 @settings(max_examples=30)
 def test_no_step_of_improvement_lowers_the_likelihood(seed):

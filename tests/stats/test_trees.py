@@ -55,13 +55,6 @@ def test_pure_noise_is_not_split():
     assert len(grown(sample(lambda _: 0.0), factor=1.0).splits) == 1
 
 
-def test_no_leaf_has_fewer_frames_than_asked_for():
-    values = sample(lambda context: float(UNITS.index(context[0]) * 4 + UNITS.index(context[1])))
-    tree = grown(values, min_frames=100.0)
-    assert len(tree.leaves) > 1
-    assert tree.frames[tree.leaves].min() >= 100
-
-
 def test_splits_are_those_of_a_search_by_hand():
     """The root's question has the highest gain of all, counted frame by frame."""
     values = sample(lambda context: 1.0 * (context[1] == "c") + 0.4 * (context[2] in "ab"))

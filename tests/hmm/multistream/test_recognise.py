@@ -34,9 +34,12 @@ def candidates(hmm, frames):
 
 
 @pytest.mark.parametrize("both", [False, True])
-@pytest.mark.parametrize(("seed", "states", "frames"), [(0, 2, 7), (1, 3, 8)])
-def test_nothing_else_is_more_probable(seed, states, frames, both):
-    hmm = random_joint(seed, states=states, components=1 + seed % 2, both_neighbours=both, recognition=WEIGHTS)
+@pytest.mark.parametrize(("seed", "states", "frames", "bigram"), [(0, 2, 7, 1.3), (1, 3, 8, 1.3), (4, 2, 7, 4.0)])
+def test_nothing_else_is_more_probable(seed, states, frames, bigram, both):
+    language = {"bigram_weight": bigram, "insertion": 1.5 if bigram > 2 else -0.4}
+    hmm = random_joint(
+        seed, states=states, components=1 + seed % 2, both_neighbours=both, recognition=WEIGHTS, **language
+    )
     data = observed(np.random.default_rng([seed, 1]), frames)
     density = slow_densities(hmm, data, WEIGHTS)
     best, units, lengths = max(slow.everything(hmm, density, frames, candidates(hmm, frames)))
