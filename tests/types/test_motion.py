@@ -1,6 +1,5 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import accumulate, pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -160,16 +159,6 @@ def test_it_says_which_span_is_wrong_and_rounding_is_no_overlap() -> None:
         with pytest.raises(InputError, match=message):
             timeline(*edges_s)
     assert len(timeline((0, 0.1 + 0.2), (0.3, 1))) == 2
-
-
-@settings(max_examples=50)
-@given(st.lists(st.floats(0, 5), min_size=2, max_size=8), st.floats(0, 1000))
-def test_shifting_moves_every_time_and_nothing_else(steps_s: list[float], offset_s: float) -> None:
-    spans = timeline(*pairwise(accumulate(steps_s)))
-    moved = spans.shifted(offset_s)
-    assert [span.label for span in moved] == [span.label for span in spans]
-    assert [span.start_s for span in moved] == [span.start_s + offset_s for span in spans]
-    assert [span.end_s for span in moved] == [span.end_s + offset_s for span in spans]
 
 
 def test_a_phone_is_named_as_users_know_it() -> None:

@@ -10,7 +10,6 @@ import numpy as np
 
 from formats.examples import LABEL_CASES
 from formats.test_labels import TIERS, long_form
-from formats.test_reported_cases import SPEAKERS
 from fuzz import inputs
 from lipmotion import Corpus, Request, animate, load_model, read_motion, write
 from lipmotion.formats.label_files import read_labels
@@ -121,7 +120,7 @@ LABELS_TEXTS = {
     "words.txt": "Hello, you 42 people.\n",
     "grid.align": "0 23750 sil\n23750 29500 bin\n29500 34000 blue\n",
 }
-SAMPLED = {f"{number}.json": case["content"] for number, case in enumerate(LABEL_CASES.values())} | SPEAKERS
+SAMPLED = {f"{number}.json": case["content"] for number, case in enumerate(LABEL_CASES.values())}
 LABELS_TEXTS |= {
     name: sample if isinstance(sample, str) else json.dumps(sample, ensure_ascii=False)
     for name, sample in SAMPLED.items()
