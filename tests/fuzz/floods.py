@@ -102,17 +102,11 @@ def _packed(count: int, mode: str, stride: int) -> Files:
     return _gltf(change, extra)
 
 
-def _png(width: int, height: int, colour: int = 6, bits: int = 8) -> bytes:
-    """Return a picture of one colour, of any size, in little."""
-    rows, body = zlib.compressobj(9), b""
-    row = b"\0" * (1 + width * bits // 8 * {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}[colour])
-    for _ in range(height):
-        body += rows.compress(row)
-    chunks = [
-        (b"IHDR", struct.pack(">IIBBBBB", width, height, bits, colour, 0, 0, 0)),
-        *([(b"PLTE", b"\0\0\0"), (b"tRNS", b"\0")] if colour == 3 else []),
-        *((b"IDAT", body + rows.flush()), (b"IEND", b"")),
-    ]
+def _png(width: int, height: int) -> bytes:
+    """Return a black picture of any size, in little."""
+    rows = zlib.compressobj(9)
+    body = b"".join(rows.compress(b"\0" * (1 + 3 * width)) for _ in range(height)) + rows.flush()
+    chunks = ((b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)), (b"IDAT", body), (b"IEND", b""))
     written = (struct.pack(">I", len(b)) + n + b + struct.pack(">I", zlib.crc32(n + b)) for n, b in chunks)
     return b"\x89PNG\r\n\x1a\n" + b"".join(written)
 
@@ -182,9 +176,9 @@ CHARACTER_FLOODS: dict[str, Callable[[], Files]] = {
     "compressed zeros": lambda: _packed(4_000_000, "ATTRIBUTES", 12),
     "too many compressed zeros": lambda: _packed(500_000_000, "ATTRIBUTES", 12),
     "compressed triangles": lambda: _packed(12_000_000, "TRIANGLES", 4),
-    "a picture of 8192 by 8192": lambda: _pictured(_png(8192, 8192, 2)),
-    "20 textures of one picture": lambda: _pictured(_png(8192, 8192, 2), 20),
-    "20 pictures of 8192 by 8192": lambda: _pictured(_png(8192, 8192, 2), 20, copies=True),
+    "a picture of 8192 by 8192": lambda: _pictured(_png(8192, 8192)),
+    "20 textures of one picture": lambda: _pictured(_png(8192, 8192), 20),
+    "20 pictures of 8192 by 8192": lambda: _pictured(_png(8192, 8192), 20, copies=True),
     "a picture of 60000 by 60000": lambda: _pictured(_png(60_000, 8)[:16] + struct.pack(">II", 60_000, 60_000)),
     "a JPEG that lies": lambda: _pictured(_jpeg(65_000, 1000)),
     "5,000 scans": lambda: _pictured(_scans(5000)),
@@ -205,12 +199,12 @@ CHARACTER_FLOODS: dict[str, Callable[[], Files]] = {
     "polygons of 1,000 corners": lambda: _obj(SQUARE + (b"f" + b" 1" * 1000 + b"\n") * 5000),
     "parts": lambda: _obj(SQUARE + b"".join(b"g p%d\nf 1 2 3\n" % n for n in range(100_000))),
     "2,000 materials with one picture": lambda: _obj(
-        b"mtllib head.mtl\n" + USED, head_mtl=LIBRARY, skin_png=_png(8192, 8192, 2)
+        b"mtllib head.mtl\n" + USED, head_mtl=LIBRARY, skin_png=_png(8192, 8192)
     ),
     "one material with 40,000 pictures": lambda: _obj(
         b"mtllib head.mtl\nusemtl m\n" + SQUARE + b"f 1 2 3\n",
         head_mtl=b"newmtl m\n" + b"map_Kd skin.png\n" * 40_000,
-        skin_png=_png(4096, 4096, 2),
+        skin_png=_png(4096, 4096),
     ),
 }
 """By what they are."""
