@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from formats.examples import of_motion
 from formats.examples import written as write
@@ -96,22 +97,10 @@ def face() -> dict[str, np.ndarray]:
     return markers | {name: np.array(p) + moved[:, n] for n, (name, p) in enumerate(mouth.items())}
 
 
-def turned(angles: np.ndarray) -> np.ndarray:
-    """Return rotations about x, y and z [shape=(T, 3, 3)]."""
-    made = np.tile(np.eye(3), (len(angles), 1, 1))
-    for axis in range(3):
-        one, other = (axis + 1) % 3, (axis + 2) % 3
-        step = np.tile(np.eye(3), (len(angles), 1, 1))
-        step[:, one, one] = step[:, other, other] = np.cos(angles[:, axis])
-        step[:, one, other], step[:, other, one] = -np.sin(angles[:, axis]), np.sin(angles[:, axis])
-        made = step @ made
-    return made
-
-
 @pytest.mark.parametrize(("unit", "per_mm"), [("mm", 1.0), ("cm", 0.1), ("m", 0.001)])
 def test_movements_of_the_head_are_taken_out(tmp_path, unit, per_mm):
     still = face()
-    rotations = turned(np.cumsum(RNG.normal(0, 0.02, (FRAMES, 3)), axis=0))
+    rotations = Rotation.from_euler("xyz", np.cumsum(RNG.normal(0, 0.02, (FRAMES, 3)), axis=0)).as_matrix()
     shift = np.cumsum(RNG.normal(0, 2, (FRAMES, 3)), axis=0)
     moved = {n: (np.einsum("tij,tj->ti", rotations, 88 * p) + shift) * per_mm for n, p in still.items()}
     write_c3d(tmp_path / "a.c3d", capture(moved, unit))

@@ -284,20 +284,7 @@ def test_milliseconds_are_read(write: Any, times: str, scale: float, caplog: pyt
     assert ("milliseconds" in caplog.text) == (scale > 1)
 
 
-TABLES = {
-    "clock.csv": "time,mouth\n0:00.00,X\n0:00.50,A\n0:00:01.00,D\n0:02.00,X\n",
-    "comma.tsv": "0,00\tX\n0,50\tA\n1,00\tD\n2,00\tX\n",
-    "semicolon.csv": "0,0;X\n0,5;A\n1,0;D\n2,0;X\n",
-    "commas.csv": "0,00,X\n0,50,A\n1,00,D\n2,00,X\n",
-    "quoted.csv": '"0,0","X"\n"0,5","A"\n"1,0","D"\n"2,0","X"\n',
-    "spans.csv": "start,end,value\n0,0.5,X\n0.5,1,A\n1,2,D\n",
-    "ms.csv": "start,end,value\n0,500,X\n500,1000,A\n1000,2000,D\n",
-    "events.json": json.dumps([{"time": t, "viseme": v} for t, v in ((0, "sil"), (0.5, "PP"), (1, "aa"), (2, "sil"))]),
-    "visemes.json": json.dumps({"visemes": [
-        {"start": f"{t},0", "end": t + 1, "name": f"viseme_{v}"} for t, v in enumerate(("sil", "aa"))]}),
-    "comma.json": json.dumps({"mouthCues": [
-        {"start": f"{t},0", "end": f"{t + 1},0", "value": v} for t, v in enumerate("XD")]}),
-}  # fmt: skip
+TABLES = json.loads(Path(__file__).with_name("cue_tables.json").read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("name", TABLES)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from formats.examples import timed
+from formats.examples import LABEL_CASES, timed
 from lipmotion import Request
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import list_speakers, read_labels, read_phones, read_transcript
@@ -125,21 +125,7 @@ def test_samples_are_read_where_their_rate_is_known(write: Any) -> None:
         read_labels(write("3000 8140 my\n8180 15520 mother\n15520 29920 moved\n", "a.txt"))
 
 
-TWO = {"ann__words": [(0.3, 0.7, "mama")], "ann__phones": [(0.3, 0.5, "M"), (0.5, 0.7, "AA1")]}
-TWO |= {"bob__words": [(0.5, 1.0, "papa")], "bob__phones": [(0.5, 0.8, "P"), (0.8, 1.0, "AA1")]}
-ELAN = """<?xml version="1.0" encoding="UTF-8"?>
-<ANNOTATION_DOCUMENT><TIME_ORDER>
-<TIME_SLOT TIME_SLOT_ID="s1" TIME_VALUE="300"/><TIME_SLOT TIME_SLOT_ID="s2" TIME_VALUE="1200"/>
-<TIME_SLOT TIME_SLOT_ID="s3" TIME_VALUE="1000"/><TIME_SLOT TIME_SLOT_ID="s4" TIME_VALUE="1900"/></TIME_ORDER>
-<TIER TIER_ID="said" PARTICIPANT="ann"><ANNOTATION>
-<ALIGNABLE_ANNOTATION ANNOTATION_ID="a1" TIME_SLOT_REF1="s1" TIME_SLOT_REF2="s2">
-<ANNOTATION_VALUE>mama [laughs]</ANNOTATION_VALUE></ALIGNABLE_ANNOTATION></ANNOTATION></TIER>
-<TIER TIER_ID="meaning" PARENT_REF="said"><ANNOTATION><REF_ANNOTATION ANNOTATION_ID="a2" ANNOTATION_REF="a1">
-<ANNOTATION_VALUE>Mutter</ANNOTATION_VALUE></REF_ANNOTATION></ANNOTATION></TIER>
-<TIER TIER_ID="other" PARTICIPANT="bob"><ANNOTATION>
-<ALIGNABLE_ANNOTATION ANNOTATION_ID="a3" TIME_SLOT_REF1="s3" TIME_SLOT_REF2="s4">
-<ANNOTATION_VALUE>papa</ANNOTATION_VALUE></ALIGNABLE_ANNOTATION></ANNOTATION></TIER></ANNOTATION_DOCUMENT>
-"""
+SPEAKERS = {case["file"]: case["content"] for case in LABEL_CASES.values() if "speakers" in case}
 
 
 def test_textgrids_as_people_spell_them(write: Any) -> None:
@@ -155,31 +141,13 @@ def test_times_of_elan_are_those_of_its_recording(write: Any, caplog: pytest.Log
         media = (
             f'<HEADER TIME_UNITS="{unit}"><MEDIA_DESCRIPTOR MEDIA_URL="a.wav" TIME_ORIGIN="1000"/></HEADER><TIME_ORDER>'
         )
-        path = write(ELAN.replace("<TIME_ORDER>", media).encode("utf-16"), "a.eaf")
+        path = write(SPEAKERS["a.eaf"].replace("<TIME_ORDER>", media).encode("utf-16"), "a.eaf")
         if unit == "milliseconds":
             assert timed(path, speaker="bob").lines[0].start_s == pytest.approx(2)
             assert "1.00 s after the start of a.wav" in caplog.text
         else:
             with pytest.raises(InputError, match="PAL-frames, required milliseconds"):
                 read_transcript(path)
-
-
-MFA = {name.replace("__", " - "): {"entries": [list(row) for row in rows]} for name, rows in TWO.items()}
-SPEAKERS = {
-    "a.TextGrid": grid(**TWO),
-    "b.TextGrid": grid(ann=[(0.3, 0.7, "mama")], bob=[(0.7, 1.0, "papa")]),
-    "mfa.json": {"start": 0, "end": 2, "tiers": MFA},
-    "a.eaf": ELAN,
-    "a.csv": "Begin,End,Label,Type,Speaker\n0.3,0.7,mama,words,ann\n0.5,1.0,papa,words,bob\n",
-    "rev.json": {
-        "monologues": [
-            {"speaker": who, "elements": [{"type": "text", "value": said, "ts": start, "end_ts": start + 0.4}]}
-            for who, said, start in (("ann", "mama", 0.3), ("bob", "papa", 0.7))
-        ]
-    },
-    "a.stm": "take 1 ann 0.3 0.7 <o,f0> mama\ntake 1 bob 0.5 1.0 <o,f0> papa\n",
-    "a.ctm": "take ann 0.3 0.4 mama\ntake bob 0.5 0.5 papa\n",
-}
 
 
 @pytest.mark.parametrize("name", SPEAKERS)
@@ -194,7 +162,7 @@ def test_a_speaker_is_chosen_and_several_are_named(write: Any, caplog: pytest.Lo
 
 
 def test_phones_of_a_speaker_are_chosen_by_the_request_too(write: Any, tmp_path: Path) -> None:
-    for path in (write(grid(**TWO), "a.TextGrid"), write(SPEAKERS["mfa.json"], "mfa.json")):
+    for path in (write(SPEAKERS[name], name) for name in ("a.TextGrid", "mfa.json")):
         assert phones(path, speaker="bob") == phones(path, tier="bob - phones") == ["p", "aa"]
         assert phones(path) == ["m", "aa", "p", "aa"]  # who began goes on
         assert list_speakers(path) == ("ann", "bob")

@@ -33,22 +33,7 @@ def words(transcript: TimedTranscript) -> list[tuple[str, float | None, float | 
     return [(word.word, word.start_s, word.end_s) for line in transcript.lines for word in line.words]
 
 
-SRT = "1\n00:00:01,000 --> 00:00:02,500\nHello there!\n\n2\n00:00:02,750 --> 00:00:04,000\nHow are\nyou?\n"
-ASS = """[Script Info]
-Title: no words
-ScriptType: v4.00+
-
-[V4+ Styles]
-Format: Name, Fontname, Fontsize
-Style: Default,Arial,20
-
-[Events]
-Format: Layer, Start, End, Style, Name, MarginL, MarginR, MarginV, Effect, Text
-Comment: 0,0:00:00.00,0:00:09.00,Default,,0,0,0,,not said
-Dialogue: 0,0:00:02.75,0:00:04.00,Default,Bob,0,0,0,,How\\Nare, {\\i1}you{\\i0}?
-Dialogue: 1,0:00:01.00,0:00:02.50,Default,,0,0,0,,{\\an8\\fad(100,100)}Hello\\hthere!
-Dialogue: 1,0:00:01.00,0:00:02.50,Default,,0,0,0,,{\\p1}m 0 0 l 100 0{\\c&HFF&} 100 100{\\p0}
-"""
+SRT, ASS, SCROLLING = (LABEL_CASES[name]["content"] for name in ("SubRip", "SubStation", "captions that scroll"))
 
 
 def expected(row: list[Any]) -> list[Any]:
@@ -96,33 +81,7 @@ def test_some_words_have_no_time_some_share_one_and_an_end_just_before_its_start
     assert words(read('{"words": [{"word": "a", "start": 7.0, "end": 6.98}]}')) == [("a", 7.0, 7.0)]
 
 
-SCROLLING = """WEBVTT
-Kind: captions
-Language: en
-
-00:00:00.240 --> 00:00:01.910 align:start position:0%
-{blank}
-Let<00:00:00.640><c> us</c><00:00:00.800><c> look</c>
-
-00:00:01.910 --> 00:00:01.920 align:start position:0%
-Let us look
-{blank}
-
-00:00:01.920 --> 00:00:03.750 align:start position:0%
-Let us look
-look<00:00:02.320><c> again</c>
-
-00:00:03.750 --> 00:00:03.760 align:start position:0%
-look again
-{blank}
-
-""".replace("{blank}", " ")
-
-
 def test_captions_that_scroll_say_each_line_once(read: Read) -> None:
-    found = words(read(SCROLLING))
-    assert [word for word, *_ in found] == ["let", "us", "look", "look", "again"]
-    assert [start_s for _, start_s, _ in found] == pytest.approx([0.24, 0.64, 0.8, 1.92, 2.32])
     without_times = SCROLLING.replace("<c>", "").replace("</c>", "").replace("<00:00:", "<").replace("<0", "<i 0")
     assert read(without_times).words == ("let", "us", "look", "look", "again")
     twice = "00:00:01,000 --> 00:00:02,000\nno\n\n00:00:02,000 --> 00:00:03,000\nno\nno\n\n"

@@ -189,12 +189,12 @@ CHARACTER_FLOODS: dict[str, Callable[[], Files]] = {
     "polygons of 1,000 corners": lambda: _obj(SQUARE + (b"f" + b" 1" * 1000 + b"\n") * 5000),
     "parts": lambda: _obj(SQUARE + b"".join(b"g p%d\nf 1 2 3\n" % n for n in range(100_000))),
     "2,000 materials with one picture": lambda: _obj(
-        b"mtllib head.mtl\n" + USED, head_mtl=LIBRARY, skin_png=_png(8192, 8192, 2)
+        b"mtllib head.mtl\n" + USED, head_mtl=LIBRARY, skin_png=_png(8192, 8192)
     ),
     "one material with 40,000 pictures": lambda: _obj(
         b"mtllib head.mtl\nusemtl m\n" + SQUARE + b"f 1 2 3\n",
         head_mtl=b"newmtl m\n" + b"map_Kd skin.png\n" * 40_000,
-        skin_png=_png(4096, 4096, 2),
+        skin_png=_png(4096, 4096),
     ),
 }
 """By what they are."""

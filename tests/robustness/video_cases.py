@@ -52,10 +52,3 @@ _pictures(
 def _(bench: Bench) -> list[object]:
     _video(bench, (64, 64), [GREY] * 25, every=2500)
     return ["corpus", "prepare", bench.folder, "-o", "corpus"]
-
-
-@case(GROUP, "background of grey pictures", 3, "no face in 25 of 25 frames; required: a face in at least 80%")
-def _(bench: Bench) -> list[object]:
-    _video(bench, (64, 64), [GREY] * 25)
-    video = bench.folder / "a.mkv"
-    return bench.animate(None, "--face", bench.face, "--background", video, output="a.mp4")

@@ -10,7 +10,6 @@ import numpy as np
 
 from formats.examples import LABEL_CASES
 from formats.test_labels import TIERS, long_form
-from formats.test_reported_cases import SPEAKERS
 from fuzz import inputs
 from lipmotion import Corpus, Request, animate, load_model, read_motion, write
 from lipmotion.formats.label_files import read_labels
@@ -113,19 +112,14 @@ def check_corpus(folder: Path, _: inputs.Good) -> None:
 
 LABELS_TEXTS = {
     "long.TextGrid": long_form(TIERS),
-    "short.TextGrid": '"ooTextFile"\n"TextGrid"\n0\n2\n<exists>\n1\n"IntervalTier"\n"words"\n0\n2\n1\n0\n2\n"hi you"\n',
-    "htk.lab": "0 1000000 sil\n1000000 2000000 p\n2000000 3500000 aa\n",
-    "states.lab": "0 1000000 x^sil-p+aa=t[2]\n1000000 2000000 x^sil-p+aa=t[3]\n2000000 3500000 p-aa+t[2] -61.2 baby\n",
-    "starts.lab": "0 sil\n1000000 p\n2000000 aa\n",
-    "audacity.txt": "0.0\t0.5\tp\n0.5\t1.25\taa\n\\\t100\t200\n",
     "words.txt": "Hello, you 42 people.\n",
     "grid.align": "0 23750 sil\n23750 29500 bin\n29500 34000 blue\n",
 }
-SAMPLED = {f"{number}.json": case["content"] for number, case in enumerate(LABEL_CASES.values())} | SPEAKERS
-LABELS_TEXTS |= {
-    name: sample if isinstance(sample, str) else json.dumps(sample, ensure_ascii=False)
-    for name, sample in SAMPLED.items()
-}
+for _number, _case in enumerate(LABEL_CASES.values()):
+    _content = _case["content"]
+    LABELS_TEXTS[f"{_number}.json"] = (
+        _content if isinstance(_content, str) else json.dumps(_content, ensure_ascii=False)
+    )
 SPLITS = {"train.txt": b"a\nb\n", "val.txt": b"c\n", "test.txt": b"d\n"}
 LENGTH_S = 4.0
 
