@@ -56,27 +56,6 @@ def test_words_beside_a_recording_are_kept(run, basics, here, toy_speech):
     assert run(*line, "--force") == run(*line) == (0, ["take.txt"], [])
 
 
-def test_a_folder(run, basics, here, toy_speech):
-    (here / "made").mkdir()
-    new, made = f"new/deep/{toy_speech.stem}.dat", f"made/{toy_speech.stem}.dat"
-    assert run(*basics, "-o", "new/deep/", "made", "a.json", "--format", "dat") == (0, [new, made, "a.json"], [])
-    assert (here / new).read_bytes() == (here / made).read_bytes()
-    assert run(*basics, "-o", "new/").out == [f"new/{toy_speech.stem}.tsv"]
-
-
-def test_folders_that_cannot_be(run, basics, here, toy_speech):
-    words = here / f"{toy_speech.stem}.tsv"
-    words.write_text("see bob papa mama")
-    for done, code, message in (
-        (run("cues", "-", "-o", "out/"), 3, "comes through a pipe has no name"),
-        (run(*basics, "-o", "out/", "--hold", "0"), 3, "hold is 0 frames"),
-        (run(*basics, "-o", f"{here}/", "--transcript", words), 7, "is the transcript"),
-    ):
-        check_refused(done, code, message)
-    assert list(here.iterdir()) == [words]
-    assert words.read_text() == "see bob papa mama"
-
-
 def test_values_that_rhubarb_does_not_take_either(run, basics, here):
     for words, answer in (
         (["--threads", "0"], "'0', required: 1 or more"),

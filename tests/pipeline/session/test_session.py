@@ -147,6 +147,8 @@ def test_a_phone_is_split_and_words_are_said_otherwise(session):
     assert {span.label.word for span in other} - {""} == {"mama"}
     assert other[0].start_s == 0
     assert other[-1].end_s == pytest.approx(last_s, abs=1e-3)
+    spelt = session.units(edited(f"say mama from 0 to {last_s:.3f} with mama b ow b"))
+    assert [span.label.phone for span in spelt if span.label.word] == ["b", "ow", "b"]
 
 
 def test_what_is_drawn_and_held_is_so_and_the_rest_joins_smoothly(session):

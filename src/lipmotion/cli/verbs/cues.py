@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lipmotion.cli.arguments.declared import add_options, add_output, check_paths, is_pipe, pick_part, read_pipe
-from lipmotion.cli.arguments.options import Version, place_outputs
+from lipmotion.cli.arguments.declared import add_options, add_output, is_pipe, pick_part, read_pipe
+from lipmotion.cli.arguments.options import Version
 from lipmotion.cli.terminal.printing import flush_output, print_line, print_lines
 from lipmotion.cli.terminal.progress import LEVELS, print_status_lines
 from lipmotion.errors import shorten
@@ -46,7 +46,7 @@ def _dialogue(path: str) -> str | None:
 
 
 def _find_words(recording: Path) -> list[Source]:
-    """Return the words beside a recording, which are read where its folder is; none where they are cues made of it."""
+    """Return the words beside a recording, which no output may replace; none where they are cues made of it."""
     beside = recording.parent / f"{recording.stem}.txt"
     if not is_file(beside):
         return []
@@ -68,11 +68,11 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     add_options(parser, Request)
     add = parser.add_argument
-    outputs: dict[str, Any] = {"nargs": "+", "action": "extend", "default": [], "type": str}
-    files = "FILE.tsv .xml .json .dat .pgo .spine.json, or several; FOLDER/"
+    outputs: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
+    files = "FILE.tsv .xml .json .dat .pgo .spine.json, or several"
     add_output(parser, "-o", "--output", force=True, help=files, **outputs)
     kinds = ("tsv", "xml", "json", "dat", "pgo", "spine.json")
-    text = "(default: that of the suffix; tsv on standard output and in a folder)"
+    text = "(default: that of the suffix; tsv on standard output)"
     add("-f", "--format", "--exportFormat", type=str.lower, choices=kinds, help=text)
     add("--fps", type=float, default=24.0, help="frames per second of the animation (default: 24)")
     add("--hold", type=int, metavar="FRAMES", help="minimum length of a shape (default: that of two frames at 24 fps)")
@@ -112,12 +112,10 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.outputs.cues import check_cue_options, check_cue_outputs, cues, write_cues
 
     piped = is_pipe(options.speech)
-    placed = place_outputs(options.speech, options.output, options.format or "tsv")
-    with print_status_lines(options) as set_progress, placed as options.output, read_pipe(options.speech) as speech:
+    with print_status_lines(options) as set_progress, read_pipe(options.speech) as speech:
         if [path.suffix.lower() in {"", ".txt"} for path in options.output] == [True]:
             options.format = options.format or "tsv"  # as Rhubarb writes whatever the name is
         check_apart(options.output, _find_words(Path(options.speech)), force=options.force)
-        check_paths(options)  # in a folder it may be a file that is read
         delivery, requested = pick_part(options, Delivery()), pick_part(options, Request(), recording=speech)
         check_cue_options(options.fps, options.hold, options.shapes)
         check_cue_outputs(options.output, speech, options.format)

@@ -26,7 +26,7 @@ from lipmotion.measures.closures import CLOSED_SHARE
 from lipmotion.motion.closure import OPENING, find_closable_ranges
 from lipmotion.motion.frame_labels import list_speech_intervals
 from lipmotion.motion.speaker_maps import SpeakerMap
-from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
+from lipmotion.pipeline.analysis.read_request import read_lexicon
 from lipmotion.pipeline.batch.ledger import (
     CUES,
     DONE,
@@ -170,14 +170,12 @@ def _write_line(work: LineWork) -> Generation:
     for kind in kinds:
         check_target(Path(work.place.out) / f"{line.name}.{kind}")
     (model, face, lexicon), speaker = _share(work.job, work.place.run), line.speaker or requested.speaker
-    request = replace(requested, recording=Path(line.recording), speaker=speaker, lexicon=lexicon)
-    request = read_request(request, words_beside=not line.transcript)
-    request = replace(request, transcript=line.transcript or request.transcript)
-    other = face.find_other_person(model, speaker) if requested.onto is None else None
-    if other is not None:
-        request = replace(request, onto=_map_onto(model, other, speaker))
-    job = replace(work.job.of(None, staged), request=request)
-    return run(job, face=face, model=model, is_typed=False)
+    known: dict[str, Any] = {"transcript": line.transcript or None, "speaker": speaker, "lexicon": lexicon}
+    if requested.onto is None and (other := face.find_other_person(model, speaker)) is not None:
+        known["onto"] = _map_onto(model, other, speaker)
+    job = work.job.of(Path(line.recording), staged)
+    job = replace(job, request=replace(job.request, **known))
+    return run(job, face=face, model=model, words_beside=True, is_typed=False)
 
 
 def _describe_motion(generation: Generation) -> Record:
