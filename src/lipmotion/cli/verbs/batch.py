@@ -22,8 +22,6 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_output(parser, "--out", is_folder=True, required=True, metavar="DIR", help="folder of the outputs")
     kinds = "what animate writes (json csv glb mp4 ...) and cues.tsv .xml .json .dat .pgo .spine.json (default: json)"
     add_options(parser, Outputs, "kinds", kinds={"help": kinds})
-    marked = "approved lines and those to be done again, as the report saves them (default: DIR/marks.csv)"
-    add_input(parser, "--marks", what="file of marks (no option needed there)", metavar="FILE.csv", help=marked)
     parser.add_argument("--jobs", type=int, metavar="N", help="number of processes (default: one per core)")
     parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler, as tcp://HOST:8786")
     add_options(parser, Request, "recogniser", "model", "lexicon", "language", "speaker", "pauses", "asymmetry")
@@ -49,8 +47,8 @@ def run(options: argparse.Namespace) -> None:
 
     with report_progress(options) as report:
         job = pick_part(options, options.start)
-        how = {"jobs": options.jobs, "cluster": options.cluster, "marks": options.marks}
-        done = batch(options.source, options.out, job, monitor=report.receive, **how)
+        how = {"jobs": options.jobs, "cluster": options.cluster, "monitor": report.receive}
+        done = batch(options.source, options.out, job, **how)
         if done.failed:
             raise InputError(f"{done.text}; the reasons are in {done.csv}; mend them and run the same command again")
         figures = {"done": done.done, "kept": done.kept, "report": [str(done.csv), str(done.html)]}
