@@ -1,7 +1,6 @@
 """Calls that programs make of Rhubarb Lip Sync, in their order and form, and what these programs read of the answer."""
 
 import json
-import logging
 import re
 import sys
 from collections.abc import Callable
@@ -66,17 +65,6 @@ def test_values_that_rhubarb_does_not_take_either(run, basics, here):
     assert list(here.iterdir()) == []
 
 
-@pytest.mark.long
-def test_transcript_and_edited_phones(run, basics, here):
-    said = run(*basics, "--transcript", "see bob papa mama")
-    run("animate", *basics[1:], "--transcript", "see bob papa mama", "-o", "a.json")
-    assert run(*basics, "--units", "a.json").out == said.out
-    document = json.loads((here / "a.json").read_text())
-    document["units"] = [unit | {"phone": "sil"} for unit in document["units"]]
-    (here / "b.json").write_text(json.dumps(document))
-    assert [line.split("\t")[1] for line in run(*basics, "--units", "b.json").out] == ["X", "X"]
-
-
 @pytest.mark.usefixtures("here")
 def test_status_lines(run, basics, toy_speech):
     done = run(*basics, "-f", "json", "--machine-readable")
@@ -95,17 +83,6 @@ def test_status_lines(run, basics, toy_speech):
     for event in progress:
         assert event["type"] == "progress"
         assert event["log"] == {"level": "Trace", "message": f"Progress: {event['value']:.0%}"}
-
-
-@pytest.mark.long
-@pytest.mark.usefixtures("here")
-def test_warnings_are_status_lines_too(run, basics):
-    handlers = list(logging.getLogger().handlers)
-    done = run(*basics, "--machine-readable", "--transcript", "see bimab papa mama")
-    (warning,) = [event["log"] for event in events(done) if event["type"] == "log"]
-    assert isinstance(warning, dict)
-    assert (warning["level"], "'bimab' is not in the dictionary" in warning["message"]) == ("Warning", True)
-    assert logging.getLogger().handlers == handlers
 
 
 @pytest.mark.long

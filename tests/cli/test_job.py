@@ -276,16 +276,6 @@ def test_controls_of_files(run, toy_model_file, toy_speech, here):
     assert np.diff([0, *changes, len(steps[0].values)]).min() >= 2
 
 
-@pytest.mark.usefixtures("here")
-def test_controls_of_cues(run, toy_model_file, toy_speech):
-    basics = ("cues", toy_speech, "--model", toy_model_file)
-    plain, late, long = run(*basics), run(*basics, "--offset-ms", "500"), run(*basics, "--min-hold-ms", "250")
-    times = [float(line.split("\t")[0]) for line in plain.out]
-    assert float(late.out[1].split("\t")[0]) == pytest.approx(times[1] + 0.5, abs=0.05)
-    assert len(long.out) < len(plain.out)
-    assert np.diff([float(line.split("\t")[0]) for line in long.out])[:-1].min() >= 0.24
-
-
 def test_a_folder(run, takes, toy_model_file, here):
     words = ["batch", takes, "--out", "out", "--to", "csv,cues.tsv", "--model", toy_model_file, "--jobs", "1"]
     words += ["--channels", "opening,width", "--rate", "25"]
