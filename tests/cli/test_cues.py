@@ -56,11 +56,7 @@ def test_words_beside_a_recording_are_kept(run, basics, here, toy_speech):
 
 
 def test_values_that_rhubarb_does_not_take_either(run, basics, here):
-    for words, answer in (
-        (["--threads", "0"], "'0', required: 1 or more"),
-        (["--consoleLevel", "loud"], "'loud'"),
-        (["-d", "missing"], "no such file: 'missing'"),
-    ):
+    for words, answer in ((["--consoleLevel", "loud"], "'loud'"), (["-d", "missing"], "no such file: 'missing'")):
         check_refused(run(*basics, *words), 2, answer)
     assert list(here.iterdir()) == []
 

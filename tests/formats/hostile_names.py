@@ -20,7 +20,7 @@ from lipmotion.cli.verbs import about
 from lipmotion.formats import annotations, label_files
 from lipmotion.formats.cues import write_cue_file
 from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
-from lipmotion.pipeline.batch.report import Mark, _field, _show_on_page
+from lipmotion.pipeline.batch.report import _field, _show_on_page
 from lipmotion.printable import is_line, printable
 from lipmotion.storage.files import as_text
 from lipmotion_faces.characters import gltf_document, gltf_writer, usd_writer
@@ -180,7 +180,7 @@ def _glb(folder: Path, name: str) -> None:
 
 def _report(_: Path, name: str) -> None:
     record = {"outputs": [name], "name": name, "recording": f"/{name}"}
-    page = _show_on_page(record, [name], Path("/"), Mark("redo", name))
+    page = _show_on_page(record, [name], Path("/"))
     assert "<" not in page
     assert "\n" not in page
     assert json.loads(page)[0] == printable(name)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import Field, fields, replace
 from pathlib import Path
-from typing import IO, Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from lipmotion.cli.terminal.printing import write_bytes
 from lipmotion.errors import InputError
@@ -145,8 +145,15 @@ def read_pipe(path: Path) -> Iterator[Path]:
         stored = folder / "standard-input"
         if str(path) == PIPE and sys.stdin is None:
             raise InputError("standard input is closed; required: a recording, as of 'ffmpeg ... -f wav -'")
-        with nullcontext(sys.stdin.buffer) if str(path) == PIPE else path.open("rb") as source:
-            _copy(source, stored)
+        size, opened = 0, nullcontext(sys.stdin.buffer) if str(path) == PIPE else path.open("rb")
+        with opened as source, stored.open("wb") as target:
+            while block := source.read(BLOCK):
+                size += target.write(block)
+                if size > LARGEST_RECORDING_BYTES:
+                    most = f"more than {LARGEST_RECORDING_BYTES} bytes"
+                    raise InputError(f"{most} come through the pipe; save the recording as a file first")
+        if not size:
+            raise InputError("nothing comes through the pipe; required: a recording, as of 'ffmpeg ... -f wav -'")
         yield stored
 
 
@@ -166,18 +173,6 @@ def write_pipe(options: argparse.Namespace) -> Iterator[tuple[tuple[str, ...], b
         motion = folder / f"motion.{options.format}"
         yield tuple(str(motion) if output == PIPE else output for output in outputs), True
         write_bytes(motion)
-
-
-def _copy(source: IO[bytes], target: Path) -> None:
-    size = 0
-    with target.open("wb") as file:
-        while block := source.read(BLOCK):
-            size += file.write(block)
-            if size > LARGEST_RECORDING_BYTES:
-                most = f"more than {LARGEST_RECORDING_BYTES} bytes"
-                raise InputError(f"{most} come through the pipe; save the recording as a file first")
-    if not size:
-        raise InputError("nothing comes through the pipe; required: a recording, as of 'ffmpeg ... -f wav -'")
 
 
 PartT = TypeVar("PartT", bound=Configuration)

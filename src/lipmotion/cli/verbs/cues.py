@@ -17,7 +17,6 @@ from lipmotion.pipeline.request import Request
 from lipmotion.storage.files import as_text
 from lipmotion.storage.sources import Source, check_apart, is_file
 from lipmotion.types.delivery import Delivery
-from lipmotion.types.values import parse_whole
 
 RECOGNISERS = {"pocketsphinx": "auto", "phonetic": "fast"}
 """The recogniser that takes the place of each of Rhubarb's."""
@@ -52,13 +51,6 @@ def _find_words(recording: Path) -> list[Source]:
         return []
     with beside.open("rb") as file:
         return [] if SHEET.match(file.read(64)) else [Source(beside, "transcript", replaceable=True)]
-
-
-def _threads(text: str) -> int:
-    """Return a number of threads. Raises ArgumentTypeError: it is none, or under 1."""
-    if (count := parse_whole(text)) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r}, required: 1 or more")
-    return count
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -96,7 +88,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     level: dict[str, Any] = {"type": str.lower, "choices": tuple(LEVELS), "metavar": "LEVEL"}
     add("--logLevel", dest="log_level", default="debug", help=f"of --logFile, from: {', '.join(LEVELS)}", **level)
     add("--consoleLevel", dest="console_level", default="warning", help="of messages on standard error", **level)
-    add("--threads", metavar="N", type=_threads, help="without effect: one recording needs one")
+    add("--threads", metavar="N", type=int, help="without effect: one recording needs one")
     add("-q", "--quiet", action="store_true", help="without effect: warnings and errors alone are printed")
     add("-v", "--version", action=Version, nargs=0, const=VERSION, help="print the version")
     parser.set_defaults(run=run, letters=False)

@@ -77,14 +77,11 @@ SILENCE_S = 0.5
 
 @dataclass(frozen=True)
 class LineWork:
-    """What a worker needs to know of a line.
-
-    of_settings : from ``fingerprint_job``
-    """
+    """What a worker needs to know of a line."""
 
     line: BatchLine
     job: Job
-    of_settings: str
+    of_settings: str  # from ``fingerprint_job``
     place: Place
 
     def record(self, outcome: str) -> Record:
