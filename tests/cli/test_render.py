@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cli.conftest import RunCommand, check_refused, is_one_error
-from lipmotion import animate, load_model, read_motion, write
+from lipmotion import read_motion
 from meshes.heads import head, lip_points, write_glb, write_obj
 
 
@@ -96,15 +96,6 @@ def test_articulation_in_motion_files(run, basics, here):
     assert run(*basics, "-o", "b.csv", "--articulation").code == 0
     header = (here / "b.csv").read_text().splitlines()[0].split(",")
     assert header[-6:] == ["tongue", "lip_tuck", "protrusion", "spread", "lip_press", "teeth"]
-
-
-@pytest.mark.long
-def test_it_is_the_function_of_the_same_name(run, basics, here, toy_speech, toy_model_file, toy_corpus):
-    assert run(*basics, "-o", "one.npz", "--onto", toy_corpus.path) == (0, ["one.npz"], [])
-    run(*basics, "-o", "command.json")
-    model = load_model(toy_model_file)
-    write(animate(toy_speech, model=model), ["function.json"], speech=toy_speech, model=model)
-    assert (here / "command.json").read_bytes() == (here / "function.json").read_bytes()
 
 
 @pytest.mark.usefixtures("here")

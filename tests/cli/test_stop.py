@@ -151,14 +151,6 @@ def test_whenever_the_signal_comes(name, lines, here):
     assert codes == {code, 130, 143}
 
 
-def test_a_late_signal_does_not_change_what_is_done(toy_model_file, here):
-    for number, step in ((signal.SIGINT, signalled.RETURN_MARK), (signal.SIGTERM, signalled.CLEARANCE_MARK)):
-        done = signalled_at(step, number, ["info", toy_model_file])
-        assert (done.returncode, done.stderr) == (0, "")
-        assert done.stdout.startswith("file ")
-    assert list(here.iterdir()) == []
-
-
 @pytest.fixture
 def stopper() -> Iterator[Stopper]:
     stopper = Stopper()

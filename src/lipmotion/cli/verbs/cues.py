@@ -103,7 +103,6 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.model import load_model
     from lipmotion.pipeline.outputs.cues import check_cue_options, check_cue_outputs, cues, write_cues
 
-    piped = is_pipe(options.speech)
     with print_status_lines(options) as set_progress, read_pipe(options.speech) as speech:
         if [path.suffix.lower() in {"", ".txt"} for path in options.output] == [True]:
             options.format = options.format or "tsv"  # as Rhubarb writes whatever the name is
@@ -115,12 +114,11 @@ def run(options: argparse.Namespace) -> None:
         request, model = read_request(requested), load_model(requested.model)
         set_progress(0.1)
         edits = edit_file(requested.edits)
-        result = animate(request, model=model, edits=edits)
-        delivery = edits.edits.delivery(delivery)
+        result, delivery = animate(request, model=model, edits=edits), edits.edits.delivery(delivery)
         set_progress(0.9)
         sheet = cues(result, fps=options.fps, hold_frames=options.hold, shapes=options.shapes, delivery=delivery)
         sheet = replace(sheet, blair=options.blair or not options.letters)
-        speech_path = "" if piped else speech
+        speech_path = "" if is_pipe(options.speech) else speech
         write_cues(sheet, options.output, speech=speech_path, form=options.format)
         set_progress(1.0)
         for path in options.output:

@@ -54,18 +54,8 @@ from lipmotion.pipeline.workers import ItemT, Pool, ResultT, WorkerDiedError, cl
 from lipmotion.storage.files import check_target, confine, make_folder, put_in_place, remove
 from lipmotion.storage.locks import open_temporary
 from lipmotion.storage.sources import Source, check_apart, hash_file
-from lipmotion.types import (
-    SPEECH_RATE_HZ,
-    Audio,
-    Generation,
-    Item,
-    Monitor,
-    Progress,
-    Span,
-    Timeline,
-    Unit,
-    silent_monitor,
-)
+from lipmotion.types import SPEECH_RATE_HZ, Audio, Generation, Span, Timeline, Unit
+from lipmotion.types.progress import Item, Monitor, Progress, silent_monitor
 from lipmotion.units import Lexicon
 from lipmotion.units.phone_timelines import group_words
 
