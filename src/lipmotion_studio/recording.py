@@ -144,7 +144,7 @@ class OpenRecording:
         for step in map(parse_step, map(str, steps)):
             if isinstance(step, WordStep):
                 text = step.word if isinstance(step, WordIs | WordSaid) else step.words
-                unknown = [word for word in split_words(text) if word not in step.pronunciations]
+                unknown = [word for word in split_words(text) if word not in step.lexicon_entries]
                 guessed |= guess_pronunciations(unknown, lexicon)
         rows = [{"word": word, "phones": list(phones)} for word, phones in guessed.items()]
         return changed | {"guessed": rows}

@@ -10,7 +10,7 @@ import pytest
 
 from lipmotion import Model, Request, animate, load_model
 from lipmotion.engines import Engine, Inputs
-from lipmotion.errors import ExportError, InputError
+from lipmotion.errors import InputError
 from lipmotion.pipeline.analysis import language
 from lipmotion.pipeline.analysis.read_request import read_request, read_text_or_file
 from lipmotion.pipeline.analysis.speech_analysis import analyse, analyse_speech, build_speech, recognise_speech
@@ -22,7 +22,6 @@ from lipmotion.pipeline.generation import (
     WHOLE_TRANSCRIPT,
     predict_outlook,
 )
-from lipmotion.pipeline.job import is_for_several, list_recordings, plan_outputs
 from lipmotion.pipeline.request import as_request
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.recognition.agreement import TranscriptFit
@@ -67,34 +66,6 @@ def test_a_name_in_a_folder_that_exists_is_no_text(here):
     assert read_text_or_file("either/or") == "either/or"
     assert read_text_or_file("subs/ nofile") == "subs/ nofile"
     assert read_text_or_file("x" * 5000 + "/a") == "x" * 5000 + "/a"
-
-
-def test_files_stay_in_order_and_folders_are_listed(tmp_path):
-    for name in ("b.wav", "a.MP4", "notes.txt"):
-        (tmp_path / name).touch()
-    assert list_recordings([Path("z.wav"), tmp_path]) == [Path("z.wav"), tmp_path / "a.MP4", tmp_path / "b.wav"]
-    (tmp_path / "empty").mkdir()
-    with pytest.raises(InputError, match="no sounds and no videos in it"):
-        list_recordings([tmp_path / "empty"])
-
-
-def test_folders_and_templates_and_outputs_that_would_be_written_twice(tmp_path):
-    planned = plan_outputs([Path("in/a.wav"), Path("b.c.flac")], ["out/", "x/{name}-take.mp4"], ["json", "csv"])
-    assert planned == [["out/a.json", "out/a.csv", "x/a-take.mp4"], ["out/b.c.json", "out/b.c.csv", "x/b.c-take.mp4"]]
-    assert is_for_several(str(tmp_path))
-    assert not is_for_several("a.json")
-    with pytest.raises(ExportError, match=r"o/a\.json: would be written for x/a\.wav and for y/a\.wav"):
-        plan_outputs([Path("x/a.wav"), Path("y/a.wav")], ["o/"], ["json"])
-    with pytest.raises(ExportError, match=r"a\.json: is one file, and there are 2 recordings"):
-        plan_outputs([Path("a.wav"), Path("b.wav")], ["a.json"], ["json"])
-
-
-@pytest.mark.parametrize("output", ["out/", "{name}.json", "out/{name}/a.json"])
-def test_a_recording_that_is_called_as_a_device_names_no_output(output):
-    for name in ("CON.wav", "nul .flac"):
-        with pytest.raises(ExportError, match="Windows"):
-            plan_outputs([Path(name)], [output], ["json"])
-    assert plan_outputs([Path("CON.wav")], ["../a.json"], ["json"]) == [["../a.json"]]
 
 
 SILENCE = Audio(np.zeros(16_000, np.float32), 16_000)

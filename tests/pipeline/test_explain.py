@@ -101,13 +101,3 @@ def test_runs_are_the_trace_of_what_animate_makes(name, toy_sentence, request):
     assert all(a.state != b.state for a, b in pairwise(runs))
     states = [run.state for run in runs for _ in range(round(100 * (run.end_s - run.start_s)))]
     assert states == [trace.states[frame] for frame in trace.frames]
-
-
-def test_text_is_bounded():
-    runs = [explain.StateRun(n / 100, (n + 1) / 100, "p", "papa", "s" * 500) for n in range(10)]
-    lines = list(explain.run_lines(runs, 4))
-    assert len(lines) == 6
-    assert lines[1].split()[:4] == ["0.00", "0.01", "p", "papa"]
-    assert max(map(len, lines)) < 160
-    assert lines[5] == "and 6 more (--count N prints N, --json all)"
-    assert len(list(explain.run_lines(runs, 10))) == 11

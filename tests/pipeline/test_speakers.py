@@ -253,17 +253,3 @@ def test_a_map_is_kept_in_a_model(toy_model, toy_sentence, ben, tmp_path):
     for name in ("ben", ""):
         with pytest.raises(InputError, match="required another name than: , ben, cleo"):
             with_person(known, name, person)
-
-
-def test_corpora_that_are_refused(toy_model, toy_sentence, tmp_path):
-    channels = tuple(Channel(name, "weight") for name in ("jaw", "width", "outer"))
-    tracks = {"weights": [captured(each, channels) for each in toy_utterances(3)], "empty": []}
-    unseen = [replace(each.track, seen=np.zeros_like(each.track.seen)) for each in toy_utterances(3)]
-    tracks["unseen"] = [replace(each, track=track) for each, track in zip(toy_utterances(3), unseen, strict=True)]
-    for name, message in (
-        ("weights", r"weights: its motion has no channel 'opening'.*3 of 3 are missing"),
-        ("unseen", r"unseen: 0\.00 s of speech with a measured face, required 0\.5 s or more"),
-        ("empty", "the corpus is empty"),
-    ):
-        with pytest.raises(InputError, match=message):
-            animate(request(toy_sentence, onto=corpus_of(tmp_path / name, tracks[name])), model=toy_model)

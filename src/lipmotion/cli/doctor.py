@@ -195,9 +195,8 @@ def _face_tracking() -> str:
         raise _AbsentError(str(error)) from error
     found = f"OpenCV {opencv}, MediaPipe {metadata.version('mediapipe')}"
     declared = _find_installed(OPENCV)
-    return (
-        found if declared.startswith(opencv) else f"{found}; {OPENCV} is {declared or 'not installed'}: {OPENCV_HINT}"
-    )
+    is_own = declared.startswith(opencv)
+    return found if is_own else f"{found}; {OPENCV} is {declared or 'not installed'}: {OPENCV_HINT}"
 
 
 def _model() -> str:

@@ -27,8 +27,6 @@ SUFFIX = ".json"
 DIGEST = "recording_sha256"
 HELD = ("recording", "model", "lexicon", "language", "recogniser", "speaker", "pauses", "asymmetry")
 """What of a request such a file holds; words and phones that were given are in the phones in time."""
-
-
 _SHARE, _TEXT = number(0, 1), text(1000)
 _OF_OUTLOOK = {"words": _TEXT, "confidence": _SHARE, "range_db": number(), "advice": as_tuple(items(_TEXT))}
 _OUTLOOK = optional(value_of(partial(Outlook, voice=None), _OF_OUTLOOK | {"voice": _SHARE}, _OF_OUTLOOK))

@@ -58,7 +58,7 @@ class Step:
         return {}
 
     @property
-    def pronunciations(self) -> dict[str, tuple[Pronunciation, ...]]:
+    def lexicon_entries(self) -> dict[str, tuple[Pronunciation, ...]]:
         """The same as a lexicon holds it."""
         return {word: (phones,) for text, phones in self.said.items() for word in split_words(text)}
 

@@ -301,7 +301,7 @@ class Outputs(Configuration):
         ("json",),
         flags=("--to",),
         metavar="KIND,KIND",
-        help="what is written into an output folder, as json,mp4 (default: json)",
+        help="what is written of each recording, as json,mp4 (default: json)",
     )
 
     @property

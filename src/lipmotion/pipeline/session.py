@@ -154,7 +154,7 @@ class Session:
         audio: AnalysedAudio | None = None,
     ) -> None:
         self.request: Request = resolve_language(read_request(as_request(speech), is_typed=False))
-        self.model = model if isinstance(model, Model) else load_model(model or self.request.model)
+        self.model = load_model(model or self.request.model)
         request = self.request
 
         def prepare() -> None:  # not of this object, which would keep itself until the garbage is collected
@@ -272,7 +272,7 @@ class Session:
             there = words[step.number - 1]
             start_s, end_s, text = there.start_s, there.end_s, Text(step.word)
             where = f"{start_s:.2f} to {end_s:.2f} s, where {there.label!r} was"
-        pronunciations = step.pronunciations
+        pronunciations = step.lexicon_entries
 
         def align() -> list[Span[Unit]]:
             request = self.request

@@ -60,7 +60,7 @@ def animate(  # noqa: PLR0913
     if not isinstance(constraints, Constraints | None):
         raise InputError(f"the constraints are a {type(constraints).__name__}, required Constraints((Pin(...),))")
     request = as_request(speech, transcript, language)
-    model = model if isinstance(model, Model) else load_model(model or request.model)
+    model = load_model(model or request.model)
     edits = request.edits if edits is None else edits
     how: dict[str, Any] = {"workers": workers, "monitor": monitor, "background": background, "curves": curves}
     if edits is None or isinstance(edits, Edits):
