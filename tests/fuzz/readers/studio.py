@@ -24,7 +24,7 @@ from lipmotion import Edits, Job, LiveFrame, Request, Stream
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.pipeline.batch import BatchLine, read_lines
 from lipmotion.pipeline.batch.ledger import LEDGER, Place, open_ledger, write_receipt
-from lipmotion.pipeline.batch.report import write_reports
+from lipmotion.pipeline.batch.report import MARKS, read_marks, write_marks, write_reports
 from lipmotion.pipeline.edit_files import EditFile, read_edits, write_edits
 from lipmotion.pipeline.job import check_outputs, open_face
 from lipmotion.storage.archive import take_array
@@ -67,16 +67,22 @@ def seed_lines(_: Good) -> list[Files]:
     rows = [ROW, ROW | FAILED, ROW, ROW | {"name": "two", "outputs": {"two.json": "0c"}}]
     whole = "".join(json.dumps(row) + "\n" for row in rows).encode()
     lists = [{name: text.encode()} for name, text in TEXTS.items()]
+    lists.append({"list.txt": b"one.wav\n", MARKS: b"name,mark,when\none,redo,12:30\n'=two,approve,\n"})
     return [*lists, *({"list.txt": b"one.wav\ntwo.wav\n", LEDGER: ledger} for ledger in (whole, whole[:700]))]
 
 
 def check_lines(folder: Path, _: Good) -> None:
     """Read a list; every output has a name of its own inside the folder of the outputs. Go on from a ledger."""
-    ledger, listed = folder / LEDGER, [path for path in folder.iterdir() if path.name != LEDGER]
+    ledger, listed = folder / LEDGER, [path for path in folder.iterdir() if path.name not in (LEDGER, MARKS)]
     lines = read_lines(listed[0], KINDS) if listed else [BatchLine("one", "/sounds/one.wav")]
     names = [line.name.casefold() for line in lines]
     require(len(set(names)) == len(names), "two lines with one name")
     require(not any(name.startswith("/") or ".." in name.split("/") for name in names), "an output outside its folder")
+    if (folder / MARKS).is_file():
+        marks = read_marks(folder / MARKS)
+        with TemporaryDirectory() as out:
+            write_marks(Path(out) / MARKS, marks)
+            require(read_marks(Path(out) / MARKS) == marks, "marks that are not read as they were written")
     if ledger.is_file():
         with TemporaryDirectory() as out:
             shutil.copy(ledger, Path(out) / LEDGER)

@@ -25,6 +25,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--check", action="store_true", help=checked)
     kinds = "what animate writes (json csv glb mp4 ...) and cues.tsv .xml .json .dat .pgo .spine.json (default: json)"
     add_options(parser, Outputs, "kinds", kinds={"help": kinds})
+    marked = "approved lines and those to be done again, as the report saves them (default: DIR/marks.csv)"
+    add_input(parser, "--marks", what="file of marks (no option needed there)", metavar="FILE.csv", help=marked)
     parser.add_argument("--jobs", type=int, metavar="N", help="number of processes (default: one per core)")
     parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler, as tcp://HOST:8786")
     add_options(parser, Request, "recogniser", "model", "lexicon", "language", "speaker", "pauses", "asymmetry")
