@@ -192,13 +192,6 @@ def keys(lines: list[str]) -> list[str]:
     return re.findall(r"^@\w+\{(\w+),$", "\n".join(lines), flags=re.MULTILINE)
 
 
-def test_its_trees_can_be_printed(run, toy_model_file):
-    done = run("info", toy_model_file, "--structure")
-    assert (done.code, done.err) == (0, [])
-    assert done.out[0] == "speech.0"
-    assert sum("leaf (" in line for line in done.out) >= 18
-
-
 def test_the_shipped_model_is_cited_by_default(run, coupled_model_file):
     done = run("cite")
     assert (done.code, done.err) == (0, [])
