@@ -219,10 +219,7 @@ def _decode_documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
 
 
 def _parse_number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
-    """Return a time, NaN where it is missing, and how many such are a second where its form says that, else ``per_s``.
-
-    Times are numbers, texts (``"1.5"``, ``"1.500s"``, ``"PT1.5S"``, ``"00:00:01,500"``), or seconds with nanos.
-    """
+    """Return a time, NaN: it is missing, and how many such are a second, where its form says that, else ``per_s``."""
     if isinstance(value, dict) and value.keys() <= {"seconds", "nanos"}:  # 0 is left out
         seconds, nanos = (_parse_number(value.get(name, 0), where)[0] for name in ("seconds", "nanos"))
         return seconds + nanos / 1e9, 1
@@ -310,12 +307,7 @@ def _find_text(value: Any) -> str | None:
 def _collect_rows(
     value: Any, found: Found, where: str, place: str = "", path: Path = ("",), owner: Row | None = None, who: str = ""
 ) -> None:
-    """Add the items with a text in a value and in all its members to those of the same lists.
-
-    path       : the names of the members that lead to the value
-    owner, who : the line that it is in, and who speaks there
-    Of alternatives it is the first one; what is no speech, or not yet sure, is passed over, with all that is in it.
-    """
+    """Add the items with a text in a value, and in all its members, to those of the same lists; of alternatives one."""
     name = path[-1]
     if isinstance(value, list):
         for number, each in enumerate(value[:1] if name in ALTERNATIVES else value, 1):
@@ -328,7 +320,8 @@ def _collect_rows(
     if not isinstance(value, dict) or len(path) > DEEPEST or not _is_said(value):
         return
     value = _list_items(value, ": ".join(filter(None, (where, f"{place}, {name}".strip(", ")))))
-    who = _find_speaker(value) or who
+    names = (str(value[name]) for name in SPEAKERS if isinstance(value.get(name), str | int))
+    who = next(filter(None, names), who)
     row = _read_row(value, place, where, name, owner, who)
     if name == "words" and row is None:
         raise InputError(f"{where}: {place}: no text; required a member 'word'")
@@ -411,10 +404,7 @@ def _add_row(rows: list[Row], row: Row, item: dict[str, Any], where: str) -> Non
 
 
 def _choose_rows(found: Found, *, phones: bool) -> list[Row]:
-    """Return the words, or else the lines, or the phones, of the lists that are known best; words within their lines.
-
-    Services say the same in several lists: the first ones count.
-    """
+    """Return the words, or else the lines, or the phones, of the lists that are known best; words in their lines."""
 
     def rank(path: Path) -> tuple[bool, int]:
         has_words = any(row.role == WORDS for row in kept[path])
@@ -439,11 +429,6 @@ def _name_stamp(item: Any) -> tuple[str, ...]:
     if not isinstance(item, list) or len(item) != 3 or not (isinstance(item[0], str) or isinstance(item[2], str)):
         return ()
     return ("text", "start", "end") if isinstance(item[0], str) else ("start", "end", "text")
-
-
-def _find_speaker(item: dict[str, Any]) -> str:
-    names = (item[name] for name in SPEAKERS if isinstance(item.get(name), str | int))
-    return next((str(name) for name in names if name != ""), "")
 
 
 def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:

@@ -111,10 +111,7 @@ def _lines(text: str) -> Lines:
 
 
 def _read_form(lines: Lines, form: re.Pattern[str], where: str, role: str = "") -> list[LabelTier]:
-    """Return the labels of lines of one form, as their times stand; a tier in order for each channel or speaker.
-
-    Raises InputError: a line is of another form, or there are too many.
-    """
+    """Return the labels of lines of one form, as their times stand; a tier in order for each channel or speaker."""
     check_count(len(lines), where)
     by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
     recording = ""

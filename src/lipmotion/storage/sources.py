@@ -218,10 +218,7 @@ _NO_MISTAKE = {
 
 @cache
 def _read_kinds() -> list[tuple[str, str, int, bytes]]:
-    """Return group and name of each kind of file, and what is in it at a byte (``file_kinds.csv``).
-
-    -1: anywhere at the end, -2: anywhere at the beginning. What is packed with gzip is unpacked.
-    """
+    """Return group and name of each kind of file, and its mark at a byte; -1: anywhere in the tail, -2: in the head."""
     lines = resources.files(__package__).joinpath("file_kinds.csv").read_text(encoding="ascii").splitlines()
     rows = csv.reader(lines[1:])
     marks = ((group, name, int(at), mark.encode().decode("unicode_escape")) for group, name, at, mark in rows)

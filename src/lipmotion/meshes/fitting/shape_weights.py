@@ -146,8 +146,11 @@ class CurveCosts:
     smooth: float = 1e-1
 
 
+USUAL_COSTS = CurveCosts()
+
+
 def solve_shape_weights(
-    motion: Motion, units: Timeline[Unit], shapes: FaceShapes, costs: CurveCosts | None = None
+    motion: Motion, units: Timeline[Unit], shapes: FaceShapes, costs: CurveCosts = USUAL_COSTS
 ) -> Motion:
     """Return the weights of blendshapes over time: one channel a blendshape, by the mesh's names, 0 to 1.
 
@@ -159,7 +162,6 @@ def solve_shape_weights(
     weights.
     Raises InputError: as ``move_points``.
     """
-    costs = costs or CurveCosts()
     points = move_points(motion, units)
     mouth, channels = points.mouth, tuple(Channel(name, WEIGHT) for name in shapes.names)
     own_weights, mood = find_own_weights(motion, shapes), weigh_moods(mouth, shapes)
@@ -190,7 +192,7 @@ def solve_shape_weights(
 def fit_bounded_curves(
     matrix: Array,
     targets: Array,
-    costs: CurveCosts | None = None,
+    costs: CurveCosts = USUAL_COSTS,
     ties: Array | None = None,
     limits: Limits = (0.0, 1.0),
     initial: Array | None = None,
@@ -211,7 +213,6 @@ def fit_bounded_curves(
     Source: Beck & Teboulle 2009 (FISTA), with the restart of O'Donoghue & Candès 2015 and a diagonal preconditioner.
     Cost: O(T·S²) a step; some hundred steps.
     """
-    costs = costs or CurveCosts()
     if matrix.ndim != 2 or targets.ndim != 2 or matrix.shape[1] != targets.shape[1]:
         raise InputError(f"shapes {matrix.shape} and targets {targets.shape} do not fit, required (S, D) and (T, D)")
     if not (np.isfinite(matrix).all() and np.isfinite(targets).all()):
