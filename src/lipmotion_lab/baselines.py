@@ -77,7 +77,8 @@ class Baseline(Animator[FrameRegressionModel]):
         constraints: Constraints | None = None,  # noqa: ARG002 - compared, never edited
     ) -> Generation:
         predicted = self.predict(model.learned, speech)
-        values, variance = model.space.restore(predicted, np.broadcast_to(model.variance, predicted.shape))
+        values = model.space.restore(predicted)
+        variance = np.broadcast_to(model.variance, predicted.shape) @ model.space.mixing
         motion = Motion(values, FRAME_RATE_HZ, model.space.channels)
         return Generation(motion, variance, speech.units, StateTrace(("all",), np.zeros(len(values), np.intp)))
 

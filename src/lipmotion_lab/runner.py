@@ -164,7 +164,7 @@ def shuffle(items: Sequence[ItemT], seed: int) -> tuple[ItemT, ...]:
 
 def take_quick_part(corpus: Corpus, seed: int) -> Corpus:
     """Return a corpus with a few utterances of each list: those of every quick run with this seed."""
-    return corpus.part([name for split in SPLITS for name in shuffle(corpus.names(split), seed)[: QUICK_CLIPS[split]]])
+    return corpus.divided({split: shuffle(corpus.names(split), seed)[: QUICK_CLIPS[split]] for split in SPLITS})
 
 
 @dataclass(frozen=True)

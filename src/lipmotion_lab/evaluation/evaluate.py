@@ -190,7 +190,7 @@ def evaluate(
         figures["seen_in_training"] = True
     if model.speakers is not None:  # the others are compared with the mean person
         speakers = {utterance.speaker for utterance in recordings.utterances}
-        figures["strangers"] = sorted(speakers - set(model.speakers.names))
+        figures["strangers"] = sorted(speakers - set(model.speakers))
     return replace_nan(figures)
 
 
