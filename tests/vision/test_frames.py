@@ -1,6 +1,8 @@
+from collections.abc import Iterator
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import av
 import numpy as np
@@ -8,6 +10,7 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.types import Audio
+from lipmotion_faces.tracking import frames
 from lipmotion_faces.tracking.frames import (
     VideoFrame,
     VideoSpan,
@@ -61,6 +64,31 @@ def test_a_span_holds_the_frames_of_its_time(tmp_path, name):
             assert video.stated_s == pytest.approx(min(span.end_s - span.start_s, stated_s - span.start_s))
             assert video.damage == []
         np.testing.assert_allclose(found, expected, atol=1e-4)
+
+
+class LateContainer:
+    """A container of ten pictures, one a second, in which seeking ends three pictures too late, unless at the start."""
+
+    start_time = 0
+
+    def __init__(self) -> None:
+        self.at = 0
+
+    def seek(self, ticks: int, *, stream: object) -> None:
+        del stream
+        self.at = 0 if ticks <= 0 else ticks + 3
+
+    def demux(self, _stream: object) -> Iterator[SimpleNamespace]:
+        for n in range(self.at, 10):
+            picture = SimpleNamespace(time=float(n), is_corrupt=n == 1)
+            yield SimpleNamespace(decode=lambda shown=picture: [shown])
+
+
+def test_where_seeking_ends_too_late_all_is_decoded():
+    damage: list[str] = []
+    found = frames._decode_pictures_from(LateContainer(), SimpleNamespace(time_base=Fraction(1)), 5.0, damage)
+    assert [picture.time for picture in found] == [5, 6, 7, 8, 9]
+    assert damage == []  # what is damaged before the span is none of its business
 
 
 def test_a_quick_look_is_small_a_span_behind_the_end_empty_and_pixels_square(write_video):

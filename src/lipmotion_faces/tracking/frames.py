@@ -122,7 +122,7 @@ def _decode_frames(
     pixel_shape = float(stream.sample_aspect_ratio or 1)
     last_s = float("-inf")
     for picture in _decode_pictures_from(container, stream, start_s + span.start_s - ROUNDING_S, damage):
-        if picture.time is None or max(picture.time - start_s, span.start_s) <= last_s:
+        if picture.time is None or picture.time - start_s <= last_s:
             continue  # it has no time, or one that another picture has
         last_s = max(picture.time - start_s, span.start_s)
         if last_s >= span.end_s - ROUNDING_S:
@@ -148,13 +148,12 @@ def _decode_pictures_from(container: Any, stream: Any, first_s: float, damage: l
     if first_s <= start_s:
         yield from _decode_pictures(container, stream, damage)
         return
-    container.seek(int(max(first_s - SEEK_MARGIN_S, start_s) / stream.time_base), stream=stream)
-    pictures = _decode_pictures(container, stream, damage)
-    picture = next(pictures, None)
-    if picture is None or picture.time is None or picture.time > first_s:
-        container.seek(int(start_s / stream.time_base), stream=stream)
+    for from_s in (max(first_s - SEEK_MARGIN_S, start_s), start_s):  # where seeking ends too late, from the beginning
+        container.seek(int(from_s / stream.time_base), stream=stream)
         pictures = _decode_pictures(container, stream, damage)
         picture = next(pictures, None)
+        if picture is not None and picture.time is not None and picture.time <= first_s:
+            break
     while picture is not None and (picture.time is None or picture.time < first_s):
         picture = next(pictures, None)
     damage.clear()

@@ -95,7 +95,7 @@ def check_video(folder: Path, _: Good) -> None:
             height, width, colours = frame.image.shape
             require(colours == 3 and min(height, width) > 0, "a picture of another shape")
             require(height * width <= MAX_PIXELS, "a picture that is too large")
-            require(math.isfinite(frame.time_s), "a picture without a time")
+            require(0 <= frame.time_s < math.inf, "a picture without a time, or before the beginning")
             times_s.append(frame.time_s)
         rate_hz = find_nominal_rate(np.array(times_s), video.stated_rates_hz)
     require(bool((np.diff(times_s) > 0).all()), "times that do not rise")
