@@ -147,6 +147,7 @@ def weigh_edits(time_s: Curve, edits: Sequence[CurveEdit]) -> Curve:
 class MotionStretch(NamedTuple):
     """Motion of N frames at 100 Hz that takes the place of other motion."""
 
+    names: tuple[str, ...]  # of its P channels
     frames: slice
     share: Curve  # how far it takes its place, 0 to 1 [shape=(N, 1)]
     values: NDArray[np.floating[Any]]  # of all P channels [shape=(N, P)]
@@ -162,14 +163,22 @@ def _cut_stretch(generation: Generation, weight: Curve) -> MotionStretch:
     """Return the motion where a weight [shape=(T,)] is not 0, which is in one span."""
     inside = np.flatnonzero(weight)
     frames = slice(inside[0], inside[-1] + 1) if len(inside) else slice(0)
-    return MotionStretch(frames, weight[frames, None], generation.motion.values[frames], generation.variance_of(frames))
+    motion = generation.motion
+    return MotionStretch(
+        motion.names, frames, weight[frames, None], motion.values[frames], generation.variance_of(frames)
+    )
 
 
 def apply_stretch(first: Generation, other: MotionStretch) -> Generation:
-    """Return a generation, and its variances, that goes over to other motion as far as that takes its place."""
+    """Return a generation, and its variances, that goes over to other motion as far as that takes its place.
+
+    It has all channels of the other motion; what it has beside them stays.
+    """
     values, variance = first.motion.values.astype(np.float64), np.array(first.variance)
+    columns = [first.motion.column(name) for name in other.names]
     for ours, theirs in ((values[other.frames], other.values), (variance[other.frames], other.variance)):
-        ours[:] = np.where(other.share == 1, theirs, ours + other.share * (theirs - ours))
+        here = ours[:, columns]
+        ours[:, columns] = np.where(other.share == 1, theirs, here + other.share * (theirs - here))
     return replace(first, motion=replace(first.motion, values=values), spread=variance)
 
 

@@ -317,7 +317,9 @@ class Session:
             for later in steps[place + 1 :]:
                 if lock.holds(later):
                     raise InputError(f"{str(later)!r} lies in what is locked ({str(lock)!r}); take the lock out first")
-            generation = apply_stretch(generation, self._locked(steps[:place], lock, generation.motion.names))
+            stretch = self._locked(steps[:place], lock)  # also with channels of edits that were taken back since
+            generation = generation.with_motion(with_gestures(generation.motion, generation.units, stretch.names))
+            generation = apply_stretch(generation, stretch)
             earlier = [edit for step in steps[:place] if isinstance(step, CurveStep) for edit in step.parts]
             before = tuple(edit for edit in generation.curve_edits if edit in earlier)
             if len(before) < len(generation.curve_edits):
@@ -325,17 +327,17 @@ class Session:
                 generation = replace(generation, curve_edits=(*generation.curve_edits, locked))
         return generation
 
-    def _locked(self, before: tuple[Step, ...], lock: LockStep, names: tuple[str, ...]) -> MotionStretch:
-        """Return what a lock keeps: the motion after the edits before it, with the channels of these names."""
+    def _locked(self, before: tuple[Step, ...], lock: LockStep) -> MotionStretch:
+        """Return what a lock keeps: the motion after the edits before it."""
         from lipmotion.articulation.curve_edits import cut_locked_stretch
-        from lipmotion.articulation.phone_targets import with_gestures
+        from lipmotion.articulation.phone_targets import SAID, with_gestures
 
         def cut() -> MotionStretch:
             generation = self._after(before)
-            motion = with_gestures(generation.motion, generation.units, names)
-            return cut_locked_stretch(generation.with_motion(motion), lock.start_s, lock.end_s)
+            asked = with_gestures(generation.motion, generation.units, SAID)
+            return cut_locked_stretch(generation.with_motion(asked), lock.start_s, lock.end_s)
 
-        return self._cache.cached("locked", (before, lock, names, self.is_sketching), cut)
+        return self._cache.cached("locked", (before, lock, self.is_sketching), cut)
 
     def _after(self, steps: tuple[Step, ...]) -> Generation:
         return self._cache.cached("edited", (steps, self.is_sketching), lambda: self._with_locks(steps))

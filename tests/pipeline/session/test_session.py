@@ -237,6 +237,13 @@ def test_a_pin_has_a_slope_and_can_be_taken_out(session, curve):
     assert np.array_equal(left.values, session.generate(edited(f"pin {curve} 0.1 at 1.5")).motion.values)
 
 
+def test_a_lock_stays_where_a_pin_before_it_is_taken_out(session):
+    """The pin brought a channel with it, which says where it decided."""
+    first = ("pin width 0.08 at 0.8", "lock from 1.2 to 1.4")
+    locked, freed = (session.generate(edited(*first, *later)).motion for later in ((), ("unpin width at 0.8",)))
+    assert freed["width"][120:140] == pytest.approx(locked["width"][120:140], abs=1e-6)
+
+
 def test_many_locks_take_the_motion_once_each(counted, counting):
     times = [(n / 10, n / 10 + 0.02) for n in range(12)]
     steps = [step for a, b in times for step in (f"pin opening 0.1 at {a}", f"lock from {a} to {b}")]
