@@ -48,12 +48,12 @@ for name in sys.argv[1:]:
 IMPORT_EXTRA = """
 import re, sys
 from importlib import import_module, metadata
-from lipmotion.cli.doctor import declared_requirements, doctor
+from lipmotion.cli.doctor import doctor, list_requirements
 row = next(each for each in doctor() if each.name == f"[{sys.argv[1]}]")
 if row.state != "works":
     sys.exit(row.text)
 plain = lambda name: re.sub(r"[-_.]+", "-", name).lower()
-wanted = {plain(each.name) for each in declared_requirements() if each.extra == sys.argv[1]}
+wanted = {plain(each.name) for each in list_requirements() if f'extra == "{sys.argv[1]}"' in str(each.marker)}
 for module, packages in metadata.packages_distributions().items():
     if module.isidentifier() and not module.startswith("_") and wanted & set(map(plain, packages)):
         import_module(module)

@@ -32,7 +32,7 @@ from lipmotion.measures import curves
 from lipmotion.motion import posterior_network
 from lipmotion.speech.features import encoding
 from lipmotion.speech.recognition.general import GeneralModel
-from lipmotion.speech.recognition.network.posteriors import Hama
+from lipmotion.speech.recognition.network.posteriors import PhoneRecogniser
 from lipmotion.storage.locks import lock_folder
 from lipmotion_faces.filmed.face import FilmedFace, save_face  # also where no entry point is installed
 from testing.toy import SMALL, ToySentence, toy_sentences, toy_utterances
@@ -168,7 +168,11 @@ def heard_once() -> Iterator[None]:
         return answer
 
     with pytest.MonkeyPatch.context() as patched:
-        for owner, name in ((Hama, "log_posteriors"), (encoding, "encode_window"), (GeneralModel, "log_density")):
+        for owner, name in (
+            (PhoneRecogniser, "log_posteriors"),
+            (encoding, "encode_window"),
+            (GeneralModel, "log_density"),
+        ):
             patched.setattr(owner, name, remember(getattr(owner, name)))
         yield
 

@@ -22,7 +22,7 @@ from lipmotion.pipeline.generate.explain import explain_session, write_explanati
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.session import Session, read_pronunciations
+from lipmotion.pipeline.session import Session
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Span, Timeline, Unit, silent_monitor
@@ -144,8 +144,8 @@ class OpenRecording:
         for step in map(parse_step, map(str, steps)):
             if isinstance(step, WordStep):
                 text = step.word if isinstance(step, WordIs | WordSaid) else step.words
-                known = read_pronunciations(step)
-                guessed |= guess_pronunciations([word for word in split_words(text) if word not in known], lexicon)
+                unknown = [word for word in split_words(text) if word not in step.lexicon_entries]
+                guessed |= guess_pronunciations(unknown, lexicon)
         rows = [{"word": word, "phones": list(phones)} for word, phones in guessed.items()]
         return changed | {"guessed": rows}
 
@@ -304,8 +304,7 @@ class OpenRecording:
         with self._preview():
             (explanation,) = explain_session(self.session, self.file.edits, [time_s])
         span = explanation.span
-        shares = [share for regression in explanation.regressions for share in regression.shares]
-        shares = shares or [state for chain in explanation.chains for state in chain.states]
+        shares = [state for chain in explanation.chains for state in chain.states]
         return {
             "time_s": explanation.time_s,
             "frame": explanation.frame,

@@ -1,9 +1,7 @@
 import json
 
-import pytest
-
 from cli.conftest import check_refused
-from lipmotion import compare, evaluate, load_model
+from lipmotion import compare
 
 
 def table(factor: float) -> str:
@@ -33,13 +31,3 @@ def test_the_figures_are_those_of_the_function_and_programs_read_lines_of_json(r
 
 def test_a_league_without_adapters_says_where_they_are(run, toy_corpus):
     check_refused(run("league", str(toy_corpus.path), "-o", "report", "--adapters", "nowhere"), 3, "extras/league")
-
-
-@pytest.mark.long
-def test_the_figures_of_a_model_are_those_of_the_function(run, toy_corpus, toy_model_file, here):
-    done = run("evaluate", toy_model_file, toy_corpus.path, "-o", "figures.json")
-    assert (done.code, done.err) == (0, [])
-    figures = evaluate(load_model(toy_model_file), toy_corpus)
-    assert done.out[0].startswith("split test: 2 clips")
-    assert json.loads((here / "figures.json").read_text()) == json.loads(json.dumps(figures))
-    assert [path.name for path in here.iterdir()] == ["figures.json"]

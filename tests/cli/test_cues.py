@@ -1,7 +1,6 @@
 """Calls that programs make of Rhubarb Lip Sync, in their order and form, and what these programs read of the answer."""
 
 import json
-import logging
 import re
 import sys
 from collections.abc import Callable
@@ -56,46 +55,10 @@ def test_words_beside_a_recording_are_kept(run, basics, here, toy_speech):
     assert run(*line, "--force") == run(*line) == (0, ["take.txt"], [])
 
 
-def test_a_folder(run, basics, here, toy_speech):
-    (here / "made").mkdir()
-    new, made = f"new/deep/{toy_speech.stem}.dat", f"made/{toy_speech.stem}.dat"
-    assert run(*basics, "-o", "new/deep/", "made", "a.json", "--format", "dat") == (0, [new, made, "a.json"], [])
-    assert (here / new).read_bytes() == (here / made).read_bytes()
-    assert run(*basics, "-o", "new/").out == [f"new/{toy_speech.stem}.tsv"]
-
-
-def test_folders_that_cannot_be(run, basics, here, toy_speech):
-    words = here / f"{toy_speech.stem}.tsv"
-    words.write_text("see bob papa mama")
-    for done, code, message in (
-        (run("cues", "-", "-o", "out/"), 3, "comes through a pipe has no name"),
-        (run(*basics, "-o", "out/", "--hold", "0"), 3, "hold is 0 frames"),
-        (run(*basics, "-o", f"{here}/", "--transcript", words), 7, "is the transcript"),
-    ):
-        check_refused(done, code, message)
-    assert list(here.iterdir()) == [words]
-    assert words.read_text() == "see bob papa mama"
-
-
 def test_values_that_rhubarb_does_not_take_either(run, basics, here):
-    for words, answer in (
-        (["--threads", "0"], "'0', required: 1 or more"),
-        (["--consoleLevel", "loud"], "'loud'"),
-        (["-d", "missing"], "no such file: 'missing'"),
-    ):
+    for words, answer in ((["--consoleLevel", "loud"], "'loud'"), (["-d", "missing"], "no such file: 'missing'")):
         check_refused(run(*basics, *words), 2, answer)
     assert list(here.iterdir()) == []
-
-
-@pytest.mark.long
-def test_transcript_and_edited_phones(run, basics, here):
-    said = run(*basics, "--transcript", "see bob papa mama")
-    run("animate", *basics[1:], "--transcript", "see bob papa mama", "-o", "a.json")
-    assert run(*basics, "--units", "a.json").out == said.out
-    document = json.loads((here / "a.json").read_text())
-    document["units"] = [unit | {"phone": "sil"} for unit in document["units"]]
-    (here / "b.json").write_text(json.dumps(document))
-    assert [line.split("\t")[1] for line in run(*basics, "--units", "b.json").out] == ["X", "X"]
 
 
 @pytest.mark.usefixtures("here")
@@ -116,17 +79,6 @@ def test_status_lines(run, basics, toy_speech):
     for event in progress:
         assert event["type"] == "progress"
         assert event["log"] == {"level": "Trace", "message": f"Progress: {event['value']:.0%}"}
-
-
-@pytest.mark.long
-@pytest.mark.usefixtures("here")
-def test_warnings_are_status_lines_too(run, basics):
-    handlers = list(logging.getLogger().handlers)
-    done = run(*basics, "--machine-readable", "--transcript", "see bimab papa mama")
-    (warning,) = [event["log"] for event in events(done) if event["type"] == "log"]
-    assert isinstance(warning, dict)
-    assert (warning["level"], "'bimab' is not in the dictionary" in warning["message"]) == ("Warning", True)
-    assert logging.getLogger().handlers == handlers
 
 
 @pytest.mark.long

@@ -43,30 +43,6 @@ def test_the_table_is_that_of_the_figures(figures_of, toy_corpus, here):
     assert [path.name for path in here.iterdir()] == ["a.json"]
 
 
-def test_the_learning_curve_of_a_list(figures_of, toy_corpus, here):
-    (here / "order.txt").write_text("\n".join(toy_corpus.names("train")) + "\n\n")
-    chosen = ("--order", "order.txt", "--sizes", "3", "--split", "val")
-    figures = figures_of(sections.build_learning_section, "learning-curve", toy_corpus.path, *chosen)
-    assert (figures["split"], figures["order"], figures["workers"]) == ("val", "given", 1)
-    assert [row["names"] for row in figures["rows"]] == [3]
-
-
-def test_folds_of_the_training_list(figures_of, toy_corpus):
-    figures = figures_of(sections.build_folds_section, "folds", toy_corpus.path, "--folds", "2")
-    assert (figures["folds"], figures["trained_on"]) == (2, [4, 4])
-
-
-def test_xieliu2007_of_some_systems(figures_of, toy_corpus, here):
-    (here / "order.txt").write_text("\n".join(toy_corpus.names("train")))
-    few = ("--systems", "ph-MSHMM;mean pose", "--order", "order.txt")
-    chosen = (*few, "--sizes", "3", "--plots", "pictures")
-    figures = figures_of(sections.build_xie_liu_section, "xieliu2007", toy_corpus.path, *chosen)
-    assert [row["names"] for row in figures["rows"]] == [3]
-    assert (figures["order"], figures["validation"]) == ("given", 0)
-    assert len(list((here / "pictures").iterdir())) == 3
-    assert sorted(path.name for path in here.iterdir()) == ["a.json", "order.txt", "pictures"]
-
-
 def test_all_engines(figures_of, run, toy_corpus, here):
     chosen = ("engines", toy_corpus.path, "--split", "test", "--models", "models")
     section = sections.build_engines_section

@@ -32,31 +32,6 @@ def test_animate(toy_speech, toy_model_file, here, name):
     assert list(here.iterdir()) == []
 
 
-def test_a_film(toy_speech, toy_model_file, filmed_face_file, here):
-    basics = ("animate", toy_speech, "--model", toy_model_file, "--face", filmed_face_file)
-    code, line = run_limited(*basics, "-o", "a.mp4", limit=20_000)
-    assert (code, line.startswith("lipmotion: error: a.mp4: cannot be written: ")) == (7, True)
-    assert list(here.iterdir()) == []
-
-
-def test_a_face(filmed_face_file, here):
-    code = (
-        "import resource, sys\n"
-        "from lipmotion.errors import ExportError\n"
-        "from lipmotion_faces.filmed.face import load_face, save_face\n"
-        "face = load_face(sys.argv[1])\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))\n"
-        "try:\n"
-        "    save_face(face, 'a.face')\n"
-        "except ExportError as error:\n"
-        "    print(error)\n"
-    )
-    done = run_child([sys.executable, "-c", code, filmed_face_file])
-    assert done.stderr == ""
-    assert done.stdout.startswith("a.face: cannot be written: ")
-    assert list(here.iterdir()) == []
-
-
 def test_train_says_what_is_kept_and_goes_on(run_outside, toy_corpus, here):
     train = ("train", toy_corpus.path, "--engine", "joint", "--set", "mixtures=1")
     code, line = run_limited(*train, "-o", "m.lipmotion", limit=30_000)  # phones, not the model
@@ -67,10 +42,3 @@ def test_train_says_what_is_kept_and_goes_on(run_outside, toy_corpus, here):
     assert run_outside(*train, "-o", "m.lipmotion").code == 0
     run_outside(*train, "-o", "whole.lipmotion")
     assert (here / "m.lipmotion").read_bytes() == (here / "whole.lipmotion").read_bytes()
-
-
-def test_a_report_says_so_before_the_work(toy_corpus, here):
-    code, line = run_limited("experiment", "all", toy_corpus.path, "-o", "r", "--quick")
-    assert (code, line.startswith("lipmotion: error: r/index.html: cannot be written: ")) == (7, True)
-    assert line.endswith("; make room, then run it again")
-    assert list((here / "r").iterdir()) == []

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import check_refused, is_one_error
-from lipmotion import Corpus, Request, Run, animate, cues, load_model, prepare, train, write, write_cues
+from lipmotion import Corpus, Request, Run, animate, cues, prepare, train, write, write_cues
 from lipmotion.cli.command_line import parser
 from lipmotion.errors import ExportError
 from lipmotion.pipeline.model import find_shipped
@@ -21,7 +21,7 @@ REFUSED = [
     ("the recording itself", f"animate {TALKING} -o a.wav"),
     ("the transcript itself", f"animate {TALKING} -o b.json t.txt"),
     ("the lexicon itself", f"animate {TALKING} -o b.json -o l.txt"),
-    ("the units file itself", f"animate {TALKING} -o b.json --posteriors u.json"),
+    ("the units file itself", f"animate {TALKING} -o b.json u.json"),
     ("the model itself", f"animate {TALKING} -o m.lipmotion"),
     ("the transcript itself", f"cues {TALKING} -f tsv -o t.txt"),
     ("the recording itself", "adapt b.wav a.wav --model m.lipmotion -o a.wav"),
@@ -94,13 +94,6 @@ def test_units_are_replaced_where_that_is_meant(run, here, toy_speech, toy_model
     assert run(*line, "--units", "u.json").code == 7
     assert run(*line, "--units", "u.json", "--rate", "50", "--force") == (0, ["u.json"], [])
     assert (here / "u.json").read_bytes() != before
-
-
-@pytest.mark.long
-def test_a_model_is_adapted_in_its_place(run, here, toy_speech, toy_model_file):
-    shutil.copy(toy_model_file, here / "m.lipmotion")
-    assert run("adapt", toy_speech, "--model", "m.lipmotion", "-o", "m.lipmotion", "--force").code == 0
-    assert load_model(here / "m.lipmotion").adaptation is not None
 
 
 def test_a_recording_is_never_replaced(run, laid):

@@ -99,7 +99,6 @@ animate a.wav --model m.lipmotion -o a.json --transcript words.txt
 animate a.wav --model m.lipmotion -o a.json --lexicon lexicon.txt
 animate a.wav --model m.lipmotion -o a.json --units none-EVIL.json
 animate a.wav --model m.lipmotion -o a.json --rate EVIL
-animate a.wav --model m.lipmotion -o a.json --posteriors EVIL
 explain EVIL.mp4 --model m.lipmotion --at 0
 cues EVIL.wav --model m.lipmotion --recogniser own -f xml
 cues EVIL.wav --model m.lipmotion --recogniser own -f json
@@ -254,19 +253,6 @@ def test_a_person_is_told_what_to_expect_of_the_motion_and_a_program_is_not(run,
         terminal(watched)
         done = run(*basics, "-o", here / "a.json", "--force", *words)
         assert any(line.endswith("dB apart") or "dB apart; " in line for line in done.err) == (watched and not words)
-
-
-@pytest.mark.long
-def test_training_for_a_program(run, toy_corpus, here):
-    done = run("train", toy_corpus.path, "-o", "m.lipmotion", "--from", "none", "--machine-readable")
-    assert (done.code, done.err) == (0, [])
-    first, *between, last = objects(done)
-    assert first == {"type": "start"}
-    assert last == {"type": "success", "model": "m.lipmotion", "used": 8, "minutes": 0.3, "skipped": 0}
-    values = [event["value"] for event in between if event["type"] == "progress"]
-    assert values == sorted(values)  # type: ignore[type-var]
-    assert (values[0], values[-1]) == (0, 1)
-    assert [path.name for path in here.iterdir()] == ["m.lipmotion"]
 
 
 def test_an_error_on_the_command_line_is_a_failure_too(run):

@@ -48,13 +48,6 @@ def test_a_text_file(run, toy_model_file, here):
     assert list(dict.fromkeys(filter(None, words))) == ["papa", "see", "bob"]
 
 
-def test_for_programs(run, basics):
-    done = run(*basics, "-o", "a.wav", "--machine-readable")
-    start, success = map(json.loads, done.out)
-    assert (start["type"], success["type"], success["files"]) == ("start", "success", ["a.wav"])
-    assert success["seconds"] == pytest.approx(1.31, abs=0.02)
-
-
 def test_voices(run, basics, monkeypatch):
     done = run("speak", "--voices")
     assert [line.split() for line in done.out] == [["stand-in:one", "en-us"], ["stand-in:two", "en-us"]]

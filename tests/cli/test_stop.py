@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import lipmotion
-from children import LIPMOTION, PIPE, child, environment, run_child
+from children import LIPMOTION, child, environment, run_child
 from children import Done as Completed
 from cli import signalled
 from lipmotion.cli.terminal.events import Stopped, Stopper
@@ -84,48 +84,6 @@ def test_while_packages_are_imported(toy_speech, here):
     assert [path.name for path in here.iterdir() if path.name != "__pycache__"] == ["numpy.py"]
 
 
-PAUSING = """
-import os, signal, sys
-from lipmotion.cli.terminal.events import JsonLines
-from lipmotion.cli.main import main
-
-def pausing(self, kind, /, emit=JsonLines.emit, **fields):
-    emit(self, kind, **fields)
-    if "pronunciations" in fields.get("stage", "") and JsonLines.emit is pausing:
-        JsonLines.emit = emit
-        os.kill(os.getpid(), signal.SIGSTOP)
-
-JsonLines.emit = pausing
-sys.exit(main())
-"""
-"""A training run that pauses once it has written a checkpoint."""
-
-
-@pytest.mark.long
-def test_training_stopped_in_the_middle_goes_on(toy_corpus, here, run_outside):
-    number = signal.SIGTERM
-    train = ["train", toy_corpus.path, "--engine", "joint", "--set", "mixtures=1"]  # it learns in a second
-    run_outside(*train, "-o", "whole.lipmotion")
-    arguments = [*map(str, train), "-o", "m.lipmotion"]
-    pausing = [sys.executable, "-c", PAUSING, *arguments, "--machine-readable"]
-    with child(pausing, stderr=PIPE) as process:
-        assert os.WIFSTOPPED(os.waitpid(process.pid, os.WUNTRACED)[1])
-        second = run_child([*LIPMOTION, *arguments])
-        process.send_signal(number)
-        process.send_signal(signal.SIGCONT)
-        rest, said = process.communicate()
-    assert process.returncode == 128 + number
-    assert said == LINE + "\n"
-    assert f'"exit_code": {128 + number}}}' in rest.splitlines()[-1]
-    assert second.returncode == 7
-    assert f"another lipmotion (process {process.pid}) is at work on it" in second.stderr
-    assert sorted(path.name for path in here.iterdir()) == ["m.lipmotion.unfinished", "whole.lipmotion"]
-    assert [path.name for path in (here / "m.lipmotion.unfinished").iterdir()] == ["phones.checkpoint"]
-    assert run_outside(*train, "-o", "m.lipmotion").code == 0
-    assert (here / "m.lipmotion").read_bytes() == (here / "whole.lipmotion").read_bytes()
-    assert sorted(path.name for path in here.iterdir()) == ["m.lipmotion", "whole.lipmotion"]
-
-
 def test_a_second_signal_later_ends_the_program():
     """A second signal ends the program at once, even where the first one was swallowed."""
     program = (
@@ -191,30 +149,6 @@ def test_whenever_the_signal_comes(name, lines, here):
         assert {path.name for path in here.iterdir()} <= {"a.tsv"}
         codes.add(done.returncode)
     assert codes == {code, 130, 143}
-
-
-@pytest.mark.long
-def test_a_film_that_is_stopped(toy_speech, toy_model_file, filmed_face_file, here):
-    """Before frames are made, and while they are."""
-    own = ["--model", toy_model_file, "--recogniser", "own", "--face", filmed_face_file, "--machine-readable"]
-    arguments = ["animate", toy_speech, *own, "-o", here / "a.mp4"]
-    assert signalled_at(0, signal.SIGTERM, arguments).returncode == 0
-    steps = int((here / "steps").read_text())
-    (here / "steps").unlink()
-    (here / "a.mp4").unlink()
-    for step in (steps // 3, steps - steps // 20):
-        done = signalled_at(step, signal.SIGTERM, arguments)
-        assert done.returncode == 143, (step, done)
-        assert ends_with_one_final_event(done, signal.SIGTERM, events_only=False), (step, done)
-        assert list(here.iterdir()) == []
-
-
-def test_a_late_signal_does_not_change_what_is_done(toy_model_file, here):
-    for number, step in ((signal.SIGINT, signalled.RETURN_MARK), (signal.SIGTERM, signalled.CLEARANCE_MARK)):
-        done = signalled_at(step, number, ["info", toy_model_file])
-        assert (done.returncode, done.stderr) == (0, "")
-        assert done.stdout.startswith("file ")
-    assert list(here.iterdir()) == []
 
 
 @pytest.fixture

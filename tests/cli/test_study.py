@@ -1,6 +1,5 @@
 import json
 import socket
-from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +8,8 @@ import pytest
 from cli.conftest import check_refused, is_one_error
 from lipmotion import analyse_study
 from lipmotion_studio.folder import open_folder
-from lipmotion_studio.study.answers import read_answers, write_answers
-from lipmotion_studio.study.store import AnswerSheet, StudyStore
+from lipmotion_studio.study.answers import write_answers
 from study.simulated import Effects, comparisons, paired_answers, rated_answers, ratings
-from study.small_study import small_study
 from study.test_design import write_video
 
 
@@ -26,27 +23,6 @@ def test_design_makes_a_study(here, run):
     assert is_one_error(run("study", "design", "-o", "study", "--mos", *words), 7)
     assert is_one_error(run("study", "design", "-o", "other", "--mos", *words, "--scales", "beauty"), 3)
     assert run("study", "design", "-o", "other", "--paired", "--mos", *words).code == 2
-
-
-def test_export_and_forget(here, run):
-    small_study(here / "study")
-    with closing(StudyStore(here / "study")) as store:
-        for _ in range(2):
-            number, _ = store.add_rater().result()
-            store.record(AnswerSheet(number, 0, ("first",), 1.5, 2)).result()
-    done = run("study", "export", "study", "-o", "answers.csv")
-    assert (done.code, done.out) == (0, ["answers.csv: 2 answers"])
-    assert [row.rater for row in read_answers(here / "answers.csv")] == ["r001", "r002"]
-    done = run("study", "export", "study", "--rater", "r2", "-o", "one.csv")
-    assert (done.code, done.out) == (0, ["one.csv: 1 answers"])
-    assert [row.rater for row in read_answers(here / "one.csv")] == ["r002"]
-    for nobody in ("r003", "anna"):
-        assert is_one_error(run("study", "export", "study", "--rater", nobody, "-o", "none.csv"), 3)
-    done = run("study", "forget", "study", "r001")
-    assert (done.code, done.out[0].split(";")[0]) == (0, "r001: 1 answers deleted")
-    assert is_one_error(run("study", "forget", "study", "r001"), 3)
-    run("study", "export", "study", "-o", "answers.csv")
-    assert [row.rater for row in read_answers(here / "answers.csv")] == ["r002"]
 
 
 @pytest.mark.parametrize("words", [("serve", "none"), ("export", "none", "-o", "a.csv"), ("forget", "none", "r001")])

@@ -1,22 +1,15 @@
-import json
-import re
 import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from cli.conftest import check_refused, is_one_error
+from cli.conftest import check_refused
 from lipmotion import Corpus, Model, adapt, load_model, read_motion, save_model
 from lipmotion.pipeline.training.other_speakers import SpokenSentence
-from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.pipeline.training.train import TrainReport
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
-from lipmotion.types import Audio
 from lipmotion.units import load_unit_set
-from pipeline.made import features_of, write_sound
-from speech.made_voices import RATE_HZ, clap, recorded_twice, speech_like
 from studio.toy_recordings import SENTENCES, write_recordings
 from testing.toy import toy_sentences
 
@@ -30,19 +23,6 @@ def test_a_model_and_what_it_was_made_of(run, toy_corpus, here):
     made = load_model(here / "mine.lipmotion")
     assert made.prior is not None
     assert (made.engine.name, made.about["split"]) == ("trajectory", "train")
-
-
-@pytest.mark.long
-def test_what_was_left_out_is_said(run, toy_corpus, here):
-    corpus = Corpus.create(here / "corpus")
-    for name in toy_corpus.names("train")[:4]:
-        utterance = toy_corpus.utterance(name)
-        corpus.add(utterance if name != "toy02" else replace(utterance, words=("five",) * 100))
-    done = run("train", "corpus", "-o", "mine.lipmotion", "--from", "none")
-    assert done.code == 0
-    assert done.out[0].startswith("mine.lipmotion: 3 used, 0.2 minutes, 1 skipped; ")
-    (warning,) = done.err
-    assert warning.startswith("lipmotion: warning: skipped toy02: ")
 
 
 @pytest.mark.long
@@ -75,17 +55,6 @@ def test_what_is_given_wins_over_what_the_joint_engine_recognises(run, toy_corpu
     phones = [" ".join(span.label.phone for span in one) for one in units]
     assert phones[1] == "sil s iy b aa b p aa p ax m aa m ax sil"
     assert {span.label.unit for span in units[0] if not span.label.phone} >= {"bilabial", "low"}
-
-
-@pytest.mark.long
-def test_a_system_of_the_coupled_engine(run, toy_corpus, here):
-    wanted = ["--system", "ph-MSHMM", "--set", "chains=2vis", "--set", "acoustic_regression=no"]
-    assert run("train", toy_corpus.path, "-o", "m", *wanted).code == 0
-    config = load_model(here / "m").engine.config
-    assert (config.structure, config.chains, config.acoustic_regression) == ("multistream", "2vis", False)
-    said = run("info", "m", "--structure").out
-    assert said[0].startswith("multistream: one chain")
-    assert "chain 1: 2vis, 2 units of 5 states" in said
 
 
 @pytest.mark.long
@@ -168,20 +137,6 @@ def test_motion_that_was_tracked_is_written_as_files(run, toy_corpus, here):
     assert not (here / "other").exists()
 
 
-def test_sync(run, toy_corpus, here):
-    """The sound of the toy corpus is made 120 ms late."""
-    corpus = Corpus.create(here / "mine")
-    for utterance in map(toy_corpus.utterance, toy_corpus.names()):
-        late = Audio(np.append(np.zeros(1920), utterance.audio.samples), 16_000)
-        corpus.add(replace(utterance, audio=late, features=features_of(late)))
-    done = run("corpus", "sync", "mine")
-    assert (done.code, done.err) == (0, [])
-    assert re.fullmatch(r".*: sound moved by -1[1-5]\d ms", done.out[0])
-    nothing = "mine: nothing moved: the sound is in step, or its offset could not be measured"
-    assert run("corpus", "sync", "mine").out == [nothing]
-    assert is_one_error(run("corpus", "sync", "missing"), 4)
-
-
 @pytest.mark.long
 def test_prepare_prints_the_counts(run, here):
     """What was prepared is kept, and what cannot be used is skipped."""
@@ -192,58 +147,3 @@ def test_prepare_prints_the_counts(run, here):
         assert (done.code, len(done.out)) == (0, 1)
         assert done.out[0].startswith(f"mine: {counts}, 1 skipped (")
         assert [line for line in done.err if line.startswith("lipmotion: warning: skipped empty: ")]
-
-
-def test_coverage(run, toy_corpus):
-    done = run("corpus", "coverage", toy_corpus.path, "--count", "3")
-    assert (done.code, done.err) == (0, [])
-    found = json.loads(run("corpus", "coverage", toy_corpus.path, "--json").out[0])
-    assert done.out[0] == f"{len(toy_corpus)} of {len(toy_corpus)} utterances, {found['sentences']} sentences"
-    for line, kind in zip(done.out[1:4], found["kinds"], strict=True):
-        assert line.split()[:4] == [kind["kind"], str(kind["covered"]), "of", str(kind["needed"])]
-    assert f"and {len(found['kinds'][1]['missing']) - 3} more diphones" in done.out
-
-
-def test_prompts(run, here, toy_corpus):
-    done = run("corpus", "prompts", "--count", "3")
-    found = prompts(count=3)
-    assert (done.code, done.err) == (0, [])
-    assert [line.split(None, 5)[5] for line in done.out[:3]] == [prompt.text for prompt in found.chosen]
-    last = found.chosen[-1]
-    assert f"phones {last.phones}/{found.phones}  diphones {last.diphones:4}/{found.diphones}" in done.out[2]
-    share = last.diphones / found.diphones
-    assert done.out[3].startswith(f"3 of {found.sentences} sentences: {share:.0%} of all their diphones")
-    (here / "mine.txt").write_text(" ".join(toy_corpus.utterance("toy00").words or ()))
-    done = run("corpus", "prompts", "--text", "mine.txt", "--have", toy_corpus.path)
-    assert (done.code, done.out) == (0, ["0 of 1 sentences: they add nothing"])
-
-
-def test_texts_and_lexicons_of_ones_own(run, here, toy_corpus):
-    (here / "mine.txt").write_text("Two qwrtzx.\nFive.\nPapa vxvx.\n")
-    (here / "lexicon.txt").write_text("qwrtzx zh oy\n")
-    own = ("--text", "mine.txt", "--lexicon", "lexicon.txt")
-    done = run("corpus", "prompts", *own, "--have", toy_corpus.path)
-    assert done.out[0].endswith("Two qwrtzx.")
-    assert done.err == ["lipmotion: warning: left out 1 sentences for their words: vxvx"]
-    given = ["corpus", "coverage", toy_corpus.path, *own]
-    done = run(*given)
-    assert done.err == ["lipmotion: warning: left out 1 sentences for their words (--json has them)"]
-    assert [line for line in done.out if line.startswith("zh ")]
-    done = run(*given, "--json")
-    assert done.err == []
-    (document,) = map(json.loads, done.out)
-    assert document["left_out"] == {"Papa vxvx.": "vxvx"}
-    assert [kind["kind"] for kind in document["kinds"]] == ["phones", "diphones", "triphones"]
-
-
-def test_offset_of_two_recordings(run, here):
-    chance = np.random.default_rng(5)
-    scene = np.concatenate([np.zeros(RATE_HZ), speech_like(chance, 3.0)])
-    made = clap(chance)
-    scene[RATE_HZ // 2 :][: len(made)] += made
-    camera, recorder, _ = recorded_twice(scene, chance, 800, 7_200)
-    write_sound(here / "camera.wav", camera)
-    write_sound(here / "recorder.wav", recorder)
-    done = run("corpus", "offset", "camera.wav", "recorder.wav")
-    assert done.code == 0
-    assert done.out[0].startswith("--offset-ms 500.0  (by clap; levels correlate by 0.")

@@ -10,7 +10,7 @@ import pytest
 
 from lipmotion import Model, Request, animate, load_model
 from lipmotion.engines import Engine, Inputs
-from lipmotion.errors import ExportError, InputError
+from lipmotion.errors import InputError
 from lipmotion.pipeline.analysis import language
 from lipmotion.pipeline.analysis.read_request import read_request, read_text_or_file
 from lipmotion.pipeline.analysis.speech_analysis import analyse, analyse_speech, build_speech, recognise_speech
@@ -22,14 +22,13 @@ from lipmotion.pipeline.generation import (
     WHOLE_TRANSCRIPT,
     predict_outlook,
 )
-from lipmotion.pipeline.job import is_for_several, list_recordings, plan_outputs
 from lipmotion.pipeline.request import as_request
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.types import Audio, Span, Speech, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import Lexicon
-from pipeline.made import features_of, read_welcome, recogniser_of
+from pipeline.made import WELCOME, features_of, read_welcome, recogniser_of
 from testing.toy import ToySentence
 
 
@@ -67,34 +66,6 @@ def test_a_name_in_a_folder_that_exists_is_no_text(here):
     assert read_text_or_file("either/or") == "either/or"
     assert read_text_or_file("subs/ nofile") == "subs/ nofile"
     assert read_text_or_file("x" * 5000 + "/a") == "x" * 5000 + "/a"
-
-
-def test_files_stay_in_order_and_folders_are_listed(tmp_path):
-    for name in ("b.wav", "a.MP4", "notes.txt"):
-        (tmp_path / name).touch()
-    assert list_recordings([Path("z.wav"), tmp_path]) == [Path("z.wav"), tmp_path / "a.MP4", tmp_path / "b.wav"]
-    (tmp_path / "empty").mkdir()
-    with pytest.raises(InputError, match="no sounds and no videos in it"):
-        list_recordings([tmp_path / "empty"])
-
-
-def test_folders_and_templates_and_outputs_that_would_be_written_twice(tmp_path):
-    planned = plan_outputs([Path("in/a.wav"), Path("b.c.flac")], ["out/", "x/{name}-take.mp4"], ["json", "csv"])
-    assert planned == [["out/a.json", "out/a.csv", "x/a-take.mp4"], ["out/b.c.json", "out/b.c.csv", "x/b.c-take.mp4"]]
-    assert is_for_several(str(tmp_path))
-    assert not is_for_several("a.json")
-    with pytest.raises(ExportError, match=r"o/a\.json: would be written for x/a\.wav and for y/a\.wav"):
-        plan_outputs([Path("x/a.wav"), Path("y/a.wav")], ["o/"], ["json"])
-    with pytest.raises(ExportError, match=r"a\.json: is one file, and there are 2 recordings"):
-        plan_outputs([Path("a.wav"), Path("b.wav")], ["a.json"], ["json"])
-
-
-@pytest.mark.parametrize("output", ["out/", "{name}.json", "out/{name}/a.json"])
-def test_a_recording_that_is_called_as_a_device_names_no_output(output):
-    for name in ("CON.wav", "nul .flac"):
-        with pytest.raises(ExportError, match="Windows"):
-            plan_outputs([Path(name)], [output], ["json"])
-    assert plan_outputs([Path("CON.wav")], ["../a.json"], ["json"]) == [["../a.json"]]
 
 
 SILENCE = Audio(np.zeros(16_000, np.float32), 16_000)
@@ -160,54 +131,13 @@ def test_words_that_are_hardly_understood_are_told(confidence, lasts_s, warns, c
     assert (f"confidence {confidence:.2f}" in caplog.text) == warns
 
 
-WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
-
-
-def labels(units: Timeline[Unit]) -> list[tuple[str, str]]:
-    return [(span.label.phone, span.label.word) for span in units]
-
-
-@pytest.fixture(scope="module")
-def found() -> Recognition:
-    return language.recognise_words(WELCOME)
-
-
-def test_long_pauses_end_a_line():
-    timed = ((0.0, 0.3, "oh"), (0.4, 0.6, "no"), (1.2, 1.5, "yes"))
-    words = Timeline(tuple(Span(start_s, end_s, RecognisedWord(text, 0.5)) for start_s, end_s, text in timed))
-    assert language.format_words(words) == "oh no\nyes\n"
-    assert language.format_words(Timeline(())) == ""
-
-
-@pytest.mark.parametrize("suffix", [".txt", ".JSON"])
-def test_files_of_words_are_transcripts(found, tmp_path, suffix):
-    path = tmp_path / f"words{suffix}"
-    language.write_words(found.words, [path], WELCOME)
-    aligned = animate(WELCOME, transcript=path).units
-    assert labels(aligned) == labels(found.units)
-    starts = [(a.start_s, b.start_s) for a, b in zip(aligned, found.units, strict=True)]
-    assert all(abs(a - b) < 0.05 for a, b in starts)
-
-
-def test_files_that_cannot_be_written(found, tmp_path):
-    for name in ("words.srt", "words", "nowhere/words.txt"):
-        with pytest.raises(ExportError):
-            language.write_words(found.words, [tmp_path / "first.txt", tmp_path / name])
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.mark.long
-def test_speech_is_as_reliable_as_its_words(found):
-    request, model = Request(WELCOME), load_model()
-    understood = analyse_speech(model, request)
-    assert understood.recognition.units == found.units
-    assert understood.speech.confidence == pytest.approx(found.reliability)
-    assert understood.speech.units == analyse(model, request).units
-    given = analyse_speech(model, Request(WELCOME, transcript="please speak"))
-    assert given.recognition is None
+def test_speech_is_as_reliable_as_its_words():
+    model, understood = load_model(), analyse_speech(load_model(), Request(WELCOME))
+    assert understood.speech.confidence == pytest.approx(understood.recognition.reliability)
+    assert understood.speech.units == analyse(model, Request(WELCOME)).units
+    assert analyse_speech(model, Request(WELCOME, transcript="please speak")).recognition is None
     assert analyse(model, Request(WELCOME, recogniser="fast")).confidence == pytest.approx(0)
-    long = Audio(np.tile(read_welcome().samples, 7), 16_000)  # of more than half a minute
-    assert language.recognise_words(long, workers=2).words == language.recognise_words(long).words
 
 
 @dataclass(frozen=True)
@@ -299,22 +229,6 @@ def test_times_decide_where_words_alone_do_not(toy_model, toy_sentence):
     starts_s = [span.start_s for span in found if span.label.word]
     true_s = [span.start_s + toy_sentence.audio.duration_s for span in toy_sentence.units if span.label.word]
     assert starts_s == pytest.approx(true_s, abs=0.06)
-
-
-def test_words_of_an_installed_recogniser_are_aligned(toy_model, toy_sentence, monkeypatch):
-    said = [group_words(toy_sentence), None]
-    place = "lipmotion.pipeline.analysis.speech_analysis.recognise_words"
-    monkeypatch.setattr(place, lambda _, kind: said.pop(0) if kind == "vosk" else None)
-    request = Request(toy_sentence.audio, recogniser="vosk")
-    found = analyse(toy_model, request)
-    words = tuple(span.label.word for span in found.units if span.label.word)
-    assert tuple(word for word, _ in groupby(words)) == toy_sentence.words
-    assert found.units_known
-    nothing = analyse(toy_model, request)  # no words: phones are recognised
-    assert not nothing.units_known
-    known = analyse(toy_model, replace(request, transcript=" ".join(toy_sentence.words)))
-    assert known.units == found.units
-    assert not said
 
 
 def test_a_transcript_beside_a_request_is_taken_if_there_is_no_other(toy_model, toy_sentence, tmp_path):

@@ -154,15 +154,6 @@ def test_a_file_its_name_and_its_samples_are_the_same(toy_model, toy_speech):
     assert all(np.array_equal(first.motion.values, other.motion.values) for other in others)
 
 
-def test_files_may_stand_for_model_and_transcript(toy_model, toy_model_file, toy_speech, tmp_path):
-    (tmp_path / "said.txt").write_text("see papa")
-    by_file = lipmotion.animate(str(toy_speech), model=str(toy_model_file), transcript=tmp_path / "said.txt")
-    assert next(span.label.word for span in by_file.units if span.label.word) == "see"
-    assert by_file.units == lipmotion.animate(toy_speech, model=toy_model, transcript="see papa").units
-    with pytest.raises(InputError, match="no such transcript file"):
-        lipmotion.animate(toy_speech, model=toy_model, transcript=tmp_path / "other.txt")
-
-
 def test_the_same_bytes_again_whatever_the_number_of_threads(toy_model, toy_speech, tmp_path):
     lipmotion.write(lipmotion.animate(toy_speech, model=toy_model), tmp_path / "first.npz")
     with threadpool_limits(2, user_api="blas"):
@@ -341,7 +332,7 @@ def test_from_videos_to_figures(some_of_grid, tmp_path):
     report = prepare(some_of_grid, tmp_path / "corpus")
     assert not report.failed
     corpus = lipmotion.Corpus.open(tmp_path / "corpus")
-    assert (corpus.splits["train"], corpus.splits["test"]) == (TRAIN, TEST)
+    assert (len(corpus.names("train")), len(corpus.names("test"))) == (TRAIN, TEST)
 
     model, trained = lipmotion.train(corpus)
     assert not trained.skipped

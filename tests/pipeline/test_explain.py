@@ -4,14 +4,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from PIL import Image
 
 import lipmotion
-from formats.examples import of_motion
 from lipmotion import Model, Request, state_runs
 from lipmotion.errors import InputError
 from lipmotion.pipeline.generate import explain
-from lipmotion.types import ChainPosteriors, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 
 WORDS = "See Bob, papa & mama!"
 
@@ -89,13 +87,6 @@ def test_runs_of_frames_with_one_state():
         explain.StateRun(0.05, 0.07, "aa", "", "x"),
     )
     assert explain.list_runs(generation(("x",), [])) == ()
-
-
-def test_the_phone_is_the_one_that_takes_most_of_the_run():
-    (run,) = explain.list_runs(generation(("x",), [0] * 20))
-    assert (run.phone, run.end_s) == ("aa", 0.2)
-    first, second = explain.list_runs(generation(("x", "y"), [0, 0, 0, 0, 1]))
-    assert (first.phone, second.phone) == ("sil", "p")
     (beyond,) = explain.list_runs(replace(generation(("x",), [0]), units=Timeline(())))
     assert (beyond.phone, beyond.word) == ("", "")
 
@@ -110,77 +101,3 @@ def test_runs_are_the_trace_of_what_animate_makes(name, toy_sentence, request):
     assert all(a.state != b.state for a, b in pairwise(runs))
     states = [run.state for run in runs for _ in range(round(100 * (run.end_s - run.start_s)))]
     assert states == [trace.states[frame] for frame in trace.frames]
-
-
-def test_text_is_bounded():
-    runs = [explain.StateRun(n / 100, (n + 1) / 100, "p", "papa", "s" * 500) for n in range(10)]
-    lines = list(explain.run_lines(runs, 4))
-    assert len(lines) == 6
-    assert lines[1].split()[:4] == ["0.00", "0.01", "p", "papa"]
-    assert max(map(len, lines)) < 160
-    assert lines[5] == "and 6 more (--count N prints N, --json all)"
-    assert len(list(explain.run_lines(runs, 10))) == 11
-
-
-FRAMES = 400
-
-
-def posteriors(probability: np.ndarray) -> ChainPosteriors:
-    units = tuple(f"u{number}" for number in range(probability.shape[1]))
-    no_lead = np.zeros((len(probability), 0), np.float32)
-    return ChainPosteriors("phone", units, probability.astype(np.float32), (), no_lead)
-
-
-def generated(frames: int = FRAMES) -> Generation:
-    values = 0.2 * np.sin(np.arange(frames) / 20)[:, None] ** 2
-    half = frames / 200
-    units = Timeline((Span(0.0, half, Unit("aa", "aa")), Span(half, 2 * half, Unit("m", "m"))))
-    return of_motion(Motion(values, 100.0, (Channel("opening"),)), units)
-
-
-def halves(frames: int = FRAMES) -> np.ndarray:
-    """Return probabilities of four units: the first in one half, the second in the other, the others seldom."""
-    early = (np.arange(frames) < frames // 2).astype(float)
-    sometimes = np.where(np.arange(frames) == frames - 1, 0.5, 0.2)
-    return np.stack([1 - early, early, sometimes, np.full(frames, 0.04)], axis=1)
-
-
-def pixels(picture: Image.Image) -> np.ndarray:
-    return np.asarray(picture.convert("RGB")).astype(int)
-
-
-def test_units_have_a_row_each_in_the_order_of_their_time():
-    shown = pixels(explain.draw_posteriors(generated(), [posteriors(halves())]))
-    rows = [2 * explain.TITLE_PX + explain.ROW_PX * number + explain.ROW_PX // 2 for number in range(3)]
-    early, late = explain.LEFT_PX + 100, explain.LEFT_PX + 2 * FRAMES - 100
-    full, white = list(explain.COLOURS[0]), [255, 255, 255]
-    assert shown[rows[0], early].tolist() == full
-    assert shown[rows[0], late].tolist() == white
-    assert shown[rows[1], early].tolist() == white
-    assert shown[rows[1], late].tolist() == full
-    faint = [round(255 + 0.2 * (part - 255)) for part in full]
-    assert shown[rows[2], early].tolist() == shown[rows[2], late].tolist() == faint
-
-
-def test_units_that_are_never_likely_have_no_row():
-    three, four = halves(), halves()
-    four[9, 3] = 0.06
-    heights = [explain.draw_posteriors(generated(), [posteriors(probability)]).height for probability in (three, four)]
-    assert heights[1] - heights[0] == explain.ROW_PX
-    few = explain.draw_posteriors(generated(), [posteriors(np.full((FRAMES, 30), 1 / 30))])
-    assert few.height > heights[0]
-    assert explain.draw_posteriors(generated(), [posteriors(np.zeros((FRAMES, 3)))]).height > 0
-
-
-def test_a_column_of_a_long_recording_is_the_mean_of_its_frames():
-    for frames, columns in {1: explain.MIN_COLUMNS, 400: 800, 5_345: explain.MAX_COLUMNS}.items():
-        picture = explain.draw_posteriors(generated(frames), [posteriors(halves(frames))])
-        assert picture.width == explain.LEFT_PX + columns + explain.RIGHT_PX
-    probability = np.zeros((8 * explain.MAX_COLUMNS, 1))
-    probability[::4] = 1
-    shown = pixels(explain.draw_posteriors(generated(8 * explain.MAX_COLUMNS), [posteriors(probability)]))
-    row = shown[
-        2 * explain.TITLE_PX + explain.ROW_PX // 2,
-        explain.LEFT_PX + 10 : explain.LEFT_PX + explain.MAX_COLUMNS // 2 - 10,
-    ]
-    assert (row == [round(255 + 0.25 * (part - 255)) for part in explain.COLOURS[0]]).all()

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from lipmotion import Corpus, Model, Selection, load_model, read_motion, speak, train, write
+from lipmotion import Corpus, Model, Selection, load_model, speak, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import InputError
 from lipmotion.pipeline.generate import speak as module
@@ -77,13 +77,6 @@ def test_the_sound_is_silent_where_the_units_are(spoken):
         for span in spoken.generation.units
     }
     assert loud["aa"] > 5 * loud["sil"]
-
-
-def test_files(spoken, toy_model, tmp_path):
-    names = ["a.mp4", "a.wav", "a.flac", "a.ogg", "a.json"]
-    write(spoken.generation, [tmp_path / name for name in names], speech=spoken.sound, model=toy_model, fps=2)
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
-    assert len(read_motion(tmp_path / "a.json")[1]) == len(spoken.generation.units)
 
 
 def test_neighbouring_silences_are_one_and_short_ones_are_pauses():

@@ -6,7 +6,6 @@ import pytest
 from lipmotion import Model, load_model
 from lipmotion.errors import AlignmentError
 from lipmotion.pipeline.analysis import transcribe
-from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser
 from lipmotion.speech.recognition.recognised_speech import select_reliable
 from lipmotion.types import Audio, Features, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
@@ -141,26 +140,10 @@ def test_speech_outside_of_the_times_of_a_transcript_is_reported(welcome, caplog
     assert "to leave out words at" in record.getMessage()
 
 
-def test_three_stretches_are_named(caplog):
-    transcribe.warn_of_misfit(TranscriptFit(-2.0, ((0.0, 2.0), (3.0, 3.5), (5.0, 9.0), (10.0, 11.04)), 20.0))
-    assert caplog.messages == [
-        "the transcript seems to leave out words at 0.0 to 2.0 s, 5.0 to 9.0 s, 10.0 to 11.0 s and at 1 more places "
-        "(7.5 of 20.0 s spoken): the lips are wrong there; add the words, or leave the whole transcript out"
-    ]
-
-
 def test_a_long_word_is_not_repeated_in_full(caplog):
     transcribe.warn_of_guesses(("ab" * 5000,), Lexicon())
     (message,) = caplog.messages
     assert len(message) < 300
-
-
-@pytest.mark.long
-def test_of_many_guesses_some_are_reported_one_by_one(caplog):
-    transcribe.warn_of_guesses([f"bimab{'ab' * i}" for i in range(transcribe.MAX_WARNINGS + 7)], Lexicon())
-    *each, last = caplog.messages
-    assert len(each) == transcribe.MAX_WARNINGS
-    assert last == "7 more words are not in the dictionary; a lexicon file can say better"
 
 
 def test_words_beyond_the_recording_are_refused(phones, audio, features):

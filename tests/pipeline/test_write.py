@@ -1,7 +1,6 @@
 """``pipeline.outputs.output``: one result, several files, all or none."""
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,11 +16,10 @@ from lipmotion.articulation.cue_sheets import list_frame_shapes
 from lipmotion.articulation.delivery import close_on_frame_grid
 from lipmotion.articulation.rest import LAUGH_GAP
 from lipmotion.errors import ExportError, InputError
-from lipmotion.pipeline.outputs import output
 from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
 from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth
 from lipmotion.pipeline.outputs.motion_files import with_articulation
-from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, create_outputs, plan, shift_prosody
+from lipmotion.pipeline.outputs.output import OutputSettings, create_outputs, plan, shift_prosody
 from lipmotion.types import Audio, Generation, Prosody, Timeline
 from lipmotion.types.delivery import MoodKey
 from lipmotion_faces import Staging
@@ -135,20 +133,6 @@ def test_scenes_name_no_sound_that_will_be_gone(result, toy_speech, tmp_path, te
     assert (toy_speech.name in (tmp_path / "a.usda").read_text()) != temporary
 
 
-class WordOutput(Output):
-    """``.words.csv``: the phones, as an installed package may write them."""
-
-    @classmethod
-    def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: ARG003
-        return (".words.csv",)
-
-    def prepare(self, performance: Performance) -> Callable[[], None]:
-        phones = [span.label.phone for span in performance.generation.units]
-        if not phones:
-            raise ExportError(f"{self.path}: no phones")
-        return lambda: self.path.write_text(" ".join(phones)) and None
-
-
 @pytest.fixture
 def settings() -> OutputSettings:
     return OutputSettings(shown_face("portrait"), sounded=True)
@@ -195,21 +179,6 @@ def test_cues_beside_other_outputs_are_those_of_the_function(result, tmp_path):
     broken[3, 0] = np.nan
     with pytest.raises(ExportError, match="not finite"):
         cues(replace(result, motion=replace(result.motion, values=broken)))
-
-
-def test_a_kind_of_a_package_is_written_beside_others(result, tmp_path, monkeypatch):
-    kinds = output.OUTPUTS.built_in
-    monkeypatch.setitem(kinds, "words", f"{__name__}:WordOutput")
-    monkeypatch.setitem(kinds, "wrong", f"{__name__}:settings")
-    with pytest.raises(InputError, match="the output 'wrong' of an installed package"):
-        write(result, tmp_path / "a.words.csv")
-    monkeypatch.delitem(kinds, "wrong")
-    write(result, [tmp_path / "a.words.csv", tmp_path / "a.json"])
-    assert (tmp_path / "a.words.csv").read_text().split() == [span.label.phone for span in result.units]
-    silent = replace(result, units=type(result.units)(()))
-    with pytest.raises(ExportError, match="no phones"):
-        write(silent, [tmp_path / "b.json", tmp_path / "b.words.csv"])
-    assert not (tmp_path / "b.json").exists()
 
 
 @pytest.mark.long

@@ -22,37 +22,13 @@ from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.extensions import Registry
 from lipmotion.types.values import parse_number, parse_whole
 
-_VERBS = "animate batch live speak render edit explain cues words train"
+_VERBS = "animate batch live speak render edit explain cues train"
 _PLACES = {name: f"lipmotion.cli.verbs.{name}:add" for name in _VERBS.split()}
 _PLACES |= {name: f"lipmotion.cli.verbs.about:add_{name}" for name in "addon info cite doctor completion".split()}
 _PLACES["words"] = "lipmotion.cli.verbs.explain:add_words"
 _PLACES["adapt"] = "lipmotion.cli.verbs.train:add_adapt"
 VERBS: Registry[Callable[[Any], None]] = Registry("verb", "lipmotion.verbs", _PLACES)
 """What adds each verb to the parser; those of faces, studio and lab are entry points."""
-OF_OTHER_TOOLS = {
-    **dict.fromkeys(("convert", "export", "import", "draw", "video", "play"), "render IN -o OUT"),
-    **dict.fromkeys(("generate", "lipsync", "sync", "process", "run", "infer", "predict"), "animate SPEECH -o OUT"),
-    "align": "animate SPEECH --transcript TEXT -o OUT.TextGrid",
-    **dict.fromkeys(("say", "tts", "synthesize", "synthesise"), "speak TEXT -o OUT"),
-    **dict.fromkeys(("transcribe", "recognize", "recognise"), "words SPEECH"),
-    **dict.fromkeys(("visemes", "mouth"), "cues SPEECH -o OUT"),
-    **dict.fromkeys(("finetune", "fine-tune"), "adapt"),
-    **dict.fromkeys(("check", "validate", "lint"), "batch --check LIST"),
-    **dict.fromkeys(("setup", "install", "status"), "doctor"),
-    **{name: f"--{name}" for name in ("version", "help")},
-}
-"""Words that do in other programs what verbs do here."""
-MEANT = {
-    **dict.fromkeys(("voice", "actor", "person"), ("voice", "speaker")),
-    **dict.fromkeys(("text", "dialog", "dialogue", "script", "lyrics"), ("transcript", "text")),
-    **dict.fromkeys(("threads", "jobs", "processes"), ("workers",)),
-    **dict.fromkeys(("audio", "wav"), ("sound",)),
-    **dict.fromkeys(("rate", "framerate", "frame-rate"), ("fps",)),
-    **dict.fromkeys(("avatar", "character", "portrait"), ("face",)),
-    **dict.fromkeys(("overwrite", "yes"), ("force",)),
-    **dict.fromkeys(("emotion", "expression"), ("mood",)),
-}
-"""Options of other programs, and what may be meant here: the first that the verb has."""
 MIN_LIKENESS = 0.7
 """So alike must an option be to one that does not exist to be suggested: ``--force`` is not meant by ``--voice``."""
 NUMBER = re.compile(r"-\d+|-\d*\.\d+")
@@ -91,16 +67,14 @@ def run(words: Sequence[str], stopper: Stopper, events: Events) -> None:
 def parse_words(words: Sequence[str], options: argparse.Namespace) -> argparse.Namespace:
     """Return the options, over those of a job file and a level.
 
-    If the first word is no verb, the error names the verb that is meant, by other tools' words, too.
+    If the first word is no verb, the error names the one that is most like it.
     """
     verb = next((word for word in words if not word.startswith("-")), None)
     program = parser([name for name in VERBS.names if name == verb])
     verbs = _verbs(program)
     if verb is not None and verb not in verbs:
         near = get_close_matches(verb, verbs, n=1)
-        usual = "animate SPEECH -o OUT" if Path(verb).suffix else ""
-        meant = OF_OTHER_TOOLS.get(verb.lower(), near[0] if near else usual)
-        hint = f"did you mean: {program.prog} {meant}" if meant else f"the verbs are: {', '.join(verbs)}"
+        hint = f"did you mean: {program.prog} {near[0]}" if near else f"the verbs are: {', '.join(verbs)}"
         program.error(f"no verb {verb!r}; {hint}")
     words = _put_recording_first(program, words)
     empty = argparse.Namespace(**vars(options))
@@ -184,8 +158,7 @@ def _find_option(parser: argparse.ArgumentParser, word: str) -> argparse.Action 
     if longer:
         return known[longer[0]]
     stems = {option.lstrip("-"): option for option in known if option.startswith("--")}
-    meant = next((each for each in MEANT.get(name.lstrip("-"), ()) if each in stems), None)
-    near = [meant] if meant else get_close_matches(name.lstrip("-"), stems, n=1, cutoff=MIN_LIKENESS)
+    near = get_close_matches(name.lstrip("-"), stems, n=1, cutoff=MIN_LIKENESS)
     return parser.error(f"unrecognized arguments: {word}" + (f"; did you mean {stems[near[0]]}?" if near else ""))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import platform
-import re
 import tempfile
 from collections.abc import Callable, Iterator
 from ctypes.util import find_library
@@ -15,9 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from packaging import requirements
-from packaging.markers import Marker
-from packaging.specifiers import SpecifierSet
+from packaging.requirements import Requirement
 
 from lipmotion.errors import LipMotionError, MissingDependencyError, ModelFormatError
 from lipmotion.extensions import find_version, install_command, load_provided
@@ -29,66 +26,11 @@ from lipmotion.types.delivery import Staging
 if TYPE_CHECKING:
     from lipmotion.types import Audio
 
-EXTRA = re.compile(r'\s*(?:\band\b)?\s*extra == "([\w-]+)"')
-
-
-@dataclass(frozen=True)
-class Requirement:
-    """A package that lipmotion declares.
-
-    name     : of the package
-    versions : that are required, as ``>=2.1``
-    marker   : the condition of the Python and the system under which it is required; empty: none
-    extra    : the extra that it belongs to; empty: it is always required
-    """
-
-    name: str
-    versions: str
-    marker: str = ""
-    extra: str = ""
-
-    @property
-    def applies(self) -> bool:
-        """Whether this Python and this system have it."""
-        return not self.marker or Marker(self.marker).evaluate()
-
-    @property
-    def installed(self) -> str:
-        """The installed version; empty: it is not installed."""
-        try:
-            return metadata.version(self.name)
-        except metadata.PackageNotFoundError:
-            return ""
-
-    @property
-    def is_met(self) -> bool:
-        """Whether a version is installed that is required."""
-        return bool(self.installed) and SpecifierSet(self.versions).contains(self.installed, prereleases=True)
-
-
-def parse_requirement(text: str) -> Requirement:
-    """Return a requirement from its text in the metadata of a package: ``NAME>=1 ; MARKER``."""
-    parsed = requirements.Requirement(text)
-    marker = str(parsed.marker or "")
-    extra = EXTRA.search(marker)
-    return Requirement(parsed.name, str(parsed.specifier), EXTRA.sub("", marker).strip(), extra[1] if extra else "")
-
-
-def list_requirements() -> tuple[Requirement, ...]:
-    """Return all requirements of the installed lipmotion; none where it runs from its sources, without metadata."""
-    try:
-        return tuple(map(parse_requirement, metadata.requires("lipmotion") or ()))
-    except metadata.PackageNotFoundError:
-        return ()
-
-
 State = Literal["works", "absent", "broken"]
 EXTRAS = {
     "video": "face tracking: corpora, faces and measures from videos",
     "text": "espeak-ng: text to speech, and other languages than English",
     "plots": "pictures of 'experiment xieliu2007'",
-    "whisper": "words recognised by faster-whisper, with a model of yours",
-    "vosk": "words recognised by Vosk, with a model of yours",
     "cluster": "'batch --cluster'",
     "study": "the page of 'study serve'",
     "studio": "the page of 'studio'",
@@ -133,28 +75,56 @@ def doctor() -> Iterator[InstalledPart]:
         yield InstalledPart(
             "packages", "absent", "not known: lipmotion runs from its sources; to install it: pip install ."
         )
-    needed = sorted((each for each in declared if not each.extra), key=lambda each: each.applies)
+    needed = sorted((each for each in declared if "extra ==" not in str(each.marker)), key=_applies)
     for each in {each.name: each for each in needed}.values():  # of several by one name, that for this Python
-        state: State = "absent" if not each.applies else "works" if each.is_met else "broken"
-        command = f"pip install '{each.name}{each.versions}'"
-        texts = {
-            "absent": f"there is none for this Python or system (required: {each.marker})",
-            "works": each.installed,
-            "broken": f"{each.installed or 'not installed'}, required {each.versions}: {command}",
-        }
-        yield InstalledPart(each.name, state, texts[state])
-    for extra in sorted({each.extra for each in declared} - {""}):
-        packages, brings = [each for each in declared if each.extra == extra], EXTRAS.get(extra, "")
-        unmet = [each for each in packages if not each.is_met]
-        other = next((each for each in packages if not each.applies), None)
-        text = ", ".join(f"{each.name} {each.installed}" for each in packages)
-        if unmet and other is not None:
+        installed = _find_installed(each.name)
+        if not _applies(each):
+            yield InstalledPart(each.name, "absent", f"none for this Python or system (required: {each.marker})")
+        elif _is_met(each):
+            yield InstalledPart(each.name, "works", installed)
+        else:
+            command = f"pip install '{each.name}{each.specifier}'"
+            text = f"{installed or 'not installed'}, required {each.specifier}: {command}"
+            yield InstalledPart(each.name, "broken", text)
+    for extra, brings in EXTRAS.items():
+        packages = [each for each in declared if f'extra == "{extra}"' in str(each.marker)]
+        unmet = [each for each in packages if not _is_met(each)]
+        other = next((each for each in unmet if not _applies(each, extra)), None)
+        text = ", ".join(f"{each.name} {_find_installed(each.name)}" for each in packages)
+        if other is not None:
             text = f"{brings}; not for this Python or system (required: {other.marker})"
         elif unmet:
-            lacks = ", ".join(f"{each.installed or 'no'} {each.name} (required {each.versions})" for each in unmet)
-            text = f"{brings}: {install_command(extra)}; there is {lacks}"
-        yield InstalledPart(f"[{extra}]", "absent" if unmet else "works", text)
+            lacks = (f"{_find_installed(each.name) or 'no'} {each.name} (required {each.specifier})" for each in unmet)
+            text = f"{brings}: {install_command(extra)}; there is {', '.join(lacks)}"
+        if packages:
+            yield InstalledPart(f"[{extra}]", "absent" if unmet else "works", text)
     yield from map(look_at, _PARTS)
+
+
+def list_requirements() -> tuple[Requirement, ...]:
+    """Return all requirements of the installed lipmotion; none where it runs from its sources, without metadata."""
+    try:
+        return tuple(map(Requirement, metadata.requires("lipmotion") or ()))
+    except metadata.PackageNotFoundError:
+        return ()
+
+
+def _applies(requirement: Requirement, extra: str = "") -> bool:
+    """Return whether this Python and this system have a requirement, of an extra or of the package itself."""
+    return requirement.marker is None or requirement.marker.evaluate({"extra": extra})
+
+
+def _find_installed(name: str) -> str:
+    """Return the installed version of a package; empty: it is not installed."""
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return ""
+
+
+def _is_met(requirement: Requirement) -> bool:
+    installed = _find_installed(requirement.name)
+    return bool(installed) and requirement.specifier.contains(installed, prereleases=True)
 
 
 def look_at(name: str) -> InstalledPart:
@@ -205,10 +175,9 @@ def _voices() -> str:
 def _phone_recogniser() -> str:
     from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser, load_phone_recogniser
 
-    name = find_installed_recogniser()
-    if name is None:
+    if find_installed_recogniser() is None:
         raise _AbsentError("none for this machine: voices that the model does not know are recognised less well")
-    return load_phone_recogniser(name).source
+    return load_phone_recogniser().source
 
 
 def _microphone() -> str:
@@ -225,10 +194,9 @@ def _face_tracking() -> str:
     except MissingDependencyError as error:
         raise _AbsentError(str(error)) from error
     found = f"OpenCV {opencv}, MediaPipe {metadata.version('mediapipe')}"
-    declared = Requirement(OPENCV, "").installed
-    return (
-        found if declared.startswith(opencv) else f"{found}; {OPENCV} is {declared or 'not installed'}: {OPENCV_HINT}"
-    )
+    declared = _find_installed(OPENCV)
+    is_own = declared.startswith(opencv)
+    return found if is_own else f"{found}; {OPENCV} is {declared or 'not installed'}: {OPENCV_HINT}"
 
 
 def _model() -> str:

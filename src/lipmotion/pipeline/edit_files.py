@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
@@ -17,20 +16,17 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Request, locate_paths
 from lipmotion.pipeline.session import Session
 from lipmotion.storage.files import atomic_file, sound_reference
-from lipmotion.storage.json_text import as_json_rows, from_json, read_toml
+from lipmotion.storage.json_text import as_json_rows, from_json
 from lipmotion.storage.sources import LARGEST_TEXT_BYTES, check_source, hash_file, read_text_file
 from lipmotion.types import Generation, Outlook, Timeline, Unit
 from lipmotion.types.values import as_tuple, describe_value, items, number, optional, require, text, value_of
 
 LOG = logging.getLogger("lipmotion")
 FORMAT, VERSION = "lipmotion.edits", 1
-JSON, TOML = SUFFIXES = (".json", ".toml")
-"""Suffixes of files of edits."""
+SUFFIX = ".json"
 DIGEST = "recording_sha256"
 HELD = ("recording", "model", "lexicon", "language", "recogniser", "speaker", "pauses", "asymmetry")
 """What of a request such a file holds; words and phones that were given are in the phones in time."""
-
-
 _SHARE, _TEXT = number(0, 1), text(1000)
 _OF_OUTLOOK = {"words": _TEXT, "confidence": _SHARE, "range_db": number(), "advice": as_tuple(items(_TEXT))}
 _OUTLOOK = optional(value_of(partial(Outlook, voice=None), _OF_OUTLOOK | {"voice": _SHARE}, _OF_OUTLOOK))
@@ -128,28 +124,24 @@ def edit_file(edits: EditFile | Edits | str | Path | None) -> EditFile:
 
 def is_edit_file(path: Path) -> bool:
     """Return whether a file is one of edits, by its suffix and how it begins."""
-    if path.suffix.lower() == TOML:
-        return True  # nothing else that is read ends so
-    if path.suffix.lower() != JSON or not path.is_file():
+    if path.suffix.lower() != SUFFIX or not path.is_file():
         return False
     with path.open("rb") as file:
         return FORMAT.encode() in file.read(100)
 
 
 def read_edits(path: str | Path, *, phones: bool = True) -> EditFile:
-    """Return the content of a file of edits: ``.json``, or ``.toml`` (Python 3.11 or newer).
+    """Return the content of a file of edits.
 
     phones : whether its phones in time are read, too: they take most of the time
     Raises InputError: no such file, another suffix, or not a file of edits of this version.
     """
     path = Path(path)
-    if _check_suffix(path) == TOML:
-        members: Any = read_toml(path, "edits", f"use {JSON}")
-    else:
-        try:
-            members = from_json(read_text_file(path, "edits"))
-        except ValueError as error:
-            raise InputError(f"{path}: not a file of edits ({error})") from error
+    _check_suffix(path)
+    try:
+        members: Any = from_json(read_text_file(path, "edits"))
+    except ValueError as error:
+        raise InputError(f"{path}: not a file of edits ({error})") from error
     if not isinstance(members, dict) or members.get("format") != FORMAT:
         raise InputError(f'{path}: not a file of edits; it must begin with "format": "{FORMAT}"')
     if (version := members.get("version")) != VERSION:
@@ -170,17 +162,16 @@ def read_edits(path: str | Path, *, phones: bool = True) -> EditFile:
         raise InputError(f"{path}: {error}") from error
 
 
-def _check_suffix(path: Path) -> str:
-    """Return the suffix of a file of edits, in lower case. Raises InputError: another one."""
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{path}: a file of edits ends in one of: {', '.join(SUFFIXES)}")
-    return path.suffix.lower()
+def _check_suffix(path: Path) -> None:
+    """Raise InputError unless a name is that of a file of edits."""
+    if path.suffix.lower() != SUFFIX:
+        raise InputError(f"{path}: a file of edits is called .json, not {path.suffix!r}; rename it")
 
 
 def write_edits(file: EditFile, path: str | Path) -> None:
     """Write a file of edits. Raises InputError: another suffix.  Raises ExportError: it cannot be written."""
     path = Path(path)
-    suffix = _check_suffix(path)
+    _check_suffix(path)
     members: dict[str, Any] = {"format": FORMAT, "version": VERSION}
     for name in HELD:
         value = getattr(file.named, name)
@@ -195,22 +186,5 @@ def write_edits(file: EditFile, path: str | Path) -> None:
         members |= list_unit_rows(file.units)
     if file.outlook is not None:
         members["outlook"] = {name: value for name, value in asdict(file.outlook).items() if value is not None}
-    if suffix == TOML:  # a line each, and lists with a line for each of their members
-        content = ""
-        for name, value in members.items():
-            rows = "".join(f"  {_format_toml(row)},\n" for row in value) if isinstance(value, list | tuple) else ""
-            content += (
-                f"{name} = [\n{rows}]\n" if isinstance(value, list | tuple) else f"{name} = {_format_toml(value)}\n"
-            )
-    else:
-        content = as_json_rows(members)
     with atomic_file(path) as temporary:
-        temporary.write_text(content, encoding="utf-8")
-
-
-def _format_toml(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{name} = {_format_toml(each)}" for name, each in value.items()) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_format_toml, value)) + "]"
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        temporary.write_text(as_json_rows(members), encoding="utf-8")

@@ -13,7 +13,7 @@ from lipmotion.errors import InputError, shorten
 from lipmotion.types import FRAME_RATE_HZ, CurveEdit, DrawnCurve, Gain, Hold, Pin, SlopedPin, Span, Timeline, Unit
 from lipmotion.types.delivery import Delivery, MoodKey, Staging, format_moods, parse_moods, sort_moods
 from lipmotion.types.values import describe_value, parse_number, parse_whole
-from lipmotion.units import PHONES, describe_unknown_phone, is_silent
+from lipmotion.units import PHONES, Pronunciation, describe_unknown_phone, is_silent, split_words
 
 MIN_PHONE_S = 0.01
 """Shortest phone that an edit may leave."""
@@ -52,6 +52,16 @@ class Step:
         forms = [form for form, kind in STEPS.items() if kind is type(self.stated)]
         return forms[-1 if getattr(self.stated, "channel", "") else 0]
 
+    @property
+    def said(self) -> dict[str, tuple[str, ...]]:
+        """The phones of words that the sentence spells out, by word."""
+        return {}
+
+    @property
+    def lexicon_entries(self) -> dict[str, tuple[Pronunciation, ...]]:
+        """The same as a lexicon holds it."""
+        return {word: (phones,) for text, phones in self.said.items() for word in split_words(text)}
+
     def __str__(self) -> str:
         return self.form.format(**{name: _written(value) for name, value in vars(self.stated).items()})
 
@@ -82,6 +92,12 @@ class PhoneStep(Step):
         if not 1 <= number <= len(units):
             raise InputError(f"{str(self)!r}: there is no phone {number}, required 1 to {len(units)}")
         return number - 1
+
+    def _check_border(self, time_s: float, first_s: float, last_s: float) -> None:
+        """Raise InputError unless two phones, from one time to another, may meet at a time between them."""
+        if not first_s + MIN_PHONE_S - 1e-9 <= time_s <= last_s - MIN_PHONE_S + 1e-9:
+            required = f"{first_s + MIN_PHONE_S:.3f} to {last_s - MIN_PHONE_S:.3f} s, between the phones beside it"
+            raise InputError(f"{str(self)!r}: required {required}")
 
 
 def _read_unit(phone: str, word: str = "") -> Unit:
@@ -121,10 +137,7 @@ class PhoneEnds(PhoneStep):
         if not 0 <= before < len(spans) - 1:
             end = "first phone begins" if before < 0 else "last phone ends"
             raise InputError(f"{str(self)!r}: the {end} with the recording")
-        first_s, last_s = spans[before].start_s, spans[before + 1].end_s
-        if not first_s + MIN_PHONE_S - 1e-9 <= self.time_s <= last_s - MIN_PHONE_S + 1e-9:
-            required = f"{first_s + MIN_PHONE_S:.3f} to {last_s - MIN_PHONE_S:.3f} s"
-            raise InputError(f"{str(self)!r}: required {required}, between the phones beside it")
+        self._check_border(self.time_s, spans[before].start_s, spans[before + 1].end_s)
         for place, change in ((before, {"end_s": self.time_s}), (before + 1, {"start_s": self.time_s})):
             label = replace(spans[place].label, confidence=None)
             spans[place] = replace(spans[place], label=label, **change)
@@ -182,11 +195,7 @@ class PhoneSplit(PhoneStep):
     def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
         place = self._index(units, self.number)
         phone = units[place]
-        if not phone.start_s + MIN_PHONE_S - 1e-9 <= self.time_s <= phone.end_s - MIN_PHONE_S + 1e-9:
-            raise InputError(
-                f"{str(self)!r}: the phone lasts from {phone.start_s:.3f} to {phone.end_s:.3f} s, required a time at "
-                f"least {MIN_PHONE_S} s within"
-            )
+        self._check_border(self.time_s, phone.start_s, phone.end_s)
         label = replace(phone.label, confidence=None)
         parts = (Span(phone.start_s, self.time_s, label), Span(self.time_s, phone.end_s, label))
         return Timeline((*units.spans[:place], *parts, *units.spans[place + 1 :]))
@@ -217,18 +226,19 @@ class WordSaid(Step):
     phones: Text
 
     def __post_init__(self) -> None:
-        _check_said(self, self.phones.split())
+        _check_said(self)
 
     @property
-    def pronunciation_of(self) -> dict[str, tuple[str, ...]]:
-        """The phones of the word."""
+    def said(self) -> dict[str, tuple[str, ...]]:  # noqa: D102
         return {self.word: tuple(self.phones.split())}
 
 
-def _check_said(step: Step, phones: Sequence[str]) -> None:
-    """Raise InputError unless phones are those of a word that an edit says."""
-    for phone in phones:
-        if _read_unit(phone) and is_silent(phone):
+def _check_said(step: Step) -> None:
+    """Raise InputError unless every word that an edit spells out has phones, and no silence among them."""
+    for word, phones in step.said.items():
+        if not phones:
+            raise InputError(f"{str(step)!r}: {shorten(repr(word))} has no phones; required WORD PHONES, WORD …")
+        if any(is_silent(_read_unit(phone).phone) for phone in phones):
             raise InputError(f"{str(step)!r}: a word has no silence in it; say two words")
 
 
@@ -253,14 +263,10 @@ class WordsSaidSo(WordsSaid):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for word, phones in self.pronunciation_of.items():
-            if not phones:
-                raise InputError(f"{str(self)!r}: {shorten(repr(word))} has no phones; required WORD PHONES, WORD …")
-            _check_said(self, phones)
+        _check_said(self)
 
     @property
-    def pronunciation_of(self) -> dict[str, tuple[str, ...]]:
-        """The phones of words, by word."""
+    def said(self) -> dict[str, tuple[str, ...]]:  # noqa: D102
         parts = (part.split() for part in self.pronunciations.split(","))
         return {word: tuple(phones) for word, *phones in filter(None, parts)}
 
@@ -373,20 +379,12 @@ class SetStep(Step):
         if self.name not in _KIND_OF:
             name, known = shorten(repr(self.name)), ", ".join(_KIND_OF)
             raise InputError(f"{str(self)!r}: nothing is called {name}; required one of: {known}")
-        value: Any = self.parsed_value
-        _KIND_OF[self.name](**{self.name: value})  # checks it
+        _KIND_OF[self.name](**{self.name: self.parsed_value})  # checks it
 
     @property
-    def parsed_value(self) -> bool | float | int | str:
+    def parsed_value(self) -> Any:
         """The value, of the type of what is set. Raises InputError: it is of another."""
-        usual = getattr(_KIND_OF[self.name](), self.name)
-        if isinstance(usual, bool):
-            if self.value not in _TRUTH:
-                raise InputError(f"{str(self)!r}: required one of: {', '.join(_TRUTH)}")
-            return _TRUTH[self.value]
-        if isinstance(usual, str):
-            return self.value
-        return (parse_whole if isinstance(usual, int) else parse_number)(self.value, f"{self.name} is")
+        return _KIND_OF[self.name].values_of([f"{self.name}={self.value}"])[self.name]
 
 
 @dataclass(frozen=True)
@@ -409,8 +407,6 @@ class MoodStep(Step):
 
 
 _KIND_OF: dict[str, Any] = {each.name: kind for kind in (Delivery, Staging) for each in fields(kind)}
-_TRUTH = {"true": True, "false": False, "yes": True, "no": False}
-
 
 STEPS: dict[str, Any] = {
     "word {number} is {word}": WordIs,

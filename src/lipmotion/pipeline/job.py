@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import load_provided
 from lipmotion.pipeline.request import Outputs, Request, locate_paths
-from lipmotion.storage.files import atomic_file, check_target, make_portable
+from lipmotion.storage.files import make_portable
 from lipmotion.storage.json_text import read_toml
 from lipmotion.storage.sources import check_listable, is_recording
 from lipmotion.types.configuration import Configuration, option
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.outputs.output import Output, OutputSettings, ShownFace
     from lipmotion.types import Audio, Generation
 
-PICTURE = ".png"
-"""Suffix of a picture of posteriors."""
 RECOGNITION = 0.3
 """The share of the work that is recognition, where a video is drawn, too."""
 
@@ -111,44 +109,31 @@ def run(  # noqa: PLR0913
     """
     from lipmotion.pipeline.analysis.read_request import read_request
     from lipmotion.pipeline.edit_files import edit_file
-    from lipmotion.pipeline.generate.explain import chain_posteriors, draw_posteriors
+    from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.model import load_model
     from lipmotion.pipeline.outputs.curve_sets import list_curve_names
-    from lipmotion.types import Audio
 
-    # What cannot be written is refused before the long work.
-    edits, recording, picture = edit_file(job.request.edits), job.request.recording, job.outputs.posteriors
+    edits, recording = edit_file(job.request.edits), job.request.recording
     job = replace(job, delivery=edits.edits.delivery(job.delivery), staging=edits.edits.staging(job.staging))
     face = face or open_face(job.outputs)
-    draws = any(output.draws for output in check_outputs(job, face, recording))
-    if picture and picture.suffix.lower() != PICTURE:
-        raise ExportError(f"{picture}: unknown format {picture.suffix!r}; required: {PICTURE}")
-    if picture:
-        check_target(picture, None if isinstance(recording, Audio) else recording)
+    draws = any(output.draws for output in check_outputs(job, face, recording))  # refused before the long work
 
     request = read_request(job.request, words_beside=words_beside, is_typed=is_typed)
-    model = model or load_model(job.request.model)
+    model = model or load_model(request.model)
     if request.onto is None:
         request = replace(request, onto=face.find_other_person(model, job.request.speaker))
-
     curves = choose_curves(job.outputs, face)
-    session = edits.session(
+    generation = animate(
         request,
         model=model,
+        edits=edits,
         workers=workers,
         monitor=sub_monitor(monitor, 0.0, RECOGNITION if draws else 1.0),
         background=face.load if draws else None,
         curves=list_curve_names(curves) if curves else (),
     )
-    if picture:
-        plot = draw_posteriors(*chain_posteriors(session, edits.edits))
-        with atomic_file(picture) as unfinished:
-            plot.save(unfinished, optimize=True)
-    generation = session.generate(edits.edits)
-    del session  # sound and features of an hour, which outputs do not need
-
-    of_writing = sub_monitor(monitor, RECOGNITION, 1.0)
-    write_outputs(job, face, generation, recording, model=model, temporary=temporary, monitor=of_writing)
+    drawing = sub_monitor(monitor, RECOGNITION, 1.0)
+    write_outputs(job, face, generation, recording, model=model, temporary=temporary, monitor=drawing)
     return generation
 
 

@@ -86,11 +86,11 @@ def save_model(model: Model, path: str | Path) -> None:
     parts: dict[str, Mapping[str, NDArray[Any]]] = {
         "phones": hmm_to_arrays(model.phones),
         "engine": model.engine.to_arrays(model.learned),
-        "adaptation": adaptation_to_arrays(model.adaptation) if model.adaptation is not None else {},
-        "eigenlips": eigenlips_to_arrays(model.eigenlips) if model.eigenlips is not None else {},
-        "speakers": speakers_to_arrays(model.speakers) if model.speakers is not None else {},
         "prior": model.prior.engine.to_arrays(model.prior.learned) if model.prior is not None else {},
     }
+    for name, (to_arrays, _) in _OPTIONAL.items():
+        part = getattr(model, name)
+        parts[name] = to_arrays(part) if part is not None else {}
     config = model.phones.config.as_mapping()
     header = {"format": FORMAT, "version": VERSION, **_describe_engine(model), "recogniser": config}
     if model.prior is not None:
@@ -103,10 +103,11 @@ def _describe_engine(model: Model) -> dict[str, Any]:
     return {"engine": model.engine.name, "configuration": model.engine.config.as_mapping(), **model.about}
 
 
-def load_model(path: str | Path | None = None) -> Model:
+def load_model(path: str | Path | Model | None = None) -> Model:
     """Return the model in a file.
 
-    path : of a file that ``save_model`` or ``lipmotion train`` wrote; None: the model that ships with the package
+    path : of a file that ``save_model`` or ``lipmotion train`` wrote; None: the model that ships with the package; a
+           model that is loaded already is returned as it is
     Raises InputError: no such file.
     Raises ModelFormatError: the file is not a model, is damaged, or has another version.
 
@@ -115,7 +116,7 @@ def load_model(path: str | Path | None = None) -> Model:
     ['CC BY 4.0']
     """
     if path is not None:
-        return _read(Path(path))
+        return path if isinstance(path, Model) else _read(Path(path))
     if not find_shipped().is_file():
         raise ModelFormatError("the package holds no model; install it again, or give one with --model")
     return _read_shipped()
@@ -158,8 +159,6 @@ def _read(path: Path) -> Model:
         if phones.mixtures.size[2] != FEATURES:
             raise ValueError(f"phone models of {phones.mixtures.size[2]} features, required {FEATURES}")
         learned = engine.from_arrays(arrays["engine"])
-        adaptation = adaptation_from_arrays(arrays["adaptation"]) if arrays["adaptation"] else None
-        eigenlips = eigenlips_from_arrays(arrays["eigenlips"]) if arrays["eigenlips"] else None
         if arrays["prior"] and "prior" not in header:
             raise ValueError("arrays of another model, which the header does not name")
         prior = None
@@ -168,15 +167,15 @@ def _read(path: Path) -> Model:
             below = engine_named(inner["engine"], _options(inner, "configuration"), stored=True)
             about = {key: value for key, value in inner.items() if key not in _OWN_KEYS}
             prior = Model(phones, below, below.from_arrays(arrays["prior"]), about)
-        speakers = speakers_from_arrays(arrays["speakers"]) if arrays["speakers"] else None
+        more = {name: read(arrays[name]) if arrays[name] else None for name, (_, read) in _OPTIONAL.items()}
     except ModelFormatError as error:
         raise ModelFormatError(f"{path}: {error}") from error
     except UNREADABLE as error:
         raise ModelFormatError(f"{path}: the model is damaged ({error}); train or download it again") from error
     about = {key: value for key, value in header.items() if key not in _OWN_KEYS}
-    if (about.get("visual", GEOMETRY) != GEOMETRY) != (eigenlips is not None):
+    if (about.get("visual", GEOMETRY) != GEOMETRY) != (more["eigenlips"] is not None):
         raise ModelFormatError(f"{path}: the model says visual {about.get('visual')!r}, which its eigenlips do not fit")
-    return Model(phones, engine, learned, about, adaptation, eigenlips, prior, speakers)
+    return Model(phones, engine, learned, about, prior=prior, **more)
 
 
 def _options(header: Mapping[str, Any], key: str) -> Mapping[str, Any]:
@@ -186,7 +185,13 @@ def _options(header: Mapping[str, Any], key: str) -> Mapping[str, Any]:
     return options
 
 
-_FOLDERS = ("phones", "engine", "adaptation", "eigenlips", "prior", "speakers")
+_OPTIONAL: dict[str, tuple[Any, Any]] = {
+    "adaptation": (adaptation_to_arrays, adaptation_from_arrays),
+    "eigenlips": (eigenlips_to_arrays, eigenlips_from_arrays),
+    "speakers": (speakers_to_arrays, speakers_from_arrays),
+}
+"""Parts that a model may lack, each with what makes arrays of it, and it of arrays."""
+_FOLDERS = ("phones", "engine", "prior", *_OPTIONAL)
 """Prefixes of the names of all arrays."""
 _OWN_KEYS = ("format", "version", "engine", "configuration", "recogniser", "prior")
 """Keys of the header that are not part of ``Model.about``."""
@@ -204,19 +209,13 @@ def with_person(model: Model, name: str, person: SpeakerMap) -> Model:
     >>> known = lipmotion.with_person(model, "anna", lipmotion.map_onto(model, "anna.mp4"))  # doctest: +SKIP
     >>> lipmotion.save_model(known, "with-anna.lipmotion")  # doctest: +SKIP
     """
-    maps = model.speakers
-    known = maps.names if maps is not None else ()
+    known = model.speakers or {}
     if not name or name in known:
         raise InputError(f"a person named {name!r}, required another name than: {', '.join(('', *known))}")
-    if maps is not None:
-        person = person.reorder(maps.channels)
-    rows = {part: getattr(person, part)[None] for part in ("gain", "offset", "rest", "habits")}
-    if maps is None:
-        speakers = SpeakerMaps(person.channels, (name,), **rows, lips=person.lips)
-    else:
-        rows = {part: np.concatenate([getattr(maps, part), row]) for part, row in rows.items()}
-        speakers = replace(maps, names=(*known, name), **rows)
-    return replace(model, speakers=speakers, about={**model.about, "speakers": list(speakers.names)})
+    channels = next((other.channels for other in known.values()), person.channels)
+    lips = next((other.lips for other in known.values()), person.lips)
+    speakers = {**known, name: replace(person.reorder(channels), lips=lips)}
+    return replace(model, speakers=speakers, about={**model.about, "speakers": list(speakers)})
 
 
 def with_prior(prior: Model | None, speech: Speech) -> Speech:

@@ -36,9 +36,7 @@ from lipmotion.pipeline.edits import (
     Step,
     Text,
     UnlockStep,
-    WordSaid,
     WordsSaid,
-    WordsSaidSo,
     WordStep,
     find_locks,
     remove_pins,
@@ -66,7 +64,7 @@ from lipmotion.types import (
     silent_monitor,
 )
 from lipmotion.types.edits import Locked
-from lipmotion.units import Pronunciation, group_words, split_words
+from lipmotion.units import group_words
 
 if TYPE_CHECKING:
     from lipmotion.articulation.curve_edits import MotionStretch
@@ -156,7 +154,7 @@ class Session:
         audio: AnalysedAudio | None = None,
     ) -> None:
         self.request: Request = resolve_language(read_request(as_request(speech), is_typed=False))
-        self.model = model if isinstance(model, Model) else load_model(model or self.request.model)
+        self.model = load_model(model or self.request.model)
         request = self.request
 
         def prepare() -> None:  # not of this object, which would keep itself until the garbage is collected
@@ -274,7 +272,7 @@ class Session:
             there = words[step.number - 1]
             start_s, end_s, text = there.start_s, there.end_s, Text(step.word)
             where = f"{start_s:.2f} to {end_s:.2f} s, where {there.label!r} was"
-        pronunciations = read_pronunciations(step)
+        pronunciations = step.lexicon_entries
 
         def align() -> list[Span[Unit]]:
             request = self.request
@@ -428,9 +426,3 @@ class Session:
         sketch = apply_excerpt(full_motion, before, after, excerpt, units)
         self._last = (phone_steps, pins), sketch
         return sketch
-
-
-def read_pronunciations(step: Step) -> dict[str, tuple[Pronunciation, ...]]:
-    """Return the pronunciations that an edit brings along, by word, as a lexicon holds them."""
-    pronunciations = step.pronunciation_of if isinstance(step, WordSaid | WordsSaidSo) else {}
-    return {word: (phones,) for text, phones in pronunciations.items() for word in split_words(text)}

@@ -20,7 +20,7 @@ from itertools import chain, islice
 from multiprocessing import connection as pipes
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError
 from lipmotion.extensions import find_version, install_command
@@ -284,14 +284,11 @@ ITEMS_AHEAD = 4
 """Items a worker of a cluster that are sent ahead, so that none waits, and memory is flat."""
 
 
-class Pool(Protocol):
-    """Applies a function to items in other processes; yields results as they are ready.
+Pool: TypeAlias = ParallelMap
+"""A map in other processes whose results come as they are ready.
 
-    Raises WorkerDiedError: a worker ended; which items are done is not known.
-    """
-
-    def __call__(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
-        """Yield the result of every item, in any order."""
+Raises WorkerDiedError: a worker ended; which items are done is not known.
+"""
 
 
 @contextmanager

@@ -14,14 +14,22 @@ import numpy as np
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import find_version
 from lipmotion.formats.base import list_read_suffixes
-from lipmotion.pipeline.job import Job, list_recordings, run
+from lipmotion.pipeline.job import Job, run
 from lipmotion.pipeline.model import find_shipped, load_model
 from lipmotion.pipeline.outputs.motion_files import match_duration, read_generation
 from lipmotion.pipeline.outputs.output import write
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import replace_folder
-from lipmotion.storage.sources import VIDEO_SUFFIXES, has_video, hash_file, open_media, read_text_file
+from lipmotion.storage.sources import (
+    VIDEO_SUFFIXES,
+    check_listable,
+    has_video,
+    hash_file,
+    is_recording,
+    open_media,
+    read_text_file,
+)
 from lipmotion.types import Audio, Monitor, silent_monitor
 from lipmotion.types.progress import with_progress
 from lipmotion_faces.tracking.track import read_video_frames
@@ -42,7 +50,11 @@ has to be made, it is the file of the second path. And how it was made, in texts
 
 def read_sentences(paths: Sequence[Path]) -> list[Path]:
     """Return the recordings of sentences in files and folders. Raises InputError: none, or two of one name."""
-    sentences = list_recordings(paths)
+    sentences: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            check_listable(path)
+        sentences += sorted(filter(is_recording, path.iterdir())) if path.is_dir() else [path]
     if not sentences:
         raise InputError("no sentences; give recordings: --sentence FILE|FOLDER")
     names = [path.stem for path in sentences]
@@ -51,7 +63,7 @@ def read_sentences(paths: Sequence[Path]) -> list[Path]:
             raise InputError(f"{path}: two sentences are called {path.stem!r}; rename one file")
         if not path.is_file():
             raise InputError(f"{path}: no such file; give the recording of a sentence")
-    return list(sentences)
+    return sentences
 
 
 def parse_conditions(texts: Sequence[str]) -> dict[str, str]:

@@ -26,7 +26,7 @@ from lipmotion_faces.corpus.long_videos import (
 )
 from lipmotion_faces.corpus.sync import measure_offsets, remove_offsets
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
-from lipmotion_faces.tracking.track import VideoScan, track
+from lipmotion_faces.tracking.track import VideoScan
 from pipeline.made import features_of, read_sound, replace_tracking
 
 RATE = 16_000
@@ -147,19 +147,6 @@ def test_cuts_divide_and_the_person_is_followed_and_words_without_times_are_of_n
     assert scanned["followed"] == (3.0,)
 
 
-@pytest.mark.long
-@pytest.mark.usefixtures("scanned")
-def test_lists_and_other_recordings_decide_the_splits(talk, talk_file, tmp_path):
-    (talk.parent / "test.txt").write_text("talk\n")
-    corpus = Corpus.open(prepare(talk.parent, tmp_path / "listed", workers=1).corpus)
-    assert {corpus.utterance(name).split for name in corpus.names()} == {"test"}
-    (talk.parent / "test.txt").unlink()
-    shutil.copy(talk_file, talk.parent / "second.mkv")
-    corpus = Corpus.open(prepare(talk.parent, tmp_path / "two", workers=1).corpus)
-    assert len(corpus) == 20
-    assert {corpus.utterance(name).split for name in corpus.names()} == {"train"}
-
-
 @pytest.mark.usefixtures("scanned")
 def test_silence_is_refused(tmp_path):
     silent = write_talk(tmp_path / "talks" / "talk.mkv", [])
@@ -167,44 +154,6 @@ def test_silence_is_refused(tmp_path):
     with pytest.raises(CorpusError, match=r"the first, talk: .*talk\.mkv: no speech in it"):
         prepare(silent, tmp_path / "other", workers=1)
     assert not (tmp_path / "other").exists()
-
-
-@pytest.mark.video
-@pytest.mark.recordings
-def test_clips_one_after_the_other(recordings, tmp_path):
-    """Eleven sentences of one speaker and one of another in one file: the other is left out, motion is as it was."""
-    pytest.importorskip("mediapipe")
-    names = (recordings / "grid-s1" / "val.txt").read_text().split()[:11]
-    clips = [recordings / "grid-s1" / "clips" / f"{name}.mkv" for name in names]
-    clips.insert(5, sorted((recordings / "grid-others").glob("*.mpg"))[0])
-    clips.insert(6, clips[5])
-    joined(clips, tmp_path / "talk.mkv")
-    report = prepare(tmp_path / "talk.mkv", tmp_path / "corpus", workers=1, crops=False)
-    corpus = Corpus.open(report.corpus)
-    usual = [track(clip, crops=False).motion["opening"] for clip in clips]
-    likenesses = []
-    for name in report.prepared:
-        found = corpus.utterance(name)
-        start = round(float(found.source["start_s"]) * 25)
-        clip, first = divmod(start, 75)
-        count = min(len(found.track.seen), 75 - first)
-        assert clip not in (5, 6)
-        likenesses.append(np.corrcoef(found.track.motion["opening"][:count], usual[clip][first : first + count])[0, 1])
-    assert len(likenesses) >= 8
-    assert min(likenesses) > 0.97
-    assert [name for name in report.failed if "another face" in report.failed[name]]
-
-
-def joined(clips: list[Path], path: Path) -> None:
-    """Write clips of 75 frames one after the other, with their sound."""
-    from vision.variants import frames_of
-
-    images, samples = [], np.zeros(3 * RATE * len(clips))
-    for number, clip in enumerate(clips):
-        frames, sound = frames_of(clip)[:75], read_sound(clip).samples[: 3 * RATE]
-        images += frames + frames[-1:] * (75 - len(frames))
-        samples[3 * RATE * number :][: len(sound)] = sound
-    write_video(path, images, (360, 288), samples, crf="8")
 
 
 def spans(stretches: list[SpokenPart], cuts_s: Sequence[float] = (), duration_s: float = 100.0) -> list[SpokenPart]:
@@ -345,13 +294,6 @@ def corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Corpus:
     return made
 
 
-def test_curves_without_lips_are_passed_over(corpus):
-    one = corpus.utterance("here0")
-    jaw = types.Track(types.Motion(np.zeros((75, 1)), 25.0, (types.Channel("jaw"),)), np.ones(75, bool))
-    corpus.add(replace(one, name="jaw", track=jaw))
-    assert set(measure_offsets(corpus).clips) == set(corpus.names()) - {"jaw"}
-
-
 def test_each_collection_has_its_own(corpus):
     found = measure_offsets(corpus)
     assert found.collections["there"].late_s - found.collections["here"].late_s == pytest.approx(0.12, abs=0.01)
@@ -378,14 +320,6 @@ def test_sync_moves_what_is_late_once(corpus):
     assert abs(measure_offsets(again).collections["there"].late_s) < 0.005
     assert "there" not in remove_offsets(again)
     assert module.move_sound(one, 0.02).source["offset_removed_ms"] == f"{1000 * late_s + 20:.1f}"
-
-
-def test_early_sound_gets_a_beginning(corpus):
-    late = corpus.utterance("here0")
-    moved = module.move_sound(late, -0.1)
-    assert moved.audio.duration_s == pytest.approx(late.audio.duration_s + 0.1)
-    np.testing.assert_array_equal(moved.audio.samples[1600:], late.audio.samples)
-    assert float(moved.source["offset_removed_ms"]) == -100
 
 
 def test_labels_move_with_the_sound(corpus):

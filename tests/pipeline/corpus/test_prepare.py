@@ -1,8 +1,5 @@
-import json
 import os
 import shutil
-import signal
-import sys
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -12,14 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from children import NOWHERE, child
 from lipmotion import Corpus, prepare
 from lipmotion.errors import ExportError, InputError, MissingDependencyError
 from lipmotion.pipeline.training.prompts import cover_greedily, find_units, prompts
 from lipmotion.storage.locks import lock_folder
 from lipmotion.types import Channel, Item, Motion, Progress, Span, Timeline, Track, Unit
-from lipmotion.units import PHONES, Lexicon, find_similar_lips
-from lipmotion_faces.corpus.coverage import coverage_to_json, format_coverage, measure_coverage, measure_phone_distances
+from lipmotion.units import PHONES, Lexicon
+from lipmotion_faces.corpus.coverage import measure_coverage, measure_phone_distances
 from pipeline.made import replace_tracking, write_noise
 from testing.toy import toy_utterances
 
@@ -172,25 +168,6 @@ def test_another_speaker_may_use_the_same_names(studio, tmp_path):
 
 
 @pytest.mark.usefixtures("tracked")
-def test_the_outcome_of_every_recording_is_reported_at_once(studio, tmp_path, capsys):
-    write_noise(studio / "broken.mp4", seed=5)
-    (studio / "empty.mp4").touch()
-    prepare(studio, tmp_path / "corpus", workers=1, crops=False)
-    (studio / "b.txt").write_text("Goodbye.")
-    events: list[Progress | Item] = []
-    prepare(studio, tmp_path / "corpus", workers=1, crops=False, monitor=events.append)
-    found = {event.name: event.outcome for event in events if isinstance(event, Item)}
-    assert found == {"a": "kept", "b": "prepared", "broken": "skipped", "c": "kept", "empty": "skipped"}
-    reasons = {event.name: event.reason for event in events if isinstance(event, Item)}
-    assert reasons["b"] == "no face in 2 frames, interpolated"
-    assert "no face in 25 of 25 frames" in reasons["broken"]
-    progress = [event for event in events if isinstance(event, Progress)]
-    assert [event.step for event in progress] == list(range(progress[0].steps + 1))
-    assert progress[-1].share == 1
-    assert capsys.readouterr() == ("", "")
-
-
-@pytest.mark.usefixtures("tracked")
 def test_two_at_a_time_are_refused(studio, tmp_path):
     with lock_folder(tmp_path / "corpus"):
         (tmp_path / "corpus" / ".part-of-the-other").touch()
@@ -199,76 +176,6 @@ def test_two_at_a_time_are_refused(studio, tmp_path):
         assert (tmp_path / "corpus" / ".part-of-the-other").exists()
     assert len(prepare(studio, tmp_path / "corpus", workers=1).prepared) == 3
     assert [path.name for path in sorted((tmp_path / "corpus").iterdir())] == ["corpus.json", "utterances"]
-
-
-@pytest.fixture
-def clips(recordings: Path, tmp_path: Path) -> Path:
-    """Six GRID clips."""
-    pytest.importorskip("mediapipe")
-    source = recordings / "grid-s1" / "clips"
-    if not source.is_dir():
-        pytest.skip("the real recordings are not here")
-    folder = tmp_path / "clips"
-    folder.mkdir()
-    for path in sorted(source.glob("*.mkv"))[:6]:
-        (folder / path.name).symlink_to(path)
-    return folder
-
-
-SCRIPT = """
-import sys
-import time
-from pathlib import Path
-from lipmotion_faces.corpus.prepare import prepare
-from lipmotion.types import Item
-
-items = []
-
-def hold(event):
-    items.append(isinstance(event, Item))
-    if sum(items) == 2:
-        print("two are done", flush=True)
-        while True:
-            time.sleep(0.05)  # a signal that comes just before one long sleep would be handled after it
-
-if __name__ == "__main__":
-    prepare(Path(sys.argv[1]), Path(sys.argv[2]), workers=2, monitor=hold)
-"""
-
-
-def prepare_partly(script: Path, folder: Path, corpus: Path, stop: signal.Signals) -> None:
-    """Prepare in another process, which goes no further than the first utterances, and stop it when they are there.
-
-    Each worker may finish one more meanwhile.
-    """
-    script.write_text(SCRIPT)
-    with child([sys.executable, script, folder, corpus], stderr=NOWHERE) as process:
-        assert process.stdout.readline() == "two are done\n"
-        if stop == signal.SIGINT:
-            os.killpg(process.pid, stop)  # as Ctrl-C does: the workers get it, too
-        else:
-            process.send_signal(stop)
-        assert process.stdout.read() == ""  # workers of a killed run end by themselves
-        assert process.wait() != 0
-
-
-@pytest.mark.long
-@pytest.mark.video
-@pytest.mark.recordings
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGKILL])
-def test_real_clips_in_two_processes_stopped_and_gone_on(clips, tmp_path, stop):
-    prepare_partly(tmp_path / "script.py", clips, tmp_path / "corpus", stop)
-    done = len(list((tmp_path / "corpus").glob("utterances/[a-z]*")))
-    assert 2 <= done <= 4
-    if stop == signal.SIGINT:
-        assert len(Corpus.open(tmp_path / "corpus")) == done
-    report = prepare(clips, tmp_path / "corpus", workers=2)
-    assert len(report.kept) == done
-    assert len(report.prepared) == 6 - done
-    assert not list((tmp_path / "corpus").rglob(".part-*"))
-
-    prepare(clips, tmp_path / "whole", workers=1)
-    assert content(tmp_path / "corpus") == content(tmp_path / "whole")
 
 
 WORDS = Lexicon({"pab": (("p", "aa", "b"),), "tib": (("t", "iy", "b"),), "zog": (("zh", "oy", "g"),)})
@@ -300,22 +207,6 @@ def test_counts_and_shares(tmp_path):
     assert diphones.missing[0].share == pytest.approx(2 / 15)
     assert triphones.share == pytest.approx(5 / 12)
     assert {unit.unit for unit in triphones.missing} == {"sil-t-iy", "t-iy-b", "iy-b-sil", "aa-b-t", "b-t-iy"}
-
-
-def test_what_stands_in(tmp_path):
-    corpus = corpus_of(tmp_path / "corpus", "pab pab tib")
-    lexicon = Lexicon(WORDS.user | {"bad": (("b", "aa", "d"),), "dib": (("d", "iy", "m"),)})
-    text = write_lines(tmp_path / "text", "bad dib")
-    phones, diphones, triphones = measure_coverage(corpus, text, lexicon=lexicon).kinds
-    stand_ins = {unit.unit: (unit.stand_in, unit.recorded) for unit in phones.missing}
-    assert stand_ins["d"] == ("t", 1)
-    assert stand_ins["m"][0] == find_similar_lips("m", {"p", "aa", "b", "t", "iy"}) == "p"
-    nearest = {unit.unit: (unit.stand_in, unit.recorded) for unit in diphones.missing}
-    assert nearest["sil-b"] == ("sil-p", 1)
-    assert nearest["b-aa"] == ("p-aa", 2)
-    assert nearest["d-iy"] == ("t-iy", 1)
-    assert nearest["iy-m"] == ("iy-b", 1)
-    assert {unit.unit: unit.stand_in for unit in triphones.missing}["d-iy-m"] == "t-iy-b"
 
 
 def test_the_nearest_has_the_least_distance(tmp_path, toy_corpus):
@@ -360,18 +251,6 @@ def test_sentences_of_the_package_and_what_is_not_counted(tmp_path):
     assert found.kinds[0].share > found.kinds[1].share > found.kinds[2].share > 0
 
 
-def test_text_is_bounded_and_json_holds_everything(tmp_path):
-    found = measure_coverage(corpus_of(tmp_path / "corpus", "see bob"))
-    lines = list(format_coverage(found, 5))
-    assert len(lines) == 4 + 3 * (2 + 5 + 1)
-    assert max(map(len, lines)) < 80
-    more = [f"and {len(kind.missing) - 5} more {kind.kind}" for kind in found.kinds]
-    assert [line for line in lines if line.startswith("and ")] == more
-    document = json.loads(json.dumps(coverage_to_json(found)))
-    assert [len(kind["missing"]) for kind in document["kinds"]] == [len(kind.missing) for kind in found.kinds]
-    assert set(document["kinds"][0]["missing"][0]) == {"unit", "count", "share", "stand_in", "recorded"}
-
-
 SETS = st.lists(st.sets(st.integers(0, 11), min_size=1), min_size=1, max_size=8)
 
 
@@ -404,19 +283,6 @@ def test_units_of_a_word():
         *[("diphone", "sil", "t"), ("diphone", "t", "uw"), ("diphone", "uw", "sil")],
         *[("beside", "[sip]-t"), ("beside", "t+[lr2]"), ("beside", "[al]-uw"), ("beside", "uw+[sip]")],
     }
-
-
-def test_the_list_in_the_package():
-    found = prompts(count=1000)
-    assert found.left_out == {}
-    assert found.sentences >= 300
-    assert found.phones == 42  # all that the dictionary uses; it has no em, en, el
-    texts = [prompt.text for prompt in found.chosen]
-    assert len(set(texts)) == len(texts)
-    assert (found.chosen[-1].phones, found.chosen[-1].diphones) == (found.phones, found.diphones)
-    assert found.diphones > 1000
-    for text in texts:
-        assert 5 <= len(text.split()) <= 10
 
 
 def test_coverage_is_what_the_sentences_hold():

@@ -241,15 +241,6 @@ def test_other_channels_than_lip_distances(toy_model, toy_corpus, known, tmp_pat
     assert "left out, for they do not move: brow, noise" in format_figures(figures)
 
 
-def test_a_model_of_two_features_is_compared_by_these(toy_model, toy_corpus, known):
-    two = {name: motion.selected(("opening", "width")) for name, motion in known.items()}
-    engine = Medium(SimpleNamespace(channels="opening width"))
-    figures = evaluate(replace(toy_model, engine=engine, learned=two), toy_corpus)
-    for condition in figures["conditions"].values():
-        assert list(condition["channels"]) == ["opening", "width"]
-        assert condition["closures"]["score"] == 1
-
-
 def test_a_model_of_other_motion_is_refused(toy_model, toy_corpus, known, tmp_path):
     first, second = held_out(toy_corpus)
     faces = corpus_of(tmp_path, [renamed_utterance(first)])
@@ -266,15 +257,6 @@ def test_a_model_of_other_motion_is_refused(toy_model, toy_corpus, known, tmp_pa
     frozen = [replace(u, track=replace(u.track, motion=m)) for u, m in zip(frozen, motions, strict=True)]
     with pytest.raises(CorpusError, match="none of 5 motion channels moves in these 2 utterances"):
         evaluate(toy_model, corpus_of(tmp_path / "frozen", frozen))
-
-
-def test_one_speaker(toy_model, toy_corpus, tmp_path):
-    first, second = held_out(toy_corpus)
-    both = corpus_of(tmp_path, [replace(first, speaker="anna"), replace(second, speaker="ben")])
-    alone = corpus_of(tmp_path / "alone", [first])
-    one = evaluate(toy_model, both, selection=Selection("test", speakers=["anna"]))
-    assert one["clips"] == 1
-    assert one == evaluate(toy_model, alone)
 
 
 def test_labelled_phones_are_the_reference(toy_model, toy_corpus, tmp_path):
@@ -300,15 +282,6 @@ def test_closings_elsewhere_are_counted_per_minute_of_other_speech():
     recordings = SimpleNamespace(channels=("opening",), closed_under=0.1, eigenlips_channels=())
     lips = measure_clips([clip], recordings, 0)["closures_p_b_m"]  # type: ignore[arg-type]
     assert (lips["false_per_minute"], lips["original_per_minute"]) == pytest.approx((6, 0))
-
-
-def test_guessed_words_are_reported_and_a_lexicon_gives_pronunciations(toy_model, toy_corpus, tmp_path, caplog):
-    names = {"papa": "pahpa", "mama": "日本"}
-    changed = [replace(u, words=tuple(names.get(word, word) for word in u.words or ())) for u in held_out(toy_corpus)]
-    lexicon = Lexicon({"日本": (("m", "aa", "m", "ax"),)})
-    figures = evaluate(toy_model, corpus_of(tmp_path, changed), lexicon=lexicon)
-    assert figures["conditions"]["with transcript"]["acc"] > 0.7
-    assert [record.getMessage().split()[0] for record in caplog.records] == ["'pahpa'"]
 
 
 SPEECH = motion()

@@ -47,13 +47,6 @@ def names(found: list[takes.Take]) -> list[str]:
     return [take.name for take in found]
 
 
-def test_one_video(make_videos):
-    video = make_videos("a") / "a.mkv"
-    (take,) = choose_takes(video)
-    assert (take.name, take.file, take.collection, take.speaker) == ("a", video, "filmed/anna", "")
-    assert (take.span.start_s, take.span.end_s) == (0.0, MAX_FOOTAGE_S)
-
-
 def test_of_a_folder_with_lists_the_training_list(make_videos):
     folder = make_videos("a", "b", "c", "d")
     (folder / "train.txt").write_text("b\nd\n")
@@ -216,22 +209,6 @@ def test_short_footage_is_refused(videos):
 
 
 @pytest.mark.long
-def test_what_is_not_enough_is_said(videos, tracker, caplog):
-    """Frames in which the face is not seen do not count."""
-    half = {path: np.arange(200) % 2 == 0 for path in list(videos)[:1]}
-    tracker(half, least_s=5.0)
-    face = build_face(folder_of(videos), workers=1)
-    frames = sum(len(video.motion.values) for video in videos.values())
-    first = len(next(iter(videos.values())).motion.values)
-    assert face.about["footage_s"] == pytest.approx((frames - first / 2) / 25, abs=0.1)
-    assert "s of footage with the face; with 60 s of varied speech the mouth would be truer" in caplog.text
-    assert face.about["name"] == "anna"
-    tracker({path: np.arange(200) % 5 == 0 for path in videos}, least_s=5.0)
-    with pytest.raises(InputError, match=r"1\.\d s of footage with the face, required 5 s or more"):
-        build_face(folder_of(videos), workers=1)
-
-
-@pytest.mark.long
 def test_recordings_that_cannot_be_used_are_left_out(videos, tracker):
     tracker({next(iter(videos)): np.zeros(0, bool)}, least_s=5.0)
     events: list[Event] = []
@@ -255,19 +232,6 @@ def test_footage_without_sound(tracker, tmp_path):
     level = face.appearance.with_jaw_of_sound(codes, np.full(len(codes), QUIETEST_DB))
     assert np.isfinite(level.chin_px).all()
     assert level.chin_px == pytest.approx(np.full(len(codes), toy_chin_px(video.motion).mean()), abs=1)
-
-
-@pytest.mark.long
-def test_fast_video_is_learned_from_in_part(tracker, tmp_path):
-    """Of 60 frames a second every second is enough; seconds are counted, not frames."""
-    video = write_video(tmp_path / "fast.mp4", toy_sentences(3)[0], 60.0)
-    tracker(more={video.path.resolve(): video}, least_s=2.0)
-    face = build_face(video.path, workers=1)
-    seconds = len(video.motion.values) / 60
-    assert face.about["footage_s"] == pytest.approx(seconds, abs=0.1)
-    assert len(face.appearance.mouths) <= round(seconds * 30) + 1
-    assert face.background.video.rate_hz == pytest.approx(60.0)
-    assert len(face.background.video) == len(video.motion.values)
 
 
 def test_what_is_left_of_the_seconds_may_be_less_than_a_frame(tmp_path):

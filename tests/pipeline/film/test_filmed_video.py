@@ -12,7 +12,7 @@ import pytest
 from lipmotion import FilmedFace, Outputs, Request, animate, write
 from lipmotion.errors import ExportError, InputError, ModelFormatError
 from lipmotion.pipeline.outputs.output import OutputSettings
-from lipmotion.types import Audio, Channel, Item, Motion, Progress, Span, Timeline, Track, Unit
+from lipmotion.types import Audio, Channel, Motion, Span, Timeline, Track, Unit
 from lipmotion_faces.film import background
 from lipmotion_faces.film.filmed_video import find_other_person, is_person_of, make_film, predict_codes, write_film
 from lipmotion_faces.filmed.renderer import AS_PRINTED, Background, Stitcher
@@ -105,23 +105,6 @@ def test_the_refinement_as_printed(filmed_face, brief):
             nearest = np.linalg.norm(candidates - own, axis=1).argmin()
             detailed = space.expand(values[None])[0, ..., colour] + kept[nearest, ..., colour]
             assert np.abs(made[row + 1, ..., colour] - np.clip(detailed, 0, 255)).max() < 2
-
-
-@pytest.mark.long
-def test_sound_and_pictures_are_as_long(filmed_face, motion, toy_sentence, tmp_path):
-    events: list[Progress | Item] = []
-    film = make_film(filmed_face, motion)
-    write_film(tmp_path / "a.mp4", film, toy_sentence.audio, monitor=events.append)
-    frames, rate, _ = pictures(tmp_path / "a.mp4")
-    assert rate == 25
-    assert len(frames) / 25 == pytest.approx(toy_sentence.audio.duration_s, abs=0.08)
-    drawn = list(make_film(filmed_face, motion).frames)
-    assert np.abs(np.stack(frames).astype(int) - np.stack(drawn)).mean() < 2
-    shares = [event.share for event in events if isinstance(event, Progress)]
-    assert len(shares) == len(events) > 2
-    assert shares == sorted(shares)
-    assert shares[-1] == pytest.approx(1.0)
-    assert {event.steps for event in events} == {film.count} == {len(frames)}
 
 
 @pytest.mark.long

@@ -1,9 +1,6 @@
-import sys
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from hashlib import sha256
 from itertools import islice
-from threading import Barrier
 from typing import Any
 
 import numpy as np
@@ -138,7 +135,7 @@ def test_a_phone_is_split_and_words_are_said_otherwise(session):
     split = session.units(edited(f"split phone 3 at {middle_s}", "phone 4 is m"))
     assert phones(split) == [*phones(plain)[:3], "m", *phones(plain)[3:]]
     assert split[2].end_s == split[3].start_s == middle_s
-    with pytest.raises(InputError, match="required a time at least"):
+    with pytest.raises(InputError, match=r"required .* between the phones beside it"):
         session.units(edited(f"split phone 3 at {third.start_s}"))
     word = next(span.label.word for span in plain if span.label.word)
     said = session.units(edited(f"word 1 is {word} said m aa m"))
@@ -148,6 +145,8 @@ def test_a_phone_is_split_and_words_are_said_otherwise(session):
     assert {span.label.word for span in other} - {""} == {"mama"}
     assert other[0].start_s == 0
     assert other[-1].end_s == pytest.approx(last_s, abs=1e-3)
+    spelt = session.units(edited(f"say mama from 0 to {last_s:.3f} with mama b ow b"))
+    assert [span.label.phone for span in spelt if span.label.word] == ["b", "ow", "b"]
 
 
 def test_what_is_drawn_and_held_is_so_and_the_rest_joins_smoothly(session):
@@ -303,27 +302,6 @@ def test_single_pictures_are_those_of_the_video(session, request_):
         pictures.draw(9)
 
 
-@pytest.mark.long
-def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model, toy_sentence):
-    """Each alone and both at once give the same bits; the matrix products of one do not change those of the other."""
-    requests = [Request(toy_sentence.audio, " ".join(toy_sentence.words)), Request(toy_sentence.audio)]
-    edits = [edited("phone 3 is p"), edited("pin opening 0.05 at 1.0")]
-    both = Barrier(2)
-
-    def generate(number: int) -> np.ndarray:
-        return Session(requests[number], model=toy_model).generate(edits[number]).motion.values
-
-    def work(number: int) -> list[np.ndarray]:
-        both.wait(60)
-        return [generate(number) for _ in range(3)]
-
-    alone = [generate(number) for number in range(2)]
-
-    with ThreadPoolExecutor(2) as pool:
-        for number, found in enumerate(pool.map(work, range(2))):
-            assert all(np.array_equal(values, alone[number]) for values in found)
-
-
 TIMES = 12
 """How often the sentence is said in the long recording."""
 UNSEEN = 0.01
@@ -431,7 +409,7 @@ def test_every_kind_of_edit_is_a_sentence():
         ("set loudness 2", "nothing is called 'loudness'; required one of: intensity"),
         ("set intensity loud", "required a number"),
         ("set intensity 9", "required 0 to 3"),
-        ("set stepped maybe", "required one of: true, false"),
+        ("set stepped maybe", "required true or false"),
     ],
 )
 def test_sentences_that_state_no_edit(sentence, message):
@@ -450,18 +428,13 @@ def test_delivery_and_staging_are_set_where_nothing_else_is_asked_for():
     assert Edits().then("set mood tense:0.5").delivery().mood == "tense:0.5"
 
 
-@pytest.mark.parametrize("suffix", [".json", ".toml"])
-def test_what_is_written_is_read_again(tmp_path, suffix):
-    path = tmp_path / f"a.edits{suffix}"
+def test_what_is_written_is_read_again(tmp_path):
+    path = tmp_path / "a.edits.json"
     spans = (Span(0.0, 0.3, Unit("sil")), Span(0.3, 1 / 3 + 0.1, Unit("p", "sil-p+l", 'pl"ease', confidence=0.25)))
     outlook = Outlook("words", 0.5, None, 30.5, ("a \\ transcript",))
     named = Request(tmp_path / "in" / "a b.wav", pauses="natural")
     file = EditFile(Edits().then(*SENTENCES), named, Timeline(spans), outlook, sha256="ab")
     write_edits(file, path)
-    if suffix == ".toml" and sys.version_info < (3, 11):
-        with pytest.raises(InputError, match=r"read by Python 3\.11"):
-            read_edits(path)
-        return
     found = read_edits(path)
     assert (found.edits, found.units, found.outlook) == (file.edits, file.units, file.outlook)
     assert (found.named, found.sha256) == (file.named, "ab")

@@ -1,6 +1,5 @@
 import multiprocessing
 import re
-import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -19,7 +18,6 @@ from lipmotion.pipeline import workers
 from lipmotion.pipeline.training import labels
 from lipmotion.pipeline.training.other_speakers import align_recordings, is_held_out_speaker, synthesise_sentences
 from lipmotion.speech.sound.acoustic_conditions import mark_spoken
-from lipmotion.speech.voices.installed import list_installed
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.types import Audio, Item, Monitor, Progress, Timeline, Unit, silent_monitor
 from lipmotion.units import Lexicon, split_words
@@ -101,24 +99,6 @@ def test_stopped_after_any_event(corpus, whole, work, tmp_path):
         assert content(run(corpus, work), tmp_path) == whole, number
         for path in work.iterdir():
             path.unlink()
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("what", ["corpus", "lexicon"])
-def test_another_job_starts_over(corpus, work, tmp_path, what):
-    run(corpus, work)
-    options: dict[str, object] = {"recogniser": CONFIG}
-    if what == "corpus":
-        shutil.copytree(corpus.path, tmp_path / "other")
-        corpus = Corpus.open(tmp_path / "other")
-        utterance = corpus.utterance("toy01")
-        values = utterance.features.values.copy()
-        values[5, 5] += 0.1
-        corpus.add(replace(utterance, features=replace(utterance.features, values=values)))
-    else:
-        options["lexicon"] = Lexicon({"papa": (("p", "ae", "p", "ax"),)})
-    expected = content(train(corpus, **options)[0], tmp_path)  # type: ignore[arg-type]
-    assert content(train(corpus, **options, run=Run(work=work))[0], tmp_path) == expected  # type: ignore[arg-type]
 
 
 @pytest.mark.long
@@ -232,16 +212,6 @@ def test_sentences_stand_between_pauses_over_a_faint_noise():
     assert sentence.phones[-1].end_s == pytest.approx(1.1)
 
 
-@pytest.mark.long
-@pytest.mark.usefixtures("spoken")
-def test_texts_by_default_say_every_phone_of_the_dictionary():
-    sentences = list(synthesise_sentences(voices=VOICES[:1]))
-    said = {span.label.phone for sentence in sentences for span in sentence.phones}
-    assert len(sentences) == 60
-    assert {"er", "hh", "ng", "oy", "sh", "uh", "zh"} <= said
-    assert len(said) == 43  # 42 of the dictionary, and silence
-
-
 def test_sides_never_change():
     named = {"slt": True, "espeak-f2": True, "espeak-m7": True, "kal": False, "awb": False, "rms": False}
     assert {speaker: is_held_out_speaker(speaker) for speaker in named} == named
@@ -253,7 +223,7 @@ def test_a_quarter_is_kept_aside():
 
 
 def test_without_voices_it_says_what_to_install():
-    with pytest.raises(MissingDependencyError, match="apt install flite festival festvox-us-slt-hts espeak-ng"):
+    with pytest.raises(MissingDependencyError, match="apt install flite festival festvox-us-slt-hts"):
         next(synthesise_sentences(TEXTS, ()))
 
 
@@ -335,14 +305,3 @@ def test_a_folder_without_transcripts(tmp_path, own, toy_sentence, name):
     write(tmp_path / "unsaid.wav", toy_sentence.audio)
     with pytest.raises(CorpusError, match="no such folder" if name else "no recording with a transcript"):
         next(align_recordings(tmp_path / name, own))
-
-
-@pytest.mark.skipif(not any(map(shutil.which, ("flite", "festival", "espeak-ng"))), reason="no synthesiser is here")
-def test_real_voices():
-    voices = list_installed()[-1:]
-    if not voices:
-        pytest.skip("the synthesisers have no voices")
-    (sentence,) = synthesise_sentences(["My baby may be home."], voices)
-    closed = [span.label.phone for span in sentence.phones if span.label.phone in ("m", "b")]
-    assert closed == list("mbbmbm")
-    assert sentence.phones[0].duration_s >= 0.25

@@ -7,9 +7,9 @@ import stat
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import Field, dataclass, fields, replace
+from dataclasses import Field, fields, replace
 from pathlib import Path
-from typing import IO, Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from lipmotion.cli.terminal.printing import write_bytes
 from lipmotion.errors import InputError
@@ -20,36 +20,22 @@ from lipmotion.types.configuration import Configuration, kind_of
 from lipmotion.types.delivery import Delivery, Staging
 
 
-@dataclass(frozen=True)
-class InputArgument:
-    """An argument that names an input file or folder.
-
-    name         : of the option in the namespace
-    what         : noun for it in error messages
-    replaceable  : read completely before anything is written, so that an output may replace it
-    is_text      : may be a text instead of a path: a folder of that name is then not an input
-    default_path : returns the input that is read where the argument is left out
-    """
+class InputArgument(NamedTuple):
+    """An argument that names an input file or folder; ``name``: of the option in the namespace."""
 
     name: str
-    what: str
-    replaceable: bool
-    is_text: bool
-    default_path: Callable[[], Path] | None
+    what: str  # a noun for it, in messages
+    replaceable: bool  # it is read completely before anything is written, so that an output may replace it
+    is_text: bool  # it may be a text instead of a path: a folder of that name is then not an input
+    default_path: Callable[[], Path] | None  # returns the input that is read where the argument is left out
 
 
-@dataclass(frozen=True)
-class OutputArgument:
-    """An argument that names an output file or folder.
-
-    name       : of the option in the namespace
-    is_folder  : whether it is a folder
-    keeps_work : whether finished stages are kept in a folder beside it (``locks.keep_unfinished``)
-    """
+class OutputArgument(NamedTuple):
+    """An argument that names an output file or folder."""
 
     name: str
     is_folder: bool
-    keeps_work: bool
+    keeps_work: bool  # finished stages are kept in a folder beside it (``locks.keep_unfinished``)
 
 
 def add_input(
@@ -159,8 +145,15 @@ def read_pipe(path: Path) -> Iterator[Path]:
         stored = folder / "standard-input"
         if str(path) == PIPE and sys.stdin is None:
             raise InputError("standard input is closed; required: a recording, as of 'ffmpeg ... -f wav -'")
-        with nullcontext(sys.stdin.buffer) if str(path) == PIPE else path.open("rb") as source:
-            _copy(source, stored)
+        size, opened = 0, nullcontext(sys.stdin.buffer) if str(path) == PIPE else path.open("rb")
+        with opened as source, stored.open("wb") as target:
+            while block := source.read(BLOCK):
+                size += target.write(block)
+                if size > LARGEST_RECORDING_BYTES:
+                    most = f"more than {LARGEST_RECORDING_BYTES} bytes"
+                    raise InputError(f"{most} come through the pipe; save the recording as a file first")
+        if not size:
+            raise InputError("nothing comes through the pipe; required: a recording, as of 'ffmpeg ... -f wav -'")
         yield stored
 
 
@@ -182,21 +175,7 @@ def write_pipe(options: argparse.Namespace) -> Iterator[tuple[tuple[str, ...], b
         write_bytes(motion)
 
 
-def _copy(source: IO[bytes], target: Path) -> None:
-    size = 0
-    with target.open("wb") as file:
-        while block := source.read(BLOCK):
-            size += file.write(block)
-            if size > LARGEST_RECORDING_BYTES:
-                most = f"more than {LARGEST_RECORDING_BYTES} bytes"
-                raise InputError(f"{most} come through the pipe; save the recording as a file first")
-    if not size:
-        raise InputError("nothing comes through the pipe; required: a recording, as of 'ffmpeg ... -f wav -'")
-
-
 PartT = TypeVar("PartT", bound=Configuration)
-OF_ANIMATE = ("posteriors", "kinds")
-"""Outputs that other verbs do not write."""
 
 
 def add_options(
@@ -226,7 +205,7 @@ def add_outputs(parser: argparse.ArgumentParser, files: str, *, required: bool =
     files    : the suffixes that are possible, for the help
     required : whether there must be an output
     """
-    add_options(parser, Outputs, but=OF_ANIMATE, files={"help": files, "required": required})
+    add_options(parser, Outputs, but=("kinds",), files={"help": files, "required": required})
     add_options(parser, Staging)
     add_options(parser, Delivery)
     add_detail(parser)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -104,7 +103,7 @@ def animate_one_by_one(job: Job, paths: Sequence[Path], options: argparse.Namesp
     the recordings are used, as a corpus and a batch use them. Faces and characters are opened once.
     Returns False, and does nothing, where there is one recording and its outputs are files.
     Raises ExportError: outputs that are not for several recordings, or that clash.
-    Raises InputError: a transcript, units or a picture of posteriors, which belong to one recording; or a pipe.
+    Raises InputError: a transcript, units or edits, which belong to one recording; or a pipe.
     Raises the error of the highest exit code among those that occurred, with the number of recordings that failed.
     """
     from lipmotion.pipeline.model import load_model
@@ -114,7 +113,6 @@ def animate_one_by_one(job: Job, paths: Sequence[Path], options: argparse.Namesp
     _check_named(paths)
     recordings = list_recordings(paths)
     alone = {name: getattr(job.request, name) for name in ("transcript", "units", "edits")}
-    alone["posteriors"] = job.outputs.posteriors
     for name, value in alone.items():
         if value is not None and len(recordings) > 1:
             raise InputError(f"--{name} belongs to one recording, and there are {len(recordings)}; animate each alone")
@@ -148,24 +146,6 @@ def animate_one_by_one(job: Job, paths: Sequence[Path], options: argparse.Namesp
     _, speech, worst = max(failures, key=lambda failure: failure[0])
     kind = type(worst) if isinstance(worst, LipMotionError) else LipMotionError
     raise kind(f"{len(failures)} of {len(jobs)} recordings were not animated, {speech} for one") from worst
-
-
-@contextmanager
-def place_outputs(recording: Path, outputs: Sequence[str], kind: str) -> Iterator[list[Path]]:
-    """Yield the output files of one recording; of folders, which are made, the files in them.
-
-    kind : suffix of a file in a folder, without the dot
-    If the block fails, no new folders are left.
-    Raises InputError: a folder for what comes through a pipe. Raises ExportError: as ``plan_outputs``.
-    """
-    if not any(map(is_for_several, outputs)):
-        yield [Path(output) for output in outputs]
-        return
-    _check_named([recording])
-    (planned,) = plan_outputs([recording], outputs, [kind])
-    files = [Path(file) for file in planned]
-    with create_folders({file.parent for file in files}):
-        yield files
 
 
 def _check_named(recordings: Sequence[Path]) -> None:

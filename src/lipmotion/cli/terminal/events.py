@@ -93,14 +93,6 @@ if TYPE_CHECKING:
     from typing import Any
 
 OPTIONS = ("--machine-readable", "--machineReadable")
-STATUS_VERBS, LINES_VERBS = (
-    ("cues",),
-    (
-        *("animate", "batch", "render", "edit", "face", "speak", "words", "corpus", "train"),
-        *("evaluate", "compare", "experiment", "study", "doctor"),
-    ),
-)
-
 STANDARD_OUTPUT = "-"
 
 
@@ -197,6 +189,6 @@ def create_events(words: Sequence[str]) -> Events:
     """Return the events that a command line asks for, before it is parsed: parsing errors are events, too."""
     requested = any(len(word) > 2 and option.startswith(word) for option in OPTIONS for word in words)
     verb = next((word for word in words if not word.startswith("-")), "")
-    if requested and verb in STATUS_VERBS:
-        return RhubarbStatus()
-    return JsonLines() if requested and verb in LINES_VERBS else Events()
+    if not requested:
+        return Events()
+    return RhubarbStatus() if verb == "cues" else JsonLines()

@@ -7,7 +7,6 @@ import errno
 import logging
 import os
 import sys
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from typing import Any
@@ -21,36 +20,11 @@ from lipmotion.storage.files import as_text
 from lipmotion.types.progress import Item, Progress, warnings_to
 
 
-class Report(ABC):
-    """Receives the events of long work."""
+class Report:
+    """Receives the events of long work. A bar and warnings go to standard error, the result to standard output.
 
-    @abstractmethod
-    def receive(self, event: Progress | Item) -> None:
-        """Show or write one event."""
-
-    @abstractmethod
-    def warn(self, text: str) -> None:
-        """Show or write a warning."""
-
-    @abstractmethod
-    def finish(self, text: str, **figures: Any) -> None:
-        """Give the result: ``text`` for a person, ``figures`` for a program."""
-
-    def close(self) -> None:
-        """Remove what is shown while the work lasts."""
-        return
-
-
-@contextmanager
-def report_progress(options: argparse.Namespace) -> Iterator[Report]:
-    """Yield the report of a command; meanwhile the package's warnings go to it, too."""
-    report = _MachineReport(options) if options.machine_readable else _TerminalReport(options)
-    with warnings_to(report.warn, propagate=False), closing(report):
-        yield report
-
-
-class _TerminalReport(Report):
-    """A progress bar and warnings on standard error, the bar only on a terminal; the result on standard output."""
+    The bar is shown on a terminal only.
+    """
 
     def __init__(self, options: argparse.Namespace) -> None:
         self._stopper: Stopper = options.stopper
@@ -58,6 +32,7 @@ class _TerminalReport(Report):
         self._bar: Any = None
 
     def receive(self, event: Progress | Item) -> None:
+        """Show or write one event."""
         self._stopper.check()
         if isinstance(event, Item):
             if event.reason:
@@ -74,19 +49,22 @@ class _TerminalReport(Report):
             self._bar.refresh()
 
     def warn(self, text: str) -> None:
+        """Show or write a warning."""
         text = f"warning: {text}"
         if self._bar is None:
             print_error(text)
         else:
             self._bar.write(with_program_name(text), file=sys.stderr)
 
-    def finish(self, text: str, **_: Any) -> None:
+    def finish(self, text: str, **figures: Any) -> None:  # noqa: ARG002
+        """Give the result: ``text`` for a person, ``figures`` for a program."""
         self.close()
         self._stopper.settle()
         if text:
             print_lines(text)
 
     def close(self) -> None:
+        """Remove what is shown while the work lasts."""
         if self._bar is not None:
             self._bar.close()
             self._bar = None
@@ -96,7 +74,7 @@ class _MachineReport(Report):
     """JSON events for the calling program."""
 
     def __init__(self, options: argparse.Namespace) -> None:
-        self._stopper: Stopper = options.stopper
+        super().__init__(options)
         self._events: JsonLines = options.events
 
     def receive(self, event: Progress | Item) -> None:
@@ -113,6 +91,14 @@ class _MachineReport(Report):
     def finish(self, text: str, **figures: Any) -> None:  # noqa: ARG002
         self._stopper.settle()
         self._events.succeed(**figures)
+
+
+@contextmanager
+def report_progress(options: argparse.Namespace) -> Iterator[Report]:
+    """Yield the report of a command; meanwhile the package's warnings go to it, too."""
+    report = (_MachineReport if options.machine_readable else Report)(options)
+    with warnings_to(report.warn, propagate=False), closing(report):
+        yield report
 
 
 NO_FOLDER = "the current folder has been deleted; go to one that exists"

@@ -6,7 +6,6 @@ import argparse
 import sys
 
 from lipmotion.cli.arguments.declared import (
-    OF_ANIMATE,
     add_job_file,
     add_options,
     add_outputs,
@@ -30,7 +29,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     many = {"nargs": "+", "help": "audio or video file, -: standard input; several, or a folder"}
     add_options(parser, Request, recording=many)
     add_outputs(parser, "FILE.mp4 .webm .mov %%05d.png .json .csv .vtt, ... (docs/formats.md); FOLDER/; -")
-    add_options(parser, Outputs, *OF_ANIMATE)
+    add_options(parser, Outputs, "kinds")
     for add_more in (add_job_file, add_pipe_format, add_execution):
         add_more(parser)
     parser.set_defaults(run=run)
@@ -50,7 +49,7 @@ def run(options: argparse.Namespace) -> None:
             job = job.of(speech, files)
             done = run_job(job, temporary=piped, workers=count_workers(options), monitor=report.receive)
             note = done.outlook.text if done.outlook is not None else ""
-        written = [str(path) for path in (*files, job.outputs.posteriors) if path and not pipe]
+        written = [] if pipe else list(files)
         report.finish("\n".join(map(printable, written)), files=written)
     if note and not options.machine_readable and sys.stderr is not None and sys.stderr.isatty():
         print_error(note)

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lipmotion.cli.arguments.declared import add_options, add_output, check_paths, is_pipe, pick_part, read_pipe
-from lipmotion.cli.arguments.options import Version, place_outputs
+from lipmotion.cli.arguments.declared import add_options, add_output, is_pipe, pick_part, read_pipe
+from lipmotion.cli.arguments.options import Version
 from lipmotion.cli.terminal.printing import flush_output, print_line, print_lines
 from lipmotion.cli.terminal.progress import LEVELS, print_status_lines
 from lipmotion.errors import shorten
@@ -17,7 +17,6 @@ from lipmotion.pipeline.request import Request
 from lipmotion.storage.files import as_text
 from lipmotion.storage.sources import Source, check_apart, is_file
 from lipmotion.types.delivery import Delivery
-from lipmotion.types.values import parse_whole
 
 RECOGNISERS = {"pocketsphinx": "auto", "phonetic": "fast"}
 """The recogniser that takes the place of each of Rhubarb's."""
@@ -46,19 +45,12 @@ def _dialogue(path: str) -> str | None:
 
 
 def _find_words(recording: Path) -> list[Source]:
-    """Return the words beside a recording, which are read where its folder is; none where they are cues made of it."""
+    """Return the words beside a recording, which no output may replace; none where they are cues made of it."""
     beside = recording.parent / f"{recording.stem}.txt"
     if not is_file(beside):
         return []
     with beside.open("rb") as file:
         return [] if SHEET.match(file.read(64)) else [Source(beside, "transcript", replaceable=True)]
-
-
-def _threads(text: str) -> int:
-    """Return a number of threads. Raises ArgumentTypeError: it is none, or under 1."""
-    if (count := parse_whole(text)) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r}, required: 1 or more")
-    return count
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -68,11 +60,11 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     add_options(parser, Request)
     add = parser.add_argument
-    outputs: dict[str, Any] = {"nargs": "+", "action": "extend", "default": [], "type": str}
-    files = "FILE.tsv .xml .json .dat .pgo .spine.json, or several; FOLDER/"
+    outputs: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
+    files = "FILE.tsv .xml .json .dat .pgo .spine.json, or several"
     add_output(parser, "-o", "--output", force=True, help=files, **outputs)
     kinds = ("tsv", "xml", "json", "dat", "pgo", "spine.json")
-    text = "(default: that of the suffix; tsv on standard output and in a folder)"
+    text = "(default: that of the suffix; tsv on standard output)"
     add("-f", "--format", "--exportFormat", type=str.lower, choices=kinds, help=text)
     add("--fps", type=float, default=24.0, help="frames per second of the animation (default: 24)")
     add("--hold", type=int, metavar="FRAMES", help="minimum length of a shape (default: that of two frames at 24 fps)")
@@ -96,7 +88,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     level: dict[str, Any] = {"type": str.lower, "choices": tuple(LEVELS), "metavar": "LEVEL"}
     add("--logLevel", dest="log_level", default="debug", help=f"of --logFile, from: {', '.join(LEVELS)}", **level)
     add("--consoleLevel", dest="console_level", default="warning", help="of messages on standard error", **level)
-    add("--threads", metavar="N", type=_threads, help="without effect: one recording needs one")
+    add("--threads", metavar="N", type=int, help="without effect: one recording needs one")
     add("-q", "--quiet", action="store_true", help="without effect: warnings and errors alone are printed")
     add("-v", "--version", action=Version, nargs=0, const=VERSION, help="print the version")
     parser.set_defaults(run=run, letters=False)
@@ -111,13 +103,10 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.model import load_model
     from lipmotion.pipeline.outputs.cues import check_cue_options, check_cue_outputs, cues, write_cues
 
-    piped = is_pipe(options.speech)
-    placed = place_outputs(options.speech, options.output, options.format or "tsv")
-    with print_status_lines(options) as set_progress, placed as options.output, read_pipe(options.speech) as speech:
+    with print_status_lines(options) as set_progress, read_pipe(options.speech) as speech:
         if [path.suffix.lower() in {"", ".txt"} for path in options.output] == [True]:
             options.format = options.format or "tsv"  # as Rhubarb writes whatever the name is
         check_apart(options.output, _find_words(Path(options.speech)), force=options.force)
-        check_paths(options)  # in a folder it may be a file that is read
         delivery, requested = pick_part(options, Delivery()), pick_part(options, Request(), recording=speech)
         check_cue_options(options.fps, options.hold, options.shapes)
         check_cue_outputs(options.output, speech, options.format)
@@ -125,12 +114,11 @@ def run(options: argparse.Namespace) -> None:
         request, model = read_request(requested), load_model(requested.model)
         set_progress(0.1)
         edits = edit_file(requested.edits)
-        result = animate(request, model=model, edits=edits)
-        delivery = edits.edits.delivery(delivery)
+        result, delivery = animate(request, model=model, edits=edits), edits.edits.delivery(delivery)
         set_progress(0.9)
         sheet = cues(result, fps=options.fps, hold_frames=options.hold, shapes=options.shapes, delivery=delivery)
         sheet = replace(sheet, blair=options.blair or not options.letters)
-        speech_path = "" if piped else speech
+        speech_path = "" if is_pipe(options.speech) else speech
         write_cues(sheet, options.output, speech=speech_path, form=options.format)
         set_progress(1.0)
         for path in options.output:

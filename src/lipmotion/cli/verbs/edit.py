@@ -15,7 +15,7 @@ from lipmotion.printable import printable
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("edit", help="change words, phones, curves of a recording's motion, in a file of edits")
-    add_output(parser, "file", metavar="FILE", help="file of edits, .json or .toml")
+    add_output(parser, "file", metavar="FILE", help="file of edits, .json")
     sentence = "'phone 12 ends 1.24', 'word 3 is blue', 'pin jawOpen 0.1 at 1.2', ... (docs/edit.md)"
     parser.add_argument("sentences", nargs="*", metavar="EDIT", help=sentence)
     add_input(parser, "--of", what="recording", metavar="RECORDING", help="begin a file of edits of this recording")

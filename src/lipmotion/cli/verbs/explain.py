@@ -61,26 +61,22 @@ def add_words(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 
 def run_words(options: argparse.Namespace) -> None:
-    """Call ``recognise_words`` and ``write_words``; print the words or the paths that were written."""
+    """Recognise words; print them, or the paths of the files that were written."""
     from lipmotion.pipeline.analysis.language import (
         check_word_outputs,
-        describe_word,
+        describe_words,
         format_words,
         recognise_words,
         write_words,
     )
 
     with report_progress(options) as report:
-        check_word_outputs(options.output, options.speech)
+        paths = check_word_outputs(options.output, options.speech)
         request = Request(options.speech, recogniser=options.recogniser)
         recognition = recognise_words(request, model=options.model, workers=count_workers(options))
-        words, similarity = recognition.words, recognition.similarity
-        write_words(words, options.output, options.speech)
+        write_words(recognition.words, paths)
         report.finish(
-            "\n".join(map(str, options.output)) or format_words(words).removesuffix("\n"),
-            words=[describe_word(span) for span in words],
-            word_s=round(recognition.word_s, 2),
-            phone_s=round(recognition.phone_s, 2),
+            "\n".join(map(str, options.output)) or format_words(recognition.words).removesuffix("\n"),
+            words=describe_words(recognition.words),
             confidence=round(recognition.confidence or 0.0, 3),
-            similarity=None if similarity is None else round(similarity, 2),
         )

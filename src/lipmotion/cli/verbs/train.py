@@ -15,8 +15,6 @@ from lipmotion.storage.files import check_target
 
 FROM = "stand on this model (default: the one that ships), or 'none' (docs/own-model.md)"
 NONE = "none"
-
-
 ENGINE = "trajectory (default), coupled (chains of states), joint (one model, five streams) or selection (recordings)"
 PRESET = (
     "a system of a paper, which names its engine: hofer2008, minnis2000, xieliu2007, or also, or instead, one of the "

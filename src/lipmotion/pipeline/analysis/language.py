@@ -1,4 +1,4 @@
-"""The language of a request, found by text and sound and its transcript; the words of a recording."""
+"""The language of a request, found by its transcript and its sound; the words of a recording."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Request, SpeechInput, as_request
 from lipmotion.speech.recognition.network.posteriors import WORD_BOUNDARY, find_installed_recogniser, find_stretches
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
-from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, USING_WORDS, open_recogniser
+from lipmotion.speech.recognition.recogniser import open_recogniser
 from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.storage.files import atomic_file, check_distinct, check_target
 from lipmotion.storage.json_text import as_json
@@ -91,13 +91,12 @@ def detect_english(audio: Audio) -> bool | None:
     audio : at 16 kHz
     The network writes every language with the phones of English: it cannot say which other one it is.
     """
-    name = find_installed_recogniser()
-    if name is None:
+    if find_installed_recogniser() is None:
         return None
     part = analysed(Audio(audio.samples[: int(PART_S * audio.rate_hz)], audio.rate_hz))
     tokens = [
         token
-        for _, posteriors in find_stretches(name, part)
+        for _, posteriors in find_stretches(part)
         for token in (*(each.token for each in posteriors.best_tokens), WORD_BOUNDARY)
     ]
     words = (list(group) for ends, group in groupby(tokens, WORD_BOUNDARY.__eq__) if not ends)
@@ -121,9 +120,7 @@ def warn_of_another_language(recognition: Recognition) -> None:
 
 
 TEXT, JSON = ".txt", ".json"
-WITHOUT_WORDS = tuple(kind for kind in RECOGNISER_KINDS if kind not in USING_WORDS)
-LINE_PAUSE_S = 0.5
-"""A longer pause between words ends a line of text."""
+LINE_PAUSE_S = 0.5  # a longer pause between words ends a line of text
 
 
 @limit_threads()
@@ -143,11 +140,8 @@ def recognise_words(speech: SpeechInput, *, model: Model | str | Path | None = N
     """
     request = as_request(speech)
     chosen = model if isinstance(model, Model) else load_model(model or request.model)
-    if request.recogniser in WITHOUT_WORDS:
-        raise InputError(
-            f"the recogniser {request.recogniser!r} recognises phones, not words; required one of: "
-            f"{', '.join(USING_WORDS)}"
-        )
+    if request.recogniser != "auto":
+        raise InputError(f"the recogniser {request.recogniser!r} recognises phones, not words; required 'auto'")
     audio = analysed(read_recording(request))
     recogniser = open_recogniser(chosen.phones, request.recogniser, chosen.adaptation)
     if workers == 1:
@@ -169,36 +163,31 @@ def format_words(words: Timeline[RecognisedWord]) -> str:
     return "".join(" ".join(line) + "\n" for line in lines)
 
 
-def describe_word(span: Span[RecognisedWord]) -> dict[str, Any]:
-    """Return a word for JSON: ``word``, ``start`` and ``end`` in seconds, and its confidence ``conf``, as Vosk's."""
-    return {
-        "word": span.label.text,
-        "start": round(span.start_s, 3),
-        "end": round(span.end_s, 3),
-        "conf": round(span.label.confidence, 3),
-    }
+def describe_words(words: Timeline[RecognisedWord]) -> list[dict[str, Any]]:
+    """Return words for JSON: ``word``, ``start`` and ``end`` in seconds, and the confidence ``conf``, as Vosk's."""
+
+    def describe(span: Span[RecognisedWord]) -> dict[str, Any]:
+        times = {"start": round(span.start_s, 3), "end": round(span.end_s, 3)}
+        return {"word": span.label.text, **times, "conf": round(span.label.confidence, 3)}
+
+    return [describe(span) for span in words]
 
 
-def write_words(
-    words: Timeline[RecognisedWord], outputs: Sequence[str | Path], speech: str | Path | None = None
-) -> None:
-    """Write words to files that can be edited and given back as transcripts: ``.txt``, or ``.json`` with their times.
-
-    speech : the recording, which must not be overwritten
-    Raises ExportError: another suffix, no such folder, or a file that cannot be written; nothing is written then.
-    """
-    paths = check_word_outputs(outputs, speech)
+def write_words(words: Timeline[RecognisedWord], paths: Sequence[Path]) -> None:
+    """Write words to files that can be edited and given back as transcripts, of ``check_word_outputs``."""
+    text = format_words(words)
+    document = {"result": describe_words(words), "text": " ".join(text.split())}
     for path in paths:
-        text = format_words(words)
-        if path.suffix.lower() == JSON:
-            document = {"result": [describe_word(span) for span in words], "text": " ".join(text.split())}
-            text = as_json(document, indent=1) + "\n"
         with atomic_file(path) as unfinished:
-            unfinished.write_text(text, encoding="utf-8")
+            unfinished.write_text(as_json(document, indent=1) + "\n" if path.suffix.lower() == JSON else text, "utf-8")
 
 
 def check_word_outputs(outputs: Sequence[str | Path], speech: str | Path | None = None) -> list[Path]:
-    """Return the paths of files of words. Raises ExportError: as ``write_words``."""
+    """Return the paths of files of words: ``.txt``, or ``.json`` with their times.
+
+    speech : the recording, which must not be overwritten
+    Raises ExportError: another suffix, no such folder, one file twice, or the recording.
+    """
     paths = [Path(output) for output in outputs]
     check_distinct(paths)
     for path in paths:

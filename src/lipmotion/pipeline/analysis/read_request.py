@@ -5,6 +5,7 @@ Formats of labels and of motion are imported where such a file is read: most req
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -79,7 +80,7 @@ def _find_label_speaker(request: Request, *, is_typed: bool) -> str:
     """Return the speaker of a request if its labels have one of that name: it then is whose words are read."""
     sources = (request.transcript, request.units) if request.speaker else ()
     kinds = (str, Path) if is_typed else Path
-    files = [Path(name) for name in sources if isinstance(name, kinds) and _is_file(Path(name))]
+    files = [Path(name) for name in sources if isinstance(name, kinds) and _exists(Path(name))]
     if not files:
         return ""
     from lipmotion.formats.label_files import list_speakers
@@ -95,7 +96,7 @@ def read_text_or_file(argument: str, tier: str = "", speaker: str = "") -> str |
     Raises InputError: the argument looks like a file name but no such file exists, or the file cannot be read.
     """
     path = Path(argument)
-    if not _is_file(path):
+    if not _exists(path):
         parts = argument.encode("utf-8", "surrogatepass").split(b"/")
         may_be_name = " " not in argument and "\0" not in argument and len(argument) < LONGEST_PATH
         if not may_be_name or max(map(len, parts)) > LONGEST_NAME:
@@ -115,12 +116,9 @@ def _read_words(words: Path | str, tier: str, speaker: str) -> str | TimedTransc
     return read_transcript(words, tier, speaker)
 
 
-def _is_file(path: Path) -> bool:
-    """Return whether a file, a pipe or a device of that name exists; a folder does not count."""
-    try:
-        return path.exists() and not path.is_dir()
-    except (OSError, ValueError):  # too long for a file name, or with a character that no file name has
-        return False
+def _exists(path: Path) -> bool:
+    """Return whether a file, a pipe or a device of that name exists; False also for names that are not valid."""
+    return os.path.exists(path) and not is_folder(path)  # noqa: PTH110 (which raises for some)
 
 
 def read_units(path: str | Path, tier: str = "", speaker: str = "") -> Timeline[Unit]:

@@ -54,7 +54,7 @@ def check_job(job: Job) -> None:
     if len(set(kinds)) < len(kinds):
         raise ExportError(f"the outputs are {', '.join(kinds)}: one is given twice; give every kind once")
     alone = {name: getattr(job.request, name) for name in ("recording", "transcript", "units", "edits")}
-    alone |= {name: getattr(job.outputs, name) for name in ("files", "overlay", "posteriors")}
+    alone |= {name: getattr(job.outputs, name) for name in ("files", "overlay")}
     if used := next((name for name, value in alone.items() if value), None):
         raise InputError(f"the job of a batch has {used!r}, which belongs to one recording; leave it out")
     for name in ("lexicon", "onto"):

@@ -26,7 +26,7 @@ from lipmotion.measures.closures import CLOSED_SHARE
 from lipmotion.motion.closure import OPENING, find_closable_ranges
 from lipmotion.motion.frame_labels import list_speech_intervals
 from lipmotion.motion.speaker_maps import SpeakerMap
-from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
+from lipmotion.pipeline.analysis.read_request import read_lexicon
 from lipmotion.pipeline.batch.ledger import (
     CUES,
     DONE,
@@ -56,18 +56,8 @@ from lipmotion.pipeline.workers import ItemT, Pool, ResultT, WorkerDiedError, cl
 from lipmotion.storage.files import check_target, confine, make_folder, put_in_place, remove
 from lipmotion.storage.locks import open_temporary
 from lipmotion.storage.sources import Source, check_apart, hash_file
-from lipmotion.types import (
-    SPEECH_RATE_HZ,
-    Audio,
-    Generation,
-    Item,
-    Monitor,
-    Progress,
-    Span,
-    Timeline,
-    Unit,
-    silent_monitor,
-)
+from lipmotion.types import SPEECH_RATE_HZ, Audio, Generation, Span, Timeline, Unit
+from lipmotion.types.progress import Item, Monitor, Progress, silent_monitor
 from lipmotion.units import Lexicon
 from lipmotion.units.phone_timelines import group_words
 
@@ -79,14 +69,11 @@ SILENCE_S = 0.5
 
 @dataclass(frozen=True)
 class LineWork:
-    """What a worker needs to know of a line.
-
-    of_settings : from ``fingerprint_job``
-    """
+    """What a worker needs to know of a line."""
 
     line: BatchLine
     job: Job
-    of_settings: str
+    of_settings: str  # from ``fingerprint_job``
     place: Place
 
     def record(self, outcome: str) -> Record:
@@ -170,14 +157,12 @@ def _write_line(work: LineWork) -> Generation:
     for kind in kinds:
         check_target(Path(work.place.out) / f"{line.name}.{kind}")
     (model, face, lexicon), speaker = _share(work.job, work.place.run), line.speaker or requested.speaker
-    request = replace(requested, recording=Path(line.recording), speaker=speaker, lexicon=lexicon)
-    request = read_request(request, words_beside=not line.transcript)
-    request = replace(request, transcript=line.transcript or request.transcript)
-    other = face.find_other_person(model, speaker) if requested.onto is None else None
-    if other is not None:
-        request = replace(request, onto=_map_onto(model, other, speaker))
-    job = replace(work.job.of(None, staged), request=request)
-    return run(job, face=face, model=model, is_typed=False)
+    known: dict[str, Any] = {"transcript": line.transcript or None, "speaker": speaker, "lexicon": lexicon}
+    if requested.onto is None and (other := face.find_other_person(model, speaker)) is not None:
+        known["onto"] = _map_onto(model, other, speaker)
+    job = work.job.of(Path(line.recording), staged)
+    job = replace(job, request=replace(job.request, **known))
+    return run(job, face=face, model=model, words_beside=True, is_typed=False)
 
 
 def _describe_motion(generation: Generation) -> Record:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from lipmotion.errors import InputError
 from lipmotion.pipeline.edits import CurveStep, Edits
@@ -28,6 +28,7 @@ def animate(  # noqa: PLR0913
     workers: int = 1,
     monitor: Monitor = silent_monitor,
     background: Callable[[], None] | None = None,
+    curves: Iterable[str] = (),
 ) -> Generation:
     """Return lip motion for speech: values of all channels at 100 Hz, variances, phones in time, and states.
 
@@ -43,6 +44,7 @@ def animate(  # noqa: PLR0913
                   guarded by ``if __name__ == "__main__":``
     monitor     : receives reports of the progress
     background  : is called while these processes work, where there are several: to prepare what is done next
+    curves      : names of further curves that outputs will have, and that may be edited: of a rig or a character
     Raises InputError: the recording, the transcript or a constraint is not usable, or the model knows no such speaker.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     Source: Hofer, Yamagishi & Shimodaira 2008 (``engines.trajectory``, the engine of the shipped model).
@@ -58,15 +60,15 @@ def animate(  # noqa: PLR0913
     if not isinstance(constraints, Constraints | None):
         raise InputError(f"the constraints are a {type(constraints).__name__}, required Constraints((Pin(...),))")
     request = as_request(speech, transcript, language)
-    model = model if isinstance(model, Model) else load_model(model or request.model)
+    model = load_model(model or request.model)
     edits = request.edits if edits is None else edits
+    how: dict[str, Any] = {"workers": workers, "monitor": monitor, "background": background, "curves": curves}
     if edits is None or isinstance(edits, Edits):
-        session = Session(request, model=model, workers=workers, monitor=monitor, background=background)
+        session = Session(request, model=model, **how)
     else:
         from lipmotion.pipeline.edit_files import edit_file
 
         file = edit_file(edits)
-        session = file.session(request, model=model, workers=workers, monitor=monitor, background=background)
-        edits = file.edits
+        session, edits = file.session(request, model=model, **how), file.edits
     pins = constraints.pins if constraints else ()
     return session.generate((edits or Edits()).then(*map(CurveStep, pins)))

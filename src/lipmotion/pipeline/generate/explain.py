@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lipmotion.engines import ENGINES, Engine
 from lipmotion.engines.base import explain_by_trace
 from lipmotion.errors import InputError
 from lipmotion.kernels.compiler import limit_threads
@@ -23,25 +22,10 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import SpeechInput, as_request
 from lipmotion.pipeline.session import NO_EDITS, Session
 from lipmotion.printable import printable
-from lipmotion.types import (
-    FRAME_RATE_HZ,
-    ChainPosteriors,
-    ChannelValue,
-    Explanation,
-    Generation,
-    NamedProbability,
-    SpeechPart,
-    frame_of,
-)
-from lipmotion.units import is_silent
+from lipmotion.types import FRAME_RATE_HZ, ChannelValue, Explanation, Generation, NamedProbability, SpeechPart, frame_of
 
-if TYPE_CHECKING:
-    from PIL import Image, ImageDraw, ImageFont
-
-LONGEST_STATE_CHARACTERS = 110
-"""Most characters of a state in a line of text."""
 LINE = 110
-"""Width of the text of a row, without its name, in characters."""
+"""Width of the text of a row, without its name, and of a state in a list, in characters."""
 SHOWN_CHANNELS = 6
 """Largest number of channels in a text; points are left out if there are other channels."""
 
@@ -153,13 +137,6 @@ def _rows(explanation: Explanation) -> Iterator[tuple[str, str]]:
         text = f"{gaussian.density}{which}, responsible for {gaussian.responsibility:.2f}{distance}"
         yield f"Gaussian of {gaussian.stream}", text
         yield from _list_values(gaussian.channels)
-    for regression in explanation.regressions:
-        shown = _list_probabilities(regression.shares)
-        text = f"regression on the acoustic features and posteriors around the frame: {shown}"
-        if regression.shares[0].name == "rest":
-            text = "the rest pose: silence away from speech"
-        yield f"mean of {regression.stream}", text
-        yield from _list_values(regression.channels)
     values = _list_values(explanation.motion)
     yield "generated", next(values)[1]
     yield from values
@@ -181,28 +158,12 @@ def _list_values(channels: Mapping[str, ChannelValue]) -> Iterator[tuple[str, st
         yield "", f"and {len(channels) - min(len(names), SHOWN_CHANNELS)} more channels (--json has all)"
 
 
-@limit_threads()
-def chain_posteriors(session: Session, edits: Edits) -> tuple[Generation, tuple[ChainPosteriors, ...]]:
-    """Return the motion of a session with some edits, and the posterior probabilities of every chain of its model.
-
-    Raises InputError: as ``Session.generate``, or the model's engine has no chains of states.
-    """
-    engine, learned = session.model.engine, session.model.learned
-    if type(engine).posteriors is Engine.posteriors:
-        having = [name for name in ENGINES.names if ENGINES.load(name).posteriors is not Engine.posteriors]
-        raise InputError(
-            f"the engine {engine.name!r} has no chains of states whose posteriors could be shown; give a model that "
-            f"was trained with --engine {' or '.join(having)}"
-        )
-    return session.generate(edits), engine.posteriors(learned, session.analyse(edits).speech)
-
-
 @dataclass(frozen=True)
 class StateRun:
     """Consecutive frames of generated motion behind which stands one state of the model.
 
     start_s, end_s : seconds; the frames are centred at times from ``start_s`` (included) to ``end_s`` (excluded)
-    phone, word    : which take most of the run; empty: none, or not known
+    phone, word    : of the frame in the middle of the run; empty: none, or not known
     state          : as in ``Generation.trace``; of the engine ``selection`` it names a recording and the times in it
     """
 
@@ -232,22 +193,13 @@ def state_runs(
 
 def list_runs(generation: Generation) -> tuple[StateRun, ...]:
     """Return the runs of frames with one state of generated motion."""
-    frames, rate_hz = generation.trace.frames, generation.motion.rate_hz
-    firsts = [0, *(np.flatnonzero(np.diff(frames)) + 1).tolist()] if len(frames) else []
-    times_s = [first / rate_hz for first in (*firsts, len(frames))]
-    spans, number = generation.units.spans, 0
-    runs = []
-    for first, start_s, end_s in zip(firsts, times_s, times_s[1:], strict=False):
-        while number < len(spans) and spans[number].end_s <= start_s:
-            number += 1
-        longest_s, phone, word = 0.0, "", ""
-        for span in spans[number:]:
-            if span.start_s >= end_s:
-                break
-            shared_s = min(span.end_s, end_s) - max(span.start_s, start_s)
-            if shared_s > longest_s:
-                longest_s, phone, word = shared_s, span.label.phone, span.label.word
-        runs.append(StateRun(start_s, end_s, phone, word, generation.trace.states[frames[first]]))
+    frames, rate_hz, spans = generation.trace.frames, generation.motion.rate_hz, generation.units.spans
+    starts_s, runs = [span.start_s for span in spans], []
+    firsts = np.flatnonzero(np.diff(frames, prepend=-1)).tolist()
+    for first, end in pairwise([*firsts, len(frames)]):
+        place = bisect_right(starts_s, (first + end - 1) // 2 / rate_hz) - 1
+        phone, word = (spans[place].label.phone, spans[place].label.word) if place >= 0 else ("", "")
+        runs.append(StateRun(first / rate_hz, end / rate_hz, phone, word, generation.trace.states[frames[first]]))
     return tuple(runs)
 
 
@@ -257,149 +209,7 @@ def run_lines(runs: Sequence[StateRun], count: int) -> Iterator[str]:
     width = max([len("word"), *(len(printable(run.word)) for run in shown)])
     yield f"{'from':>8} {'to':>8}  phone  {'word':{width}}  state"
     for run in shown:
-        state = run.state[:LONGEST_STATE_CHARACTERS] + "..." * (len(run.state) > LONGEST_STATE_CHARACTERS)
+        state = run.state[:LINE] + "..." * (len(run.state) > LINE)
         yield f"{run.start_s:8.2f} {run.end_s:8.2f}  {run.phone:5}  {run.word:{width}}  {state}"
     if len(runs) > len(shown):
         yield f"and {len(runs) - len(shown)} more (--count N prints N, --json all)"
-
-
-MAX_COLUMNS = 2000
-"""Most columns of a plot; in a longer recording, each column is the mean of several frames."""
-MIN_COLUMNS = 600
-ROW_PX, GAP_PX, LEFT_PX, RIGHT_PX, TITLE_PX = 16, 14, 120, 16, 20
-CURVE_PX = 90
-"""Height of the plot of the opening."""
-MIN_PROBABILITY = 0.05
-"""Units whose posterior probability never reaches this have no row."""
-STEPS_S = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60, 120, 300, 600, 1800)
-MIN_PHONE_WIDTH = 8
-"""Mean pixels per phone that are needed to write the phones."""
-MIN_TICK_DISTANCE = 80
-"""Least distance between two times on the axis, in pixels."""
-WHITE, INK, GREY, PALE = (255, 255, 255), (30, 34, 42), (120, 126, 136), (228, 231, 236)
-COLOURS = ((23, 92, 166), (176, 62, 24), (38, 122, 62))
-"""The colours of the chains, in their order."""
-
-
-def draw_posteriors(generation: Generation, posteriors: Sequence[ChainPosteriors]) -> Image.Image:
-    """Return a picture of the posterior probabilities of chains over time (docs/explain.md).
-
-    From top to bottom: phones, units of each chain, asynchrony, opening, time.
-    """
-    from PIL import Image, ImageChops, ImageDraw
-
-    frames, rate_hz = len(generation.motion.values), generation.motion.rate_hz
-    columns = int(np.clip(2 * frames, MIN_COLUMNS, MAX_COLUMNS))
-    panels = []  # of each: title, names of the rows, probabilities [shape=(T, rows)], colour
-    for number, chain in enumerate(posteriors):
-        highest = chain.probability.max(axis=0)
-        units = np.flatnonzero(highest >= min(MIN_PROBABILITY, highest.max()))
-        first = (chain.probability[:, units] >= highest[units] / 2).argmax(axis=0)
-        units = units[np.argsort(first, kind="stable")]
-        title, names = f"chain {number + 1}: {chain.name}", [chain.units[unit] for unit in units]
-        panels.append((title, names, chain.probability[:, units], COLOURS[number % len(COLOURS)]))
-        if chain.leads:
-            leads = [f"{lead:+d}" if lead else "0" for lead in chain.leads]
-            title = f"asynchrony: states that {chain.name} is ahead of {posteriors[0].name}"
-            panels.append((title, leads, chain.lead, INK))
-    channels = generation.motion.names
-    curve = "opening" if "opening" in channels else channels[0]
-    height = 4 * TITLE_PX + CURVE_PX + sum(TITLE_PX + ROW_PX * len(names) + GAP_PX for _, names, *_ in panels)
-    picture = Image.new("RGB", (LEFT_PX + columns + RIGHT_PX, height), WHITE)
-    pen = PlotPainter(ImageDraw.Draw(picture), frames, rate_hz, columns)
-    pen.phones(generation, height - 2 * TITLE_PX)
-    y = TITLE_PX
-    for title, names, probability, colour in panels:
-        pen.text(LEFT_PX, y + 2, title, INK)
-        y += TITLE_PX
-        pen.rows(y, names)
-        area = (LEFT_PX, y, LEFT_PX + columns, y + ROW_PX * len(names))
-        share = np.clip(pen.averaged(probability), 0, 1)[:, :, None]
-        shades = np.round(255 + share * (np.array(colour, float) - 255)).astype(np.uint8)
-        band = Image.fromarray(shades.transpose(1, 0, 2)).resize((columns, ROW_PX * len(names)), 0)
-        picture.paste(ImageChops.darker(band, picture.crop(area)), area)
-        y += ROW_PX * len(names) + GAP_PX
-    pen.text(LEFT_PX, y + 2, f"{curve} (generated)", INK)
-    pen.curve(y + TITLE_PX, generation.motion[curve])
-    pen.times(y + TITLE_PX + CURVE_PX)
-    return picture
-
-
-@dataclass(frozen=True)
-class PlotPainter:
-    """Draws texts, lines and curves over time, from left to right.
-
-    frames, rate_hz : of the recording
-    columns         : width of the plot in pixels
-    """
-
-    on: ImageDraw.ImageDraw
-    frames: int
-    rate_hz: float
-    columns: int
-
-    def x(self, time_s: float) -> float:
-        """Return the horizontal position of a time, in pixels."""
-        return LEFT_PX + float(np.clip(time_s * self.rate_hz / self.frames, 0, 1)) * self.columns
-
-    def averaged(self, values: NDArray[Any]) -> NDArray[np.float64]:
-        """Return values of frames [shape=(T, K)] averaged over each column [shape=(columns, K)]."""
-        edges = np.linspace(0, self.frames, self.columns + 1)
-        first = np.minimum(edges[:-1].astype(int), self.frames - 1)
-        if self.columns < self.frames:
-            counts = np.diff([*first, self.frames])
-            return np.add.reduceat(values.astype(float), first, axis=0) / counts[:, None]
-        return values[first].astype(float)
-
-    @cached_property
-    def font(self) -> ImageFont.ImageFont | ImageFont.FreeTypeFont:
-        """The font of all texts."""
-        from PIL import ImageFont
-
-        return ImageFont.load_default(12)
-
-    def text(self, x: float, y: float, text: str, colour: tuple[int, int, int], anchor: str = "la") -> None:
-        """Write a text at a position."""
-        self.on.text((x, y), text, fill=colour, font=self.font, anchor=anchor)
-
-    def rows(self, y: float, names: Sequence[str]) -> None:
-        """Write the names of rows, and draw lines between them."""
-        right = LEFT_PX + self.columns
-        for number, name in enumerate(names):
-            self.on.line([(LEFT_PX, y + ROW_PX * number), (right, y + ROW_PX * number)], fill=PALE)
-            self.text(LEFT_PX - 6, y + ROW_PX * (number + 0.5), name, INK, "rm")
-        self.on.rectangle([LEFT_PX, y, right, y + ROW_PX * len(names)], outline=GREY)
-
-    def curve(self, y: float, values: NDArray[Any]) -> None:
-        """Draw a curve [shape=(T,)] with its least and largest value."""
-        shown = values if len(values) < self.columns else self.averaged(values[:, None])[:, 0]
-        low, high = float(min(shown.min(), 0)), float(shown.max())
-        heights = y + CURVE_PX - (shown - low) / max(high - low, 1e-9) * (CURVE_PX - 8)
-        positions = LEFT_PX + (np.arange(len(shown)) + 0.5) / len(shown) * self.columns
-        self.on.rectangle([LEFT_PX, y, LEFT_PX + self.columns, y + CURVE_PX], outline=GREY)
-        self.on.line(list(zip(positions.tolist(), heights.tolist(), strict=True)), fill=INK, width=2)
-        self.text(LEFT_PX - 6, y + 8, f"{high:.2f}", INK, "rm")
-        self.text(LEFT_PX - 6, y + CURVE_PX, f"{low:.2f}", INK, "rm")
-
-    def phones(self, generation: Generation, bottom: float) -> None:
-        """Write the phones at the top, and draw lines where they begin, if there is room for them."""
-        if len(generation.units) * MIN_PHONE_WIDTH > self.columns:
-            return
-        free = 0.0
-        for span in generation.units:
-            left, right = self.x(span.start_s), self.x(span.end_s)
-            self.on.line([(left, TITLE_PX - 4), (left, bottom)], fill=PALE)
-            width = self.on.textlength(span.label.phone, font=self.font)
-            start = (left + right - width) / 2
-            if start > free:
-                self.text(start, 3, span.label.phone, GREY if is_silent(span.label.phone) else INK)
-                free = start + width + 2
-
-    def times(self, y: float) -> None:
-        """Draw the time axis."""
-        length_s = self.frames / self.rate_hz
-        step_s = next((s for s in STEPS_S if s / length_s * self.columns >= MIN_TICK_DISTANCE), STEPS_S[-1])
-        for number in range(int(length_s / step_s) + 1):
-            x = self.x(number * step_s)
-            self.on.line([(x, y), (x, y + 5)], fill=INK)
-            self.text(x, y + 8, f"{number * step_s:g} s", INK, "ma")

@@ -193,18 +193,18 @@ def speak(  # noqa: PLR0913
             raise InputError("a corpus that speaks needs both: the voice 'corpus', and the corpus (--corpus FOLDER)")
         if onto is not None:
             raise InputError("a corpus speaks with the motion that was recorded; it is not mapped onto another person")
-        loaded = model if isinstance(model, Model) else load_model(model)
-        sound, generation = speak_from_corpus(text, corpus, loaded, replace(request, onto_speaker=""), constraints)
+        request = replace(request, onto_speaker="")
+        sound, generation = speak_from_corpus(text, corpus, load_model(model), request, constraints)
     else:
         sentences = split_sentences(text)
         chosen = find_voice(voice) if isinstance(voice, str) else voice or choose_voice()
-        loaded = model if isinstance(model, Model) else load_model(model)
-        find_speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
+        model = load_model(model)
+        find_speaker_map(model.speakers, speaker)  # an unknown one is reported before anything is spoken
         sound, units = _speak_sentences(sentences, chosen, lexicon)
         sound = quantise(sound)
         spoken_so = {"recording": resample_speech(sound), "units": units, "manner": ASKED, "spoken_so": True}
         request = replace(request, lexicon=None, **spoken_so)
-        generation = animate(request, model=loaded, constraints=constraints)
+        generation = animate(request, model=model, constraints=constraints)
     return SpokenText(sound, replace(generation, moods=time_moods(tags, generation.units)))
 
 

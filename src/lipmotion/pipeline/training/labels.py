@@ -75,8 +75,8 @@ def warn_of_missing_transcripts(utterances: Sequence[Utterance]) -> None:
     missing = [utterance.name for utterance in utterances if utterance.phones is None and not utterance.words]
     if 0 < len(missing) < len(utterances):
         LOG.warning(
-            "%d of %d recordings have no transcript, or an empty one (%s): their phones are recognised, with errors; "
-            "add the words",
+            "%d of %d recordings have no transcript, or an empty one (%s): their phones are recognised, which is less "
+            "sure; write the words into a .txt beside each (docs/corpora.md)",
             *(len(missing), len(utterances), _listed(missing)),
         )
 

@@ -190,7 +190,7 @@ def train(  # noqa: PLR0913
     if speakers is not None:
         generated = (engine.generate(fit.model, example.speech).motion.values for example in examples)
         speakers = add_habits(speakers, examples, people, generated)
-        about["speakers"] = list(speakers.names)
+        about["speakers"] = list(speakers)
     prior = prior if fit.uses_prior else None
     model = Model(phones, engine, fit.model, about, eigenlips=eigenlips, prior=prior, speakers=speakers)
     return model, TrainReport(used, skipped, fit.figures)
@@ -282,13 +282,6 @@ def _train_phone_models(
     if not transcribed and not labelled:
         LOG.warning("no transcripts in the corpus: its phones are recognised by the shipped model")
         return load_model().phones
-    unknown = sum(utterance.phones is None and not utterance.words for utterance in utterances)
-    if unknown:
-        LOG.warning(
-            "%d of %d recordings have no words: their phones are recognised, which is less sure; write the words "
-            "into a .txt beside each (docs/corpora.md)",
-            *(unknown, len(utterances)),
-        )
     vocabulary = dict.fromkeys(word for _, words in transcribed for word in words)
     warn_of_guesses(tuple(vocabulary), lexicon)
     lexicon = Lexicon(lexicon.user | pronunciations)
@@ -342,7 +335,7 @@ def adapt(model: Model | str | Path | None, recordings: Sequence[str | Path | Au
     """
     if isinstance(recordings, str | Path | Audio) or not len(recordings):
         raise InputError("recordings are not a list, or it is empty; required: one or more recordings of the speaker")
-    chosen = model if isinstance(model, Model) else load_model(model)
+    chosen = load_model(model)
     sounds = [recording if isinstance(recording, Audio) else read_audio(Path(recording)) for recording in recordings]
     estimated = estimate_adaptation(chosen.phones, sounds)
     about = {**chosen.about, "adapted": {"recordings": len(recordings), "speech_s": round(estimated.speech_s, 1)}}
