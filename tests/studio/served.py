@@ -115,7 +115,7 @@ def lost_edits(
     each_s : how long it is edited, at most, between two kills
     report : is called with what was found so far, after each kill
     """
-    chance, found = Random(seed), {"kills": 0, "acknowledged": 0, "lost": 0}
+    chance, times, found = Random(seed), Random(seed), {"kills": 0, "acknowledged": 0, "lost": 0}
     steps: list[str] = []  # that were acknowledged
     sent: list[str] = []  # those of the last request, which may have been answered or not
     while found["kills"] < kills:
@@ -128,7 +128,7 @@ def lost_edits(
                 killed.set()
                 server.process.kill()
 
-            Timer(chance.uniform(0.1, each_s), kill).start()
+            Timer(times.uniform(0.1, each_s), kill).start()
             with suppress(*NO_REPLY):
                 while not killed.is_set():
                     state = server.ask("/api/lines/1")[1]
