@@ -114,9 +114,7 @@ def _(bench: Bench) -> list[object]:
 case(GROUP, "a video without sound", 3, "has no sound track")(
     lambda bench: bench.animate(write_pictures(bench.folder / "a.mp4"))
 )
-case(GROUP, "a folder", 3, "no sounds and no videos in it; give a folder of recordings")(
-    lambda bench: bench.animate(bench.folder)
-)
+case(GROUP, "a folder", 3, "is a folder; give one recording")(lambda bench: bench.animate(bench.folder))
 
 
 @case(GROUP, "a link to itself", 3, "a.wav")
