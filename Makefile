@@ -1,6 +1,6 @@
 # make demo   installs, then turns a spoken sentence into an animated face with the model in the package
 # make test   installs everything, then runs the quick tests (under three minutes)
-# make test-all   the three that follow, and pages in both browsers
+# make test-all   the three that follow
 # make test-long      tests that take seconds: mutations, kills, real recordings, copies of the repository, pages
 # make test-portable  the numeric tests as other processors would run them, those of files as on Windows
 # make test-explore   the property tests with other random cases at every run
@@ -51,11 +51,10 @@ test-drawing test-speech: test-kernels
 test-kernels test-drawing test-speech: $(VENV)/dev
 	$(BIN)/python -m pytest -m "not long" --slowest 20 $(TESTS)
 
-test-all: BROWSERS := --both-browsers
 test-all: test-long test-portable test-explore
 
 test-long: $(VENV)/dev
-	$(TIMED) --limit 1500 $(PYTEST) -m long $(BROWSERS)
+	$(TIMED) --limit 1500 $(PYTEST) -m long
 
 test-portable: $(VENV)/dev
 	PYTHONPATH=tests $(TIMED) --limit 400 $(BIN)/python -m portable.run

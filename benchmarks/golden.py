@@ -107,7 +107,6 @@ def _outputs(name: str, model: Path | None, work: Path) -> Iterator[tuple[str, s
     shipped = HERE / "src" / "lipmotion" / "models" / "grid-s1.lipmotion"
     arguments = ("--transcript", WELCOME_WORDS, "--at", "0.5", "--at", "1.0", "--json")
     yield f"{name}: explanation", of_bytes(run(work, "explain", WELCOME, "--model", model or shipped, *arguments))
-    yield f"{name}: trees", of_bytes(run(work, "info", *(() if model is None else (model,)), "--structure"))
 
 
 def _kinds(work: Path) -> Iterator[tuple[str, str]]:

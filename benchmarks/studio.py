@@ -1,10 +1,9 @@
-"""The studio measured: how long an edit takes, kills, hostile requests, a thousand edits and back.
+"""The studio measured: how long an edit takes, kills, hostile requests, two clients, a crowd.
 
 python benchmarks/studio.py times RECORDING [SECONDS ...]     processor time from an edit to the weights of the head
-python benchmarks/studio.py browser RECORDING [SECONDS ...] [--count 20]  from a key to the moved face in real browsers
-python benchmarks/studio.py kills RECORDING [--count 100]     of the server; forks: of a process that edits
+python benchmarks/studio.py browser RECORDING [SECONDS ...] [--count 20]  from a key to the moved face in Chromium
+python benchmarks/studio.py kills RECORDING [--count 100]     of the server while its line is edited
 python benchmarks/studio.py hostile RECORDING [--count 2000]
-python benchmarks/studio.py undo RECORDING [--count 1000]
 python benchmarks/studio.py clients RECORDING [--count 2000]  steps of two clients; sounds are those of the toy corpus
 python benchmarks/studio.py crowd RECORDING [--count 1000]    edits beside so many connections without a request
 
@@ -16,11 +15,9 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import resource
 import selectors
 import shutil
-import signal
 import socket
 import sys
 import tempfile
@@ -42,7 +39,6 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "src")]
 from lipmotion.formats.sound import write_sound  # noqa: E402
 from lipmotion.kernels.compiler import numba_works  # noqa: E402
 from lipmotion.pipeline.edit_files import EditFile  # noqa: E402
-from lipmotion.pipeline.edits import parse_step  # noqa: E402
 from lipmotion.pipeline.model import load_model  # noqa: E402
 from lipmotion.pipeline.request import Request  # noqa: E402
 from lipmotion.speech.sound.audio_files import read_audio  # noqa: E402
@@ -56,15 +52,13 @@ from lipmotion_studio.folder import open_folder  # noqa: E402
 from lipmotion_studio.recording import OpenRecording, analyse_recording, open_recording  # noqa: E402
 from meshes.heads import head, write_glb  # noqa: E402
 from studio.hostile import attack  # noqa: E402
-from studio.served import Served, lost_edits, random_edit, served, undone_edits  # noqa: E402
+from studio.served import Served, lost_edits, served  # noqa: E402
 from studio.two_clients import walk  # noqa: E402
 from testing.toy import toy_sentences  # noqa: E402
 
 RECOGNISED_S = 100.0
 """In longer recordings phones are repeated, not recognised."""
 STEPS_OF_A_WALK = 80
-UNDO_LIMIT_S = 7200.0
-"""How long a server may be asked for edits, until it is ended."""
 EDITS, FEW_EDITS = 40, 10
 """Edits of which the time is taken, after some that load what they need; of longer recordings fewer."""
 
@@ -149,27 +143,21 @@ def lasting(sound: Path, seconds: float) -> tuple[Path, float]:
     return part, whole.duration_s
 
 
-def in_browsers(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
-    """Measure the page in the browsers that there are."""
+def in_browser(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
+    """Measure the page in Chromium."""
     from studio_browser import measured_page, settled_load
-
-    from study.firefox import BOTH
 
     found: dict[str, Any] = {}
     for seconds in options.seconds or (10.0,):
         part, each_s = lasting(sound, seconds)
         if seconds > RECOGNISED_S:
             repeated(sound, part, each_s, seconds)
-        for choice in BOTH:
-            with served(part, sound.with_name("errors.txt")) as server:
-                state = server.ready()
-                if state["undo"]:  # what the browser before has typed
-                    server.ask("/api/lines/1/undo", {"revision": state["revision"], "count": state["undo"]})
-                name, load = f"{seconds:g} s, {choice.id}", settled_load()
-                folder = sound.with_name(f"home-{choice.id}-{seconds:g}")
-                page = measured_page(choice.values[0], server, folder, options.count or 20)
-                found[name] = {"before": load} | page | {"after": settled_load()}
-                told({name: found[name]})
+        with served(part, sound.with_name("errors.txt")) as server:
+            server.ready()
+            name, load = f"{seconds:g} s", settled_load()
+            page = measured_page(server, sound.with_name(f"home-{seconds:g}"), options.count or 20)
+            found[name] = {"before": load} | page | {"after": settled_load()}
+            told({name: found[name]})
     return found
 
 
@@ -221,55 +209,6 @@ def told(found: dict[str, Any]) -> None:
     print(json.dumps(found), file=sys.stderr, flush=True)
 
 
-def forks(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
-    """Kill a process that edits a line as fast as it can, again and again; compare the file with what it said.
-
-    The process is a copy of this one, in which the line is open: so a hundred kills take seconds.
-    """
-    line, chance, count = opened(sound), Random(options.seed), options.count or 100  # noqa: S311
-    found = {"kills": 0, "acknowledged": 0, "last edit lost": 0, "lost": 0}
-    while found["kills"] < count:
-        reading, writing = os.pipe()
-        child = os.fork()
-        if not child:
-            edit_for_ever(line, Random(options.seed + found["kills"]), writing)  # noqa: S311
-        os.close(writing)
-        time.sleep(chance.uniform(0.1, 2.5))
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-        with os.fdopen(reading, encoding="utf-8") as file:
-            told = [json.loads(row) for row in file.read().splitlines(keepends=True) if row.endswith("\n")]
-        line.file = replace(line.folder.read_edits(line.folder.find_recording(line.number)), named=line.file.named)
-        steps = list(line.file.edits.sentences)
-        done = [each["done"] for each in told if "done" in each]
-        found["kills"] += 1
-        found["acknowledged"] += len(done)
-        if told and steps != (done or [told[0]["before"]])[-1]:
-            found["last edit lost" if steps == told[-1].get("tried") else "lost"] += 1
-    found["last edit written, not acknowledged"] = found.pop("last edit lost")
-    return found
-
-
-def edit_for_ever(line: OpenRecording, chance: Random, writing: int) -> NoReturn:
-    """Make random edits, and write what was tried and what was done into a pipe."""
-
-    def tell(**told: list[str]) -> None:
-        os.write(writing, f"{json.dumps(told)}\n".encode())
-
-    tell(before=list(line.file.edits.sentences))
-    while True:
-        steps = list(line.file.edits.sentences)
-        with suppress(ValueError):
-            if len(steps) > 20:
-                tell(tried=[])
-                line.undo(line.revision, len(steps))
-            else:
-                step = random_edit(chance, line.describe())
-                tell(tried=[*steps, str(parse_step(step))])
-                line.edit(line.revision, (step,))
-            tell(done=list(line.file.edits.sentences))
-
-
 def hostile(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     errors, count = sound.with_name("errors.txt"), options.count or 2000
     with served(sound, errors) as server:
@@ -279,14 +218,6 @@ def hostile(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
         server.kill()
     tracebacks = errors.read_text(encoding="utf-8").count("Traceback")
     return {"requests": count, "statuses": sorted(statuses), "foreign files": 0, "tracebacks": tracebacks}
-
-
-def undo(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
-    """Make random edits over HTTP, take all back after a restart, and make all again: the bytes are the same."""
-    started_s, errors = time.monotonic(), sound.with_name("errors.txt")
-    found = undone_edits(sound, errors, options.count or 1000, seed=options.seed, limit_s=UNDO_LIMIT_S)
-    tracebacks = errors.read_text(encoding="utf-8").count("Traceback")
-    return found | {"tracebacks": tracebacks, "minutes": round((time.monotonic() - started_s) / 60, 1)}
 
 
 def clients(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
@@ -361,16 +292,7 @@ def hold(port: int, count: int, sent: bytes) -> NoReturn:
         time.sleep(0.05)  # so that the machine is not busy with the crowd alone
 
 
-WHAT = {
-    "crowd": crowd,
-    "times": times,
-    "browser": in_browsers,
-    "kills": kills,
-    "forks": forks,
-    "hostile": hostile,
-    "undo": undo,
-    "clients": clients,
-}
+WHAT = {"crowd": crowd, "times": times, "browser": in_browser, "kills": kills, "hostile": hostile, "clients": clients}
 
 if __name__ == "__main__":
     main()

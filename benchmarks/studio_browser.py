@@ -1,4 +1,4 @@
-"""The studio's page measured in real browsers: first picture, edits by keys, scrolling, memory.
+"""The studio's page measured in Chromium: first picture, edits by keys, scrolling, memory.
 
 WebGL is drawn by the processor here (SwiftShader, llvmpipe), as on a machine without a graphics card. Times are of the
 clock, beside them processor time of the server and of all processes of the browser: compare both before believing one.
@@ -17,8 +17,7 @@ import numpy as np
 
 from children import wait_until
 from studio.served import Served
-from study.browser import ENTER, Browser
-from study.firefox import Opens
+from study.browser import ENTER, Browser, browser
 
 WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 LIMIT_S = 600.0
@@ -48,14 +47,14 @@ const step = (now_ms) => {
 requestAnimationFrame(step);"""
 
 
-def measured_page(opens: Opens, server: Served, folder: Path, edits: int) -> dict[str, Any]:
+def measured_page(server: Served, folder: Path, edits: int) -> dict[str, Any]:
     """Return what is measured of the first line of a studio in a browser.
 
     folder : a new one, for the profile of the browser
     edits  : so many phones are typed over
     """
     folder.mkdir()
-    with opens(folder, *WEBGL) as window:
+    with browser(folder, *WEBGL) as window:
         window.open("about:blank")
         empty_mb = memory_mb(server)
         window.open(f"http://127.0.0.1:{server.port}/#{server.token}")

@@ -6,7 +6,7 @@ of the same studies: of answers taken for independent, by Satterthwaite without 
 raters and sentences (percentiles; BCa, its acceleration by the jackknife over raters and sentences).
 
     python benchmarks/study_coverage.py -o coverage.json
-    python benchmarks/study_coverage.py --parts power range
+    python benchmarks/study_coverage.py --parts power
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from lipmotion_studio.study.analysis import crossed
 from lipmotion_studio.study.analysis.analyse import compute_power, count_raters
-from lipmotion_studio.study.analysis.crossed import RANKS, Components, Interval, RatingTable, analyse_ratings
+from lipmotion_studio.study.analysis.crossed import Components, Interval, analyse_ratings
 from lipmotion_studio.study.analysis.paired import analyse_pairs, fit_strengths
 from study.simulated import Effects, comparisons, expected_preference, expected_rating, ratings
 
@@ -192,37 +192,7 @@ def power(studies: int) -> list[dict[str, Any]]:
     return rows
 
 
-def normalised(values: Array) -> Array:
-    """Return ranks with mean 0 and deviation 1 for each rater."""
-    deviation = values.std(axis=(0, 2), keepdims=True)
-    return (values - values.mean(axis=(0, 2), keepdims=True)) / np.maximum(deviation, 1e-9)
-
-
-def ranges(studies: int) -> list[dict[str, Any]]:
-    """Return and print how often a difference of ranks is told, as given and normalised for each rater.
-
-    Raters use between a third and all of the scale; ``careless``: every fifth answers at random.
-    """
-    rows = []
-    for careless in (False, True):
-        for difference in (0.0, 5.0):
-            draw, told = np.random.default_rng([studies, careless]), np.zeros(2)
-            for _ in range(studies):
-                table = ratings(draw, np.array([45.0, 45 + difference, 75.0]), (20, 6), Effects(8, 5, 4, 3, 10), RANKS)
-                used = draw.uniform(1 / 3, 1, size=(1, 20, 1))
-                values = np.clip(np.round(50 + used * (table.values - 50)), *RANKS)
-                if careless:
-                    values[:, ::5] = draw.integers(101, size=values[:, ::5].shape)
-                for place, each in enumerate((values, normalised(values))):
-                    shown = RatingTable(table.conditions, each, table.count, RANKS)
-                    told[place] += shown.compare_conditions("c0", "c1").p_value < 0.05
-            given, same = (told / studies).tolist()
-            rows.append({"careless": careless, "difference": difference, "as given": given, "normalised": same})
-            print(rows[-1], flush=True)
-    return rows
-
-
-PARTS = {"coverage": coverage, "power": power, "range": ranges}
+PARTS = {"coverage": coverage, "power": power}
 
 
 def main() -> None:

@@ -364,10 +364,9 @@ def _transcripts(recordings: Sequence[Said]) -> Iterator[tuple[str, NDArray[np.f
 
 def _network() -> Hearing | None:
     """Return what hears phones; None where no phone recogniser is installed."""
-    name = find_installed_recogniser()
-    if name is None:
+    if find_installed_recogniser() is None:
         return None
-    network, step = load_phone_recogniser(name), PIECE_S * RATE_HZ
+    network, step = load_phone_recogniser(), PIECE_S * RATE_HZ
 
     def hear(samples: NDArray[np.float32]) -> NDArray[np.float64]:
         pieces = [network.log_posteriors(samples[at : at + step]) for at in range(0, len(samples), step)]

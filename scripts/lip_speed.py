@@ -16,7 +16,7 @@ import numpy as np
 
 import lipmotion
 from lipmotion.motion.space import resample_to_model
-from lipmotion.types import FRAME_RATE_HZ, Features
+from lipmotion.types import Features
 from lipmotion_faces.corpus.sound_offset import (
     FRAME_OFFSETS,
     STATIC_FEATURES,
@@ -76,7 +76,7 @@ def examples(corpus: lipmotion.Corpus, names: tuple[str, ...]) -> Iterator[tuple
         if seen.all():
             opening = np.asarray(motion["opening"], float)[:, None]
             frames = len(utterance.features.values)
-            values, valid = resample_to_model(opening, seen, motion.rate_hz, frames, FRAME_RATE_HZ)
+            values, valid = resample_to_model(opening, seen, motion.rate_hz, frames)
             yield utterance.features, measure_opening_speed(values[valid, 0])
 
 

@@ -416,7 +416,7 @@ def standard_articulators(model: Model, motion: Motion) -> NDArray[np.float64]:
     """Return the articulators of motion in deviations from the pose of the table of a model [shape=(T, 8)]."""
     prior, space = model.learned.prior, model.learned.space
     poses = np.concatenate([prior.centre[None], prior.centre + prior.matrix])
-    rows, _ = space.restore(poses, np.zeros_like(poses))
+    rows = space.restore(poses)
     names = [channel.name for channel in space.channels]
     known, measured = measure_articulators(rows, names), measure_articulators(motion.values, motion.names)
     base, *moved = np.stack([known[name] for name in ARTICULATORS], axis=1)

@@ -27,6 +27,7 @@ SEE = {
     "studio": "studio",
     "explain": "explain",
     "cues": "cues",
+    "words": "start",
     "corpus": "corpora",
     "train": "own-model unit-sets voices long-work",
     "adapt": "adaptation",

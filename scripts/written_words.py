@@ -15,7 +15,7 @@ from pathlib import Path
 from hama.inference import G2PModel
 
 from lipmotion.speech.recognition.network.beam_search import load_english
-from lipmotion.speech.recognition.network.posteriors import Hama
+from lipmotion.speech.recognition.network.posteriors import PhoneRecogniser
 from lipmotion.units import Lexicon
 from lipmotion.units.ipa_phones import read_tokens
 from lipmotion.units.phones import FULL_FORMS
@@ -27,7 +27,7 @@ TARGET = Path(__file__).parents[1] / "src" / "lipmotion" / "speech" / "recogniti
 def main() -> None:
     """Write the file."""
     network = G2PModel()
-    tokens = sorted((token for token in Hama().tokens if not token.startswith("<")), key=len, reverse=True)
+    tokens = sorted((token for token in PhoneRecogniser().tokens if not token.startswith("<")), key=len, reverse=True)
     lines = []
     for word in load_english().language.words[:MAX_WORDS]:
         known = {tuple(FULL_FORMS.get(phone, phone) for phone in each) for each in Lexicon().pronunciations(word)}

@@ -32,7 +32,7 @@ from lipmotion.measures import curves
 from lipmotion.motion import posterior_network
 from lipmotion.speech.features import encoding
 from lipmotion.speech.recognition.general import GeneralModel
-from lipmotion.speech.recognition.network.posteriors import Hama
+from lipmotion.speech.recognition.network.posteriors import PhoneRecogniser
 from lipmotion.storage.locks import lock_folder
 from lipmotion_faces.filmed.face import FilmedFace, save_face  # also where no entry point is installed
 from testing.toy import SMALL, ToySentence, toy_sentences, toy_utterances
@@ -67,15 +67,10 @@ MEASURED_S = pytest.StashKey[float]()
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slowest", type=int, default=0, help="print so many tests that took most processor time")
-    parser.addoption("--both-browsers", action="store_true", help="show pages in Firefox, too, beside Chromium")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Whatever needs real recordings, or trains on them, takes long; exploring tries more than a test asks for."""
-    if not config.getoption("--both-browsers"):
-        second = [item for item in items if item.get_closest_marker("second_browser")]
-        config.hook.pytest_deselected(items=second)
-        items[:] = [item for item in items if item not in second]
     config.stash[MEASURED_S] = sum(os.times()[:4])
     for item in items:
         if item.get_closest_marker("recordings") or item.get_closest_marker("slow"):
@@ -173,7 +168,11 @@ def heard_once() -> Iterator[None]:
         return answer
 
     with pytest.MonkeyPatch.context() as patched:
-        for owner, name in ((Hama, "log_posteriors"), (encoding, "encode_window"), (GeneralModel, "log_density")):
+        for owner, name in (
+            (PhoneRecogniser, "log_posteriors"),
+            (encoding, "encode_window"),
+            (GeneralModel, "log_density"),
+        ):
             patched.setattr(owner, name, remember(getattr(owner, name)))
         yield
 

@@ -54,7 +54,6 @@ __all__ = [
     "SpokenText", "Staging", "Stream", "Timeline", "Unit", "adapt", "animate", "cues", "engine_named", "explain",
     "load_model", "read_motion", "save_model", "speak", "state_runs", "train", "with_person", "write", "write_cues",
 ]  # fmt: skip
-
 _HOMES = {
     name: f"lipmotion.{home}"
     for home, names in {

@@ -40,13 +40,7 @@ from lipmotion.types.values import any_members, items, members, number, one_of, 
 
 SPLITS = ("train", "val", "test")
 ENTRY = "entry.json"
-KEYS = frozenset(
-    "name words split audio_rate_hz duration_s rate_hz frames unseen_frames channels crops source settings".split()
-)
-"""The keys of every description. ``speaker`` and ``phones`` came with version 2 of the corpus; without them both are
-unknown. ``checksums`` came later; without them, only impossible arrays are noticed."""
-LARGEST_FEATURE = 1e3
-"""No feature has a larger magnitude; features are standardised."""
+LARGEST_FEATURE = 1e3  # no feature has a larger magnitude; features are standardised
 UTTERANCE_ARRAYS = {
     "audio": ArraySpec(np.int16, "N"),
     "features": ArraySpec(np.float32, "T D", -LARGEST_FEATURE, LARGEST_FEATURE),
@@ -55,10 +49,8 @@ UTTERANCE_ARRAYS = {
     "crops": ArraySpec(np.uint8, "F H W 3", optional=True),
 }
 """The arrays of an utterance: N samples, T frames of sound, F frames of motion."""
-BLOCK = 1 << 20
-"""Samples that are quantised at a time."""
-LARGEST_NUMBER = 1e9
-"""No utterance has more seconds or frames, nor more frames a second."""
+BLOCK = 1 << 20  # samples that are quantised at a time
+LARGEST_NUMBER = 1e9  # no utterance has more seconds or frames, nor more frames a second
 
 
 def quantise(audio: Audio) -> Audio:
@@ -126,17 +118,14 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
 
 _TEXT, _COUNT = text(1 << 24), number(0, LARGEST_NUMBER)
 _CHANNEL = {"name": _TEXT, "unit": _TEXT}
-_ENTRY = members(
-    {
-        **{"name": _TEXT, "speaker": _TEXT, "split": one_of(SPLITS), "words": optional(items(_TEXT))},
-        **{"source": any_members(_TEXT), "notes": items(_TEXT), "settings": any_members(lambda value: value)},
-        **{"checksums": any_members(lambda value: value), "audio_rate_hz": whole(1, 1 << 31), "crops": truth},
-        **{"channels": items(members(_CHANNEL, _CHANNEL, alone=True))},
-        **dict.fromkeys(("duration_s", "rate_hz", "frames", "unseen_frames"), _COUNT),
-    },
-    KEYS,
-)
-"""What of the description is used, and its types."""
+_NEEDED = {
+    **{"name": _TEXT, "speaker": _TEXT, "split": one_of(SPLITS), "words": optional(items(_TEXT)), "crops": truth},
+    **{"source": any_members(_TEXT), "settings": any_members(lambda value: value), "audio_rate_hz": whole(1, 1 << 31)},
+    **{"channels": items(members(_CHANNEL, _CHANNEL, alone=True))},
+    **dict.fromkeys(("duration_s", "rate_hz", "frames", "unseen_frames"), _COUNT),
+}
+_ENTRY = members(_NEEDED | {"notes": items(_TEXT), "checksums": any_members(lambda value: value)}, _NEEDED)
+"""What of the description is used, and its types. Without ``checksums``, only impossible arrays are noticed."""
 
 
 def read_entry(folder: Path) -> dict[str, Any]:
@@ -167,10 +156,7 @@ def _damaged(folder: Path, error: Exception) -> CorpusError:
 
 
 FORMAT = "lipmotion.corpus"
-VERSION = 2
-"""Version 2 has speakers, labelled phones and motion of any kind. Version 1 can be read; its speakers and phones are
-unknown."""
-READ_VERSIONS = (1, 2)
+VERSION = 2  # version 2 has speakers, labelled phones and motion of any kind
 MANIFEST = "corpus.json"
 UTTERANCES = "utterances"
 
@@ -237,10 +223,10 @@ class Corpus:
         file = path / MANIFEST
         if format_name != FORMAT:
             raise CorpusError(f"{file}: format is {format_name!r}, required {FORMAT!r}; give a prepared corpus")
-        if version not in READ_VERSIONS:
+        if version != VERSION:
             raise CorpusError(
-                f"{file}: corpus version {version}, this lipmotion reads versions up to {VERSION}; "
-                "upgrade lipmotion, or prepare the recordings again into a new folder"
+                f"{file}: corpus version {version}, this lipmotion reads version {VERSION}; upgrade lipmotion, or "
+                "prepare the recordings again into a new folder"
             )
         try:
             index: dict[str, dict[str, Any]] = content["utterances"]
@@ -274,16 +260,11 @@ class Corpus:
         return len(self._index)
 
     @property
-    def splits(self) -> dict[str, int]:
-        """The number of utterances of train, val and test."""
-        return {split: len(self.names(split)) for split in SPLITS}
-
-    @property
     def speakers(self) -> dict[str, tuple[int, float]]:
         """The number of utterances and of seconds of each speaker, sorted by name; "" where the speaker is unknown."""
         spoken: dict[str, list[float]] = {}
         for entry in self._index.values():
-            spoken.setdefault(entry.get("speaker", ""), []).append(float(entry["duration_s"]))
+            spoken.setdefault(entry["speaker"], []).append(float(entry["duration_s"]))
         return {speaker: (len(seconds), sum(seconds)) for speaker, seconds in sorted(spoken.items())}
 
     def names(self, split: str | None = None, speakers: Sequence[str] = ()) -> tuple[str, ...]:
@@ -292,22 +273,15 @@ class Corpus:
             sorted(
                 name
                 for name, entry in self._index.items()
-                if split in (None, entry["split"]) and (not speakers or entry.get("speaker", "") in speakers)
+                if split in (None, entry["split"]) and (not speakers or entry["speaker"] in speakers)
             )
         )
 
-    def part(self, names: Collection[str]) -> Corpus:
-        """Return the same corpus with some of its utterances alone. Raises CorpusError: a name that it does not have.
+    def divided(self, lists: Mapping[str, Collection[str]]) -> Corpus:
+        """Return the same corpus with some of its utterances alone, in other lists ``train``, ``val`` and ``test``.
 
         Nothing may be added to what is returned: the manifest on disk is that of the whole.
         """
-        for name in names:
-            if name not in self._index:
-                raise CorpusError(f"{self.path}: no utterance {name!r} among {len(self)}")
-        return Corpus(self.path, {name: self._index[name] for name in names}, self._fetch)
-
-    def divided(self, lists: Mapping[str, Collection[str]]) -> Corpus:
-        """Return the utterances of other lists ``train``, ``val`` and ``test`` alone; as of ``part``."""
         entries = {name: {**self._index[name], "split": split} for split, names in lists.items() for name in names}
         return Corpus(self.path, entries, self._fetch)
 
@@ -354,7 +328,7 @@ class Corpus:
         rights = sorted({entry["source"]["attribution"] for entry in sources if "attribution" in entry["source"]})
         return {
             "corpus": str(self.path),
-            "utterances": f"{len(self)} ({', '.join(f'{count} {split}' for split, count in self.splits.items())})",
+            "utterances": f"{len(self)} ({', '.join(f'{len(self.names(split))} {split}' for split in SPLITS)})",
             "transcribed": str(sum(entry["words"] is not None for entry in sources)),
             "labelled": f"{sum(entry.get('phones') is not None for entry in sources)} with phones in time",
             "minutes": f"{seconds / 60:.1f}",
@@ -404,7 +378,7 @@ class Corpus:
                 words=None if entry["words"] is None else tuple(entry["words"]),
                 split=entry["split"],
                 source=entry["source"],
-                speaker=entry.get("speaker", ""),
+                speaker=entry["speaker"],
                 phones=None if phones is None else Timeline(tuple(phones)),
             )
         except (OSError, EOFError, ValueError, KeyError, TypeError, OverflowError) as error:
@@ -473,9 +447,9 @@ def _open_remote(url: str) -> tuple[Path, Callable[[str], None]]:
 
 
 def _summary(entry: dict[str, Any]) -> dict[str, Any]:
-    return {key: entry[key] for key in ("split", *_COUNTS)} | {"speaker": entry.get("speaker", "")}
+    return {key: entry[key] for key in ("split", "speaker", *_COUNTS)}
 
 
 _COUNTS = ("duration_s", "frames", "unseen_frames")
-_LISTED = {"split": one_of(SPLITS)} | dict.fromkeys(_COUNTS, number(0, LARGEST_NUMBER))
-_INDEX = any_members(members(_LISTED | {"speaker": text(1 << 20)}, _LISTED))
+_LISTED = {"split": one_of(SPLITS), "speaker": text(1 << 20)} | dict.fromkeys(_COUNTS, number(0, LARGEST_NUMBER))
+_INDEX = any_members(members(_LISTED, _LISTED))

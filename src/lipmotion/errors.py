@@ -6,8 +6,7 @@ for each class; exit code 2 means a wrong command line, exit code 1 a bug.
 
 from __future__ import annotations
 
-SHOWN_CHARACTERS = 80
-"""Largest number of characters of a text from a user that a message repeats."""
+SHOWN_CHARACTERS = 80  # largest number of characters of a text from a user that a message repeats
 
 
 def shorten(text: str) -> str:

@@ -22,14 +22,13 @@ from lipmotion.errors import InputError
 ExtensionT = TypeVar("ExtensionT")
 GROUPS = (
     *("lipmotion.engines", "lipmotion.faces", "lipmotion.exporters", "lipmotion.corpus_readers"),
-    *("lipmotion.outputs", "lipmotion.predictors", "lipmotion.trackers", "lipmotion.phone_recognisers"),
-    *("lipmotion.motion_readers", "lipmotion.live", "lipmotion.verbs", "lipmotion.names"),
+    *("lipmotion.outputs", "lipmotion.predictors", "lipmotion.trackers", "lipmotion.motion_readers"),
+    *("lipmotion.live", "lipmotion.verbs", "lipmotion.names"),
 )
 """Every group of entry points that is read."""
 PACKAGE = "lipmotion"
 OWN = {PACKAGE, "lipmotion_faces", "lipmotion_studio", "lipmotion_lab", "argparse"}
-SOURCE = "source"
-"""What stands for the version where lipmotion is not installed."""
+SOURCE = "source"  # what stands for the version where lipmotion is not installed
 
 
 def find_version() -> str:

@@ -11,10 +11,8 @@ _UNPRINTABLE = re.compile(
 )
 """Characters that control a terminal or are invisible: both sets of control characters, line ends, changes of
 direction, surrogates. The joiners that some scripts and emoji need are not among them."""
-
 _NOT_IN_LINES = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufffe\uffff]")
 """Characters that a line of a text file cannot hold: control characters, line ends, surrogates and no characters."""
-
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """First characters of a field that a spreadsheet executes as a formula; full-width forms count as well."""
 

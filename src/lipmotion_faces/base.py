@@ -32,8 +32,7 @@ __all__ = [
 
 PoseT = TypeVar("PoseT")
 Picture = NDArray[np.uint8]
-THREADS = 2
-"""Pictures that are drawn at the same time."""
+THREADS = 2  # pictures that are drawn at the same time
 
 
 class Face(ABC):

@@ -68,21 +68,14 @@ class FrameGroups:
         return self._groups[group][index - self._starts[group]]
 
 
-VIDEO_CRF = 18.0
-"""Quality of a stored background: x264's constant rate factor, 0 (lossless) to 51; smaller is better."""
-PICTURES_CRF = 12.0
-"""Quality of stored pictures of mouths."""
-GROUP = 8
-"""Frames of a stored video that are decoded together."""
-PICTURE_GROUP = 250
-"""Pictures of a stack, all of which are decoded at once, that are coded together at most."""
-MAX_FRAMES = 100_000
-"""Most frames of a stored video: an hour."""
-MAX_PICTURE_BYTES = 1 << 29
-"""Most bytes of a stack of decoded pictures."""
+VIDEO_CRF = 18.0  # quality of a stored background: x264's constant rate factor, 0 (lossless) to 51; smaller is better
+PICTURES_CRF = 12.0  # quality of stored pictures of mouths
+GROUP = 8  # frames of a stored video that are decoded together
+PICTURE_GROUP = 250  # pictures of a stack, all of which are decoded at once, that are coded together at most
+MAX_FRAMES = 100_000  # most frames of a stored video: an hour
+MAX_PICTURE_BYTES = 1 << 29  # most bytes of a stack of decoded pictures
 _BT601, _LIMITED_RANGE = 5, 1
-_DELIMITER, _PARAMETERS = 9, 7
-"""Types of the unit that begins every frame, and of the one that begins every group."""
+_DELIMITER, _PARAMETERS = 9, 7  # types of the unit that begins every frame, and of the one that begins every group
 
 
 @dataclass(frozen=True, eq=False)

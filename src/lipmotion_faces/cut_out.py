@@ -24,8 +24,7 @@ Picture = NDArray[np.uint8]
 SUFFIXES = (".png", ".webp", ".jpg", ".jpeg")
 BASE = "base"
 REQUIRED = "".join(name for name, shape in SHAPES.items() if not shape.fallback)
-LARGEST_PX, MAX_PIXELS = 4096, 1 << 26
-"""Largest side of a picture, and most pixels of all together."""
+LARGEST_PX, MAX_PIXELS = 4096, 1 << 26  # largest side of a picture, and most pixels of all together
 LARGEST_BYTES = 1 << 26
 MAX_FILES = 1000
 WHITE = (255, 255, 255)

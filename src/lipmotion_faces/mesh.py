@@ -30,10 +30,8 @@ Turn = Sequence[float]
 
 SHARE_BELOW_MOUTH = 0.55
 """The picture shows as much below the mouth as this share of what is above it, up to the top of the head."""
-PICTURE_SHARE = 0.92
-"""The picture is cut to this share of that height: hair may leave it at the top."""
-DISTANCE = 2.8
-"""The camera is this many heights of the picture away."""
+PICTURE_SHARE = 0.92  # the picture is cut to this share of that height: hair may leave it at the top
+DISTANCE = 2.8  # the camera is this many heights of the picture away
 DRAWN_HEIGHTS = 1.7
 """Everything within this many heights of the picture around the mouth is drawn: of a body, head and shoulders."""
 PIVOT = np.array([0.0, 0.12, -1.05])
@@ -41,8 +39,7 @@ PIVOT = np.array([0.0, 0.12, -1.05])
 between the corners of the mouth."""
 NECK_TOP, NECK_BOTTOM = -0.55, -1.6
 """Where no bone says it: above this height all follows the head, below the second nothing, in eye distances."""
-NECK_SHARE = 0.4
-"""What follows the neck but not the head goes this part of the way."""
+NECK_SHARE = 0.4  # what follows the neck but not the head goes this part of the way
 STILL: Turn = (0.0, 0.0, 0.0)
 WIDTH, HEIGHT = 1280, 720
 FRAMES_AHEAD = 2

@@ -29,10 +29,8 @@ from lipmotion_faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import track
 
-MAX_FOOTAGE_S = 60.0
-"""Seconds of footage that are used: the first of a video, utterances spread evenly over a corpus."""
-MIN_SPEECH_S = 0.5
-"""Fewest seconds of speech, with the face measured, of which a map is made."""
+MAX_FOOTAGE_S = 60.0  # seconds of footage that are used: the first of a video, utterances spread evenly over a corpus
+MIN_SPEECH_S = 0.5  # fewest seconds of speech, with the face measured, of which a map is made
 
 
 @limit_threads()

@@ -35,12 +35,9 @@ Array = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
 Recording = tuple[Speech, Array, NDArray[np.bool_]]
 """Speech, reduced motion, and which frames are valid [shape=(T, Q), (T,)]."""
-COMPONENTS = 16
-"""Dimensions that all point channels are reduced to, as in the engines."""
-REACH = 15
-"""Frames of acoustic context on both sides: ±150 ms."""
-RIDGE_FRAMES = 1e-3
-"""Strength of the ridge penalty, in frames of training."""
+COMPONENTS = 16  # dimensions that all point channels are reduced to, as in the engines
+REACH = 15  # frames of acoustic context on both sides: ±150 ms
+RIDGE_FRAMES = 1e-3  # strength of the ridge penalty, in frames of training
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +77,8 @@ class Baseline(Animator[FrameRegressionModel]):
         constraints: Constraints | None = None,  # noqa: ARG002 - compared, never edited
     ) -> Generation:
         predicted = self.predict(model.learned, speech)
-        values, variance = model.space.restore(predicted, np.broadcast_to(model.variance, predicted.shape))
+        values = model.space.restore(predicted)
+        variance = np.broadcast_to(model.variance, predicted.shape) @ model.space.mixing
         motion = Motion(values, FRAME_RATE_HZ, model.space.channels)
         return Generation(motion, variance, speech.units, StateTrace(("all",), np.zeros(len(values), np.intp)))
 

@@ -53,8 +53,7 @@ class PhoneticTableOptions:
 FULL, QUICK = PhoneticTableOptions(), PhoneticTableOptions(states=(5,), mixtures=(1, 2), motion_mixtures=(1, 2))
 
 
-ValidationAcc = Mapping[tuple[int, int], float]
-"""The ACC on ``val`` by the Gaussians a state: for speech, for motion."""
+ValidationAcc = Mapping[tuple[int, int], float]  # the ACC on ``val`` by the Gaussians a state: for speech, for motion
 
 
 @limit_threads()

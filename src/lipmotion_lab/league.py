@@ -36,14 +36,13 @@ from lipmotion.types import Audio, Monitor, Span, Timeline, Unit, Utterance, sil
 from lipmotion.types.motion import interpolate_rows
 from lipmotion.units import Lexicon, is_silent
 from lipmotion_lab.evaluation.evaluate import BILABIAL, ClipStatistic, divide_sums
-from lipmotion_lab.report.page import FPS, RECORDED, FinishedPart, draw_mouths, write_html
+from lipmotion_lab.report.page import FPS, FinishedPart, draw_mouths, write_html
 from lipmotion_lab.report.section import Column, Section, Table, warn_of_few, write_text
 
 Array = NDArray[np.float64]
 CHANNELS = ("opening", "width")
 TABLE = "rivals.json"
-SOUND_HZ, GRID_HZ = 48_000, 100.0
-"""Rate of the sound that rivals hear, and that at which their weights are compared."""
+SOUND_HZ, GRID_HZ = 48_000, 100.0  # rate of the sound that rivals hear, and that at which their weights are compared
 LEVEL, LEVEL_SHARE, LEVEL_WINDOW = 0.1, 95, SOUND_HZ // 50
 """Rivals have thresholds: the root mean square of the loudest twentieth of each recording is brought to this."""
 LAGS_S, SMOOTHINGS_S = np.arange(-0.08, 0.33, 0.04), (0.0, 0.03, 0.06, 0.1)
@@ -51,10 +50,8 @@ SHUT_SHARES = (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
 """What is tried of every rival: lags, smoothing (σ), and the share of its 95th percentile under which it is shut."""
 SYNC_STEP_S, RIDGE = 0.01, 1e-3
 FOLDS = 5
-ONSET_REACH_S = 0.2
-"""A movement that begins nowhere within this time counts as an error of it."""
-ABSENT = MissingDependencyError.exit_code
-"""Exit code of an adapter whose rival is not installed."""
+ONSET_REACH_S = 0.2  # a movement that begins nowhere within this time counts as an error of it
+ABSENT = MissingDependencyError.exit_code  # exit code of an adapter whose rival is not installed
 
 
 class RivalError(InputError):
@@ -551,12 +548,12 @@ def describe_league(league: League) -> Section:
     words = warn_of_few(len(league.recordings))
     for title, reasons in (("Not installed", league.absent), ("Failed", league.failed)):
         words |= {title: [f"{name}: {reason}" for name, reason in reasons.items()]} if reasons else {}
-    return Section("The league", about, verdict, words, (), table, shown=list(rows))
+    return Section("The league", about, verdict, words, table)
 
 
 def write_league(league: League, folder: Path) -> dict[str, Any]:
     """Write the page of a league, with its pictures and all figures, to a folder; return the figures."""
-    section, motion, part = describe_league(league), _choose_excerpt(league), folder / PART
+    section, part = describe_league(league), folder / PART
     names = [each.utterance.name for each in league.recordings]
     accs = {each.rival.title: [acc for acc, _ in each.figures["acc"].sums] for each in league.standings}
     content = {
@@ -571,8 +568,8 @@ def write_league(league: League, folder: Path) -> dict[str, Any]:
     figures: dict[str, Any] = replace_nan(content)
     section.write_tables(part / "tables")
     write_text(part / "figures.json", as_json(figures) + "\n")
-    record = {"pictures": list(_draw_mouths(motion, part)) if motion else [], "videos": [], "stamp": league.about}
-    finished = [FinishedPart(PART, record, motion, section)]
+    record = {"pictures": list(_draw_mouths(league, part)), "stamp": league.about}
+    finished = [FinishedPart(PART, record, section)]
     page = write_html(
         "The league", league.about, finished, league.absent, league.failed, subtitle=SUBTITLE, how_to_read=HOW_TO_READ
     )
@@ -580,35 +577,23 @@ def write_league(league: League, folder: Path) -> dict[str, Any]:
     return figures
 
 
-def _choose_excerpt(league: League) -> dict[str, Any]:
-    """Return what systems do in the seconds that have most p, b and m, as the page of a report shows it."""
-    if not league.standings:
-        return {}
-    max_count, number, begin_s = -1, 0, 0.0
-    for n, each in enumerate(league.recordings):
-        lips = each.list_spans(lips=True)
-        for start_s in (0.0, *(start for start, _ in lips)):
-            count = sum(start_s <= start and end <= start_s + SHOWN_S for start, end in lips)
-            if count > max_count:
-                max_count, number, begin_s = count, n, start_s
+def _draw_mouths(league: League, folder: Path) -> Iterator[dict[str, str]]:
+    """Write a strip of mouths for the speaker and each system, at wide and closed lips where most p, b and m are."""
+    counts = {
+        (number, begin_s): sum(begin_s <= start and end <= begin_s + SHOWN_S for start, end in lips)
+        for number, lips in enumerate(each.list_spans(lips=True) for each in league.recordings)
+        for begin_s in (0.0, *(start for start, _ in lips))
+    }
+    number, begin_s = max(counts, key=lambda place: counts[place])
     recording = league.recordings[number]
-    seen = (recording.time_s >= begin_s) & (recording.time_s < begin_s + SHOWN_S)
-    spoken = [s for s in recording.phones if s[2] and s[1] > begin_s and s[0] < begin_s + SHOWN_S]
-    systems = {each.rival.title: each.made[number][seen] for each in league.standings}
-    utterance = recording.utterance
-    about = {"name": utterance.name, "words": list(utterance.words or ()), "channels": list(CHANNELS)}
-    recorded = {"spoken": spoken, "time_s": recording.time_s[seen], RECORDED: recording.original[seen]}
-    return about | recorded | {"systems": systems}
-
-
-def _draw_mouths(motion: Mapping[str, Any], folder: Path) -> Iterator[dict[str, str]]:
-    """Write a strip of mouths for the speaker and for each system, at instants of wide and of closed lips."""
-    parts = np.array_split(np.arange(len(motion["time_s"])), INSTANTS)
+    seen = np.flatnonzero((recording.time_s >= begin_s) & (recording.time_s < begin_s + SHOWN_S))
     extremes = (np.argmax, np.argmin)
-    frames = [p[extremes[n % 2](motion[RECORDED][p, 0])] for n, p in enumerate(parts) if len(p)]
+    parts = [part for part in np.array_split(seen, INSTANTS) if len(part)]
+    frames = [part[extremes[n % 2](recording.original[part, 0])] for n, part in enumerate(parts)]
     silence = Timeline((Span(0.0, len(frames) / FPS, Unit("sil")),))
-    for number, (name, values) in enumerate({RECORDED: motion[RECORDED], **motion["systems"]}.items()):
+    made = {each.rival.title: each.made[number] for each in league.standings}
+    for place, (name, values) in enumerate(({"recorded": recording.original} | made).items()):
         pictures = list(draw_mouths(values[frames], CHANNELS, silence))[: len(frames)]
-        with atomic_file(folder / f"{number}.png") as unfinished:
+        with atomic_file(folder / f"{place}.png") as unfinished:
             Image.fromarray(np.concatenate(pictures, axis=1)).reduce(2).save(unfinished, format="png")
-        yield {"file": f"{number}.png", "caption": name}
+        yield {"file": f"{place}.png", "caption": name}

@@ -20,8 +20,7 @@ from lipmotion_lab.evaluation.evaluate import measure_clips, pair_curves, sum_co
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, generate_clips, load_held_out
 from lipmotion_lab.xie_liu2007.systems import BLSTM, as_row, find_best_trial, tune_network, with_inputs_of
 
-OTHERS = ("width", "outer")
-"""Channels that are compared beside the opening."""
+OTHERS = ("width", "outer")  # channels that are compared beside the opening
 _ROW = "row"
 
 
@@ -101,7 +100,6 @@ def _compare_network(
     )
     system = tune_network(with_inputs_of(BLSTM, examples, corpus), judges, settings.monitor)
     clips = generate_clips(recordings, AUDIO_ONLY, system.engine, system.model)
-    settings.receive(f"{BLSTM}, {len(examples)} recordings", AUDIO_ONLY, recordings, clips)
     free = result.model.engine.without_closures()
     ours = generate_clips(recordings, AUDIO_ONLY, free, result.model.learned)
     channels: dict[str, Any] = {}

@@ -42,8 +42,7 @@ from lipmotion_lab.evaluation.evaluate import measure_clips, pair_curves, sum_co
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, OPENING, generate_compared, make_speech
 
 Array = NDArray[np.float64]
-REACH = 4
-"""Frames before and after a frame between which velocities are compared: 40 ms, a picture of a video."""
+REACH = 4  # frames before and after a frame between which velocities are compared: 40 ms, a picture of a video
 HALF = 0.5
 
 

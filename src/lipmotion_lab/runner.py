@@ -48,8 +48,7 @@ from lipmotion_lab.evaluation.held_out import (
 ItemT = TypeVar("ItemT")
 MotionReceiver = Callable[[str, str, HeldOutRecordings, Sequence[ComparedClip]], None]
 """Called with the name of a system, a condition, the recordings, and what the system generates for each of them."""
-QUICK_CLIPS = {"train": 20, "val": 4, "test": 6}
-"""Most recordings of each list in a quick run of any experiment."""
+QUICK_CLIPS = {"train": 20, "val": 4, "test": 6}  # most recordings of each list in a quick run of any experiment
 _CURVES, _ABOUT = ("original", "generated", "time_s"), "about"
 """Fields of ``ComparedClip`` that are curves; the array with the rest of stored clips."""
 
@@ -165,7 +164,7 @@ def shuffle(items: Sequence[ItemT], seed: int) -> tuple[ItemT, ...]:
 
 def take_quick_part(corpus: Corpus, seed: int) -> Corpus:
     """Return a corpus with a few utterances of each list: those of every quick run with this seed."""
-    return corpus.part([name for split in SPLITS for name in shuffle(corpus.names(split), seed)[: QUICK_CLIPS[split]]])
+    return corpus.divided({split: shuffle(corpus.names(split), seed)[: QUICK_CLIPS[split]] for split in SPLITS})
 
 
 @dataclass(frozen=True)
@@ -227,8 +226,7 @@ def make_opening_row(figures: Mapping[str, Any]) -> dict[str, Any]:
 
 PACKAGES = ("lipmotion", "numpy", "scipy", "numba", "av", "pocketsphinx", "hama", "matplotlib")
 """Packages on which figures, or pictures, depend."""
-ROOT = Path(__file__).parents[3]
-"""The root of a checkout of the source, where the package is in one."""
+ROOT = Path(__file__).parents[3]  # the root of a checkout of the source, where the package is in one
 DIGITS = 8
 CPU_INFO = Path("/proc/cpuinfo")
 

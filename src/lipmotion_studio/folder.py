@@ -38,13 +38,11 @@ from lipmotion_studio.project import (
     digest_edits,
     parse_project,
 )
-from lipmotion_studio.votes import Vote, read_votes, write_votes
 
 LOG = logging.getLogger("lipmotion")
 PROJECT, SOUNDS, EDITS, EXPORTS, LEXICON = "project.json", "sounds", "edits", "exports", "lexicon.txt"
 COPIES = "copies"
 """Folder of a copy of each file of edits, which is written with it: what a damaged one is restored from."""
-VOTES = "votes.json"
 SUFFIX = ".studio"
 """How the folder of a project ends, beside the recording or the folder of recordings that it was made of."""
 UNTITLED = Path(f"untitled{SUFFIX}")
@@ -138,8 +136,7 @@ class ProjectFolder:
     def check_sound(self, recording: ProjectRecording) -> Path:
         """Return the path of a recording's sound. Raises InputError: it is not there, or another one than it was."""
         path = self.locate_sound(recording)
-        if recording.sha256:
-            check_sound(path, recording.sha256)
+        check_sound(path, recording.sha256)
         return path
 
     @contextmanager
@@ -194,7 +191,7 @@ class ProjectFolder:
                 file = read_edits(self.locate_edits(recording))
             except InputError as error:
                 raise self._damage(recording, error) from error
-        if recording.sha256 and file.sha256 not in ("", recording.sha256):
+        if file.sha256 not in ("", recording.sha256):
             raise InputError(
                 f"{self.locate_edits(recording)}: are edits of another recording than {self.locate_sound(recording)}; "
                 "put the right file in its place, or add the recording again, under another name"
@@ -209,23 +206,19 @@ class ProjectFolder:
         """Write a recording's file of edits, and the copy of it. Raises ExportError: it cannot be written."""
         path, copy = self.locate_edits(recording), self._copy(recording)
         with self.lock, files.create_folders([path.parent, copy.parent]):
-            write_with_copy(path, copy, lambda first: write_edits(file, first))
+            first, second = (copy, path) if path.exists() else (path, copy)
+            write_edits(file, first)
+            copy_file(first, second)
             self._summaries[recording.number] = self._read_file_state(recording), summarise_edits(file)
 
     def adopt(self, recording: ProjectRecording, file: EditFile) -> EditFile:
-        """Return a recording's edits with the digest of its sound, where a project of an earlier version has none.
+        """Return a recording's edits with the digest of its sound, where it was taken out; the copy becomes the same.
 
-        From then on another sound is refused; a warning says so. The copy becomes that of the file.
-        Raises InputError: the sound cannot be read. ExportError: it cannot be written.
+        Raises ExportError: it cannot be written.
         """
-        path, copy, digest = self.locate_edits(recording), self._copy(recording), recording.sha256 or file.sha256
-        if not (recording.sha256 and file.sha256):
-            sound = self.locate_sound(recording)
-            LOG.warning("%s: is taken to be the recording that was edited; from now on no other is", sound)
-            digest = digest or hash_file(sound)
-            self.change_recording(recording.number, lambda now: replace(now, sha256=digest))
+        path, copy = self.locate_edits(recording), self._copy(recording)
         if not file.sha256:
-            file = replace(file, sha256=digest)
+            file = replace(file, sha256=recording.sha256)
             self.write_edits(recording, file)
         elif not copy.exists() or copy.read_bytes() != path.read_bytes():  # others may have edited it
             with self.lock, files.create_folders([copy.parent]):
@@ -376,13 +369,6 @@ class ProjectFolder:
         language = self.project.language
         return lexicon if language in (ENGLISH, AUTO) else LanguageLexicon(lexicon.user, language)
 
-    def add_vote(self, vote: Vote) -> tuple[Vote, ...]:
-        """Write a vote behind those that were cast before; return all. Raises InputError, ExportError: not possible."""
-        with self.lock:
-            votes = (*read_votes(self.path / VOTES), vote)
-            write_votes(self.path / VOTES, votes)
-            return votes
-
     @property
     def voice_revision(self) -> int:
         """The revision of the voice that moves the recordings, as ``compute_revision`` is that of a recording."""
@@ -453,11 +439,9 @@ def copy_file(source: Path, target: Path) -> None:
         shutil.copyfile(source, temporary)
 
 
-def write_with_copy(path: Path, copy: Path, write: Callable[[Path], object]) -> None:
-    """Write a file and its copy. Raises ExportError: one of them cannot be written."""
-    first, second = (copy, path) if path.exists() else (path, copy)
-    write(first)
-    copy_file(first, second)
+def set_aside(path: Path) -> Path:
+    """Give a damaged file another name beside its place; return that. Raises OSError: it cannot be renamed."""
+    return path.replace(path.with_name(f"{path.name}.damaged-{uuid4().hex[:8]}"))
 
 
 def restore_copy(path: Path, copy: Path) -> None:
@@ -465,7 +449,7 @@ def restore_copy(path: Path, copy: Path) -> None:
     with files.atomic_file(path) as temporary:
         shutil.copyfile(copy, temporary)
         if path.exists():
-            path.replace(path.with_name(f"{path.name}.damaged-{uuid4().hex[:8]}"))
+            set_aside(path)
     LOG.warning("%s: was damaged, and is restored from %s", path, copy)
 
 

@@ -24,7 +24,7 @@ from lipmotion.storage.json_text import as_json
 from lipmotion.storage.locks import open_temporary
 from lipmotion.types import Motion, values
 from lipmotion.types.configuration import kind_of
-from lipmotion.types.values import Schema, any_members, items, number_or_text, parse_number, parse_whole, require
+from lipmotion.types.values import Schema, items, number_or_text, parse_number, parse_whole, require
 from lipmotion.units import PHONES, split_words
 from lipmotion_faces.outputs.shown_faces import ShownPerson
 from lipmotion_studio.folder import RevisionError
@@ -34,7 +34,6 @@ from lipmotion_studio.recording import OpenRecording, list_doubts
 from lipmotion_studio.studio import Studio
 from lipmotion_studio.trainer import MAX_LISTED
 from lipmotion_studio.training import FACE, VOICE, VoiceOptions
-from lipmotion_studio.votes import Vote, tally
 from lipmotion_studio.web.replies import FRESH, read_json, reply_json, write_body
 from lipmotion_studio.workspace import READY, WORKING
 
@@ -184,20 +183,6 @@ class RecordingReplies:
             await to_thread(folder.check_sound, folder.find_recording(number))
         path, kind = await to_thread(self._studio.prepare_video, number)
         return FileResponse(path, media_type=kind, headers=FRESH)
-
-    async def vote(self, request: Request) -> Response:
-        """Store which of two motions somebody found better."""
-        number, content, revision = await self._read_change(request)
-        sides = take(content, "shown", None, items(any_members(lambda value: value), most=2))
-        shown = [take_text(side, "by", "") for side in sides]
-        better = None if content.get("better") is None else take_int(content, "better", high=1)
-
-        def add() -> dict[str, Any]:
-            with self._studio.folder.check_out(number, revision) as recording:
-                vote = Vote(recording.name, tuple(self._studio.find_side(number, by) for by in shown), better)
-                return tally(self._studio.folder.add_vote(vote), vote)
-
-        return reply_json(await to_thread(add))
 
     async def restore(self, request: Request) -> Response:
         """Restore the last good copy of damaged edits."""
@@ -359,8 +344,7 @@ class ProjectReplies:
         """List the recordings, page by page, and what forms need."""
         query = request.query_params
         first, count = take_int(query, "from", 0), take_int(query, "count", 200, high=2000)
-        filters = {name: take_text(query, name, "") for name in ("order", "status", "mark")}
-        document = await to_thread(self._studio.list_recordings, first, count, **filters)
+        document = await to_thread(self._studio.list_recordings, first, count)
         return reply_json(document | {"largest_upload_bytes": MAX_UPLOAD_BYTES})
 
     async def send_progress(self, _: Request) -> Response:
@@ -467,7 +451,7 @@ class ProjectReplies:
         return await self.send_training(request, 201)
 
     def train_with(self, act: Callable[[], None], status: int = 200) -> Handler:
-        """Return a handler that stops, continues or restores what is being made."""
+        """Return a handler that stops or continues what is being made."""
 
         async def reply(request: Request) -> Response:
             await read_content(request)
@@ -496,10 +480,7 @@ class ProjectReplies:
                 for each in fields(VoiceOptions)
             ]
             return {
-                "job": trainer.describe(),
-                "damage": trainer.damage,
-                "restorable": bool(trainer.damage) and trainer.is_restorable,
-                "earlier": trainer.list_earlier(),
+                "job": trainer.describe() or None,
                 "voices": [{"name": name, "used": path == used} for name, path in self._studio.list_voices().items()],
                 "revision": folder.voice_revision,
                 "faces": [path.relative_to(folder.path).as_posix() for path in trainer.list_files(FACE).values()],

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
-from functools import partial
 from hashlib import sha256
 from typing import Any
 
@@ -67,7 +66,7 @@ class ProjectRecording:
 
     name       : path of its files without suffix, with ``/`` between folders; unique
     sound      : path of its sound from the folder of the project, or absolute
-    sha256     : digest of the sound; empty: of an earlier version's project, until the recording is opened
+    sha256     : digest of the sound
     transcript : its words, where they were given here; empty: those of a file beside it, or it is recognised
     duration_s : of the sound; None: not known yet
     doubt      : how unsure the motion of its speech is, 0 to 1; None: not known yet
@@ -193,9 +192,7 @@ _RECORDING = {
     "exports": values.as_tuple(values.items(values.value_of(ExportRecord, _EXPORT, _EXPORT))),
     "versions": values.as_tuple(values.items(values.value_of(EditVersion, _VERSION, _VERSION), most=MAX_VERSIONS)),
 }
-_RECORDINGS = values.items(
-    values.value_of(partial(ProjectRecording, sha256=""), _RECORDING, ("number", "name", "sound"))
-)
+_RECORDINGS = values.items(values.value_of(ProjectRecording, _RECORDING, ("number", "name", "sound", "sha256")))
 _PROJECT = values.members(
     {
         "lines": _RECORDINGS,

@@ -304,8 +304,7 @@ class OpenRecording:
         with self._preview():
             (explanation,) = explain_session(self.session, self.file.edits, [time_s])
         span = explanation.span
-        shares = [share for regression in explanation.regressions for share in regression.shares]
-        shares = shares or [state for chain in explanation.chains for state in chain.states]
+        shares = [state for chain in explanation.chains for state in chain.states]
         return {
             "time_s": explanation.time_s,
             "frame": explanation.frame,
@@ -398,14 +397,13 @@ def analyse_recording(
         request = replace(request, transcript=recording.transcript)
     session = Session(request, model=model, monitor=monitor, audio=audio)
     file, generation = create_edit_file(replace(named, lexicon=None), session)
-    digest = recording.sha256 or file.sha256
-    folder.check_sound(replace(recording, sha256=digest))  # it may have been replaced since
+    folder.check_sound(recording)  # it may have been replaced since
     duration_s, doubt = audio.duration_s, average_doubt(generation)
     with folder.lock:
         folder.find_recording(recording.number)  # it may have been removed since
-        folder.write_edits(recording, replace(file, sha256=digest))
+        folder.write_edits(recording, replace(file, sha256=recording.sha256))
         folder.change_recording(
-            recording.number, lambda now: replace(now, duration_s=duration_s, doubt=doubt, sha256=digest), save=False
+            recording.number, lambda now: replace(now, duration_s=duration_s, doubt=doubt), save=False
         )
     return audio
 
@@ -416,8 +414,7 @@ def open_recording(
     """Open an analysed recording; note its length and doubt. Raises InputError: unreadable. ExportError."""
     file = folder.read_edits(recording)
     if audio is None:
-        sound = folder.check_sound(replace(recording, sha256=recording.sha256 or file.sha256))
-        audio = analysed(read_audio(sound))
+        audio = analysed(read_audio(folder.check_sound(recording)))
     file = folder.adopt(recording, file)
     named = replace(file.named, recording=folder.locate_sound(recording), model=folder.model_file)
     opened = OpenRecording(replace(file, named=named), folder, recording.number, model, audio)

@@ -52,7 +52,6 @@ from lipmotion_studio.project import (
 from lipmotion_studio.recording import LONGEST_VIDEO_S, OpenRecording
 from lipmotion_studio.trainer import VOICES, Trainer
 from lipmotion_studio.training import FACE, VOICE
-from lipmotion_studio.votes import Side
 from lipmotion_studio.workspace import FAILED, READY, WAITING, WORKING, NotReadyError, Workspace
 
 PLAYED = {
@@ -125,7 +124,6 @@ def write_playable(video: Path, sound: Path, path: Path) -> None:
 
 
 LOG = logging.getLogger("lipmotion")
-ORDERS = ("", "doubt")
 OTHER = "other"
 """What requests call the model that the project's is compared with."""
 DIGEST_DIGITS = 8
@@ -174,21 +172,11 @@ class Studio:
         self.workspace.close()
         self._run.close()
 
-    def list_recordings(
-        self, first: int, count: int, *, order: str = "", status: str = "", mark: str = ""
-    ) -> dict[str, Any]:
-        """Return the project, and ``count`` recordings from one on, of a status and mark if given."""
-        if order not in ORDERS:
-            raise InputError(f"order is {shorten(repr(order))}, required doubt, or nothing")
+    def list_recordings(self, first: int, count: int) -> dict[str, Any]:
+        """Return the project, and ``count`` recordings from one on."""
         with self.folder.lock:
             project, revision = self.folder.project, self.folder.revision
-        recordings = [
-            each
-            for each in project.lines.values()
-            if (not mark or each.mark == mark) and (not status or self.workspace.find_status(each) == status)
-        ]
-        if order == "doubt":
-            recordings.sort(key=lambda each: -1.0 if each.doubt is None else each.doubt, reverse=True)
+        recordings = list(project.lines.values())
         return {
             "name": self.folder.path.absolute().name,
             "folder": str(self.folder.path.absolute()),
@@ -402,14 +390,6 @@ class Studio:
         model = self._find_model(by).model
         onto = self.faces.open_face(face).find_other_person(model, recording.file.named.speaker) if face else None
         return recording if model is self.used.model and onto is None else recording.with_model(model, onto)
-
-    def find_side(self, number: int, by: str) -> Side:
-        """Return what identifies a motion of a recording in a comparison; ``by``: as in ``vary``. Raises as that."""
-        recording = self.folder.find_recording(number)
-        if by not in ("", OTHER):
-            return Side(self.used.name, self.used.digest, recording.find_version(by).digest)
-        model = self._find_model(by)
-        return Side(model.name, model.digest, self.folder.summarise(recording).digest)
 
     def _find_model(self, by: str) -> KnownModel:
         """Return the model that requests call so. Raises InputError: there is none."""

@@ -22,12 +22,12 @@ from lipmotion.storage.locks import UNFINISHED, name_work_folder
 from lipmotion.storage.sources import VIDEO_SUFFIXES, read_text_file
 from lipmotion.types import values
 from lipmotion_faces.filmed.face import SUFFIX as FACE_SUFFIX
-from lipmotion_studio.folder import ProjectFolder, clean_name, copy_file, restore_copy, write_with_copy
+from lipmotion_studio.folder import ProjectFolder, clean_name, set_aside
 from lipmotion_studio.project import ProjectRecording
 from lipmotion_studio.training import FACE, KINDS, VOICE, TrainingOrder, TrainingRecording, VoiceOptions, run_training
 
 LOG = logging.getLogger("lipmotion")
-TRAINING, STATE, STATE_COPY = "training", "state.json", "state.copy.json"
+TRAINING, STATE = "training", "state.json"
 VOICES, FACES = "voices", "faces"
 PLACES = {VOICE: (VOICES, ".lipmotion"), FACE: (FACES, FACE_SUFFIX)}
 """Folder and suffix of what is made, by its kind."""
@@ -56,36 +56,19 @@ class TrainingRequest:
         return f"{folder}/{self.name}{suffix}"
 
 
-@dataclass(frozen=True)
-class TrainingJob:
-    """What was requested, and its status (by the names of the file that keeps it)."""
-
-    wanted: TrainingRequest
-    told: dict[str, Any]
-
-    def describe(self) -> dict[str, Any]:
-        """Return the job as the page shows it."""
-        return {**asdict(self.wanted), "lines": list(self.wanted.lines), "file": self.wanted.file, **self.told}
-
-
 class Trainer:
     """Makes voices and faces of a project, one at a time; may be used by several threads.
 
-    The last job is shown until there is another; and besides, the last voice and the last face that were made. All is
-    kept in the folder of the project: what a killed studio was making is shown as interrupted, and can be made again.
+    The last job is shown until there is another. It is kept in the folder of the project: what a killed studio was
+    making is shown as interrupted, and can be made again.
 
-    clock  : returns seconds, and only grows
-    damage : why the file of jobs cannot be read, and how to restore it; empty: it can. Until then nothing is made.
+    clock : returns seconds, and only grows
     """
 
     def __init__(self, folder: ProjectFolder, clock: Callable[[], float] = time.monotonic) -> None:
         self._folder, self._lock, self._clock = folder, threading.RLock(), clock
-        self._file, self._copy = folder.path / TRAINING / STATE, folder.path / TRAINING / STATE_COPY
-        self._request: TrainingRequest | None = None
-        self._status: dict[str, Any] = {}
-        self._finished: dict[str, TrainingJob] = {}
-        self.damage = ""
-        self._open()
+        self._file = folder.path / TRAINING / STATE
+        self._request, self._status = _read_job(self._file)
         self._process: BaseProcess | None = None
         self._thread: threading.Thread | None = None
         self._begun_s = 0.0
@@ -97,22 +80,19 @@ class Trainer:
         """Whether something is being made."""
         return self._status.get("state") == WORKING
 
-    def describe(self) -> dict[str, Any] | None:
-        """Return what was asked for last, and how it goes on or ended; None: nothing was."""
+    def describe(self) -> dict[str, Any]:
+        """Return what was asked for last, and how it goes on or ended, as the page shows it; empty: nothing was."""
         with self._lock:
-            return TrainingJob(self._request, self.summarise()).describe() if self._request else None
+            request = self._request
+            if request is None:
+                return {}
+            return {**asdict(request), "lines": list(request.lines), "file": request.file, **self.summarise()}
 
     def summarise(self) -> dict[str, Any]:
         """Return the state of a job: ``stage``, ``share``, ``left_s`` (0: longer than estimated), warnings, report."""
         with self._lock:
             left_s = None if self._ends_s is None else max(round(self._ends_s - self._clock()), 0)
             return dict(self._status) | ({"left_s": left_s} if self.is_working else {})
-
-    def list_earlier(self) -> list[dict[str, Any]]:
-        """Return the last voice and the last face that were made, as ``describe``, where that is another one."""
-        with self._lock:
-            last = self._request if self._status.get("state") == DONE else None
-            return [job.describe() for job in self._finished.values() if job.wanted != last]
 
     def list_videos(self) -> list[ProjectRecording]:
         """Return the recordings of the project that are videos."""
@@ -142,8 +122,8 @@ class Trainer:
 
     def retry(self) -> None:
         """Begin again what was stopped, interrupted or has failed, where it was. Raises as ``begin``."""
-        if self.damage or self._request is None or self._status["state"] == DONE:
-            raise InputError(self.damage or "nothing was stopped; begin with a voice or a face")
+        if self._request is None or self._status["state"] == DONE:
+            raise InputError("nothing was stopped; begin with a voice or a face")
         self._begin(self._request)
 
     def stop(self) -> None:
@@ -166,8 +146,6 @@ class Trainer:
 
     def _begin(self, request: TrainingRequest) -> None:
         with self._lock:
-            if self.damage:
-                raise InputError(self.damage)
             if self.is_working or self._thread is not None:
                 raise InputError("a voice or a face is being made; wait for it, or stop it")
             order = self._build_order(request)
@@ -245,8 +223,6 @@ class Trainer:
             elif "report" in report:
                 file = self._request.file if self._request else ""
                 status |= {"state": DONE, "share": 1.0, "report": {**report["report"], "file": file}}
-                if self._request:
-                    self._finished[self._request.kind] = TrainingJob(self._request, status)
             elif "error" in report and self.is_working:
                 status |= {"state": FAILED, "error": report["error"]}
             elif "warning" in report:
@@ -259,69 +235,25 @@ class Trainer:
     def _write(self) -> None:
         make_folder(self._file.parent)
         request = {} if self._request is None else asdict(self._request)
-        made = [asdict(job) for job in self._finished.values()]
-        document = {"format": FORMAT, "version": VERSION, "wanted": request, "told": self._status, "made": made}
-        text = as_json(document, indent=1, ensure_ascii=False)
-
-        def write(path: Path) -> None:
-            with atomic_file(path) as temporary:
-                temporary.write_text(text, encoding="utf-8")
-
-        write_with_copy(self._file, self._copy, write)
-
-    def _open(self) -> None:
-        """Read what was made last, where there is a file of it; what is wrong with it is reported as damage."""
-        self.damage = ""
-        if not self._file.exists() and not self._copy.exists():
-            return
-        try:
-            last, made = _read_jobs(self._file)
-        except InputError as error:
-            way_out = f"there is no good copy; remove the folder {self._file.parent}: voices and faces stay"
-            if self.is_restorable:
-                way_out = f"restore the last good copy on the page, or put it in its place: {self._copy}"
-            self.damage = f"what is known of the training is damaged, and is left as it is: {error}; {way_out}"
-            LOG.warning("%s", self.damage)
-            return
-        self._request, self._status = last.wanted, last.told
-        self._finished = {job.wanted.kind: job for job in (*made, last) if job.told["state"] == DONE}
-        if not self._copy.exists():
-            with suppress(ExportError):
-                copy_file(self._file, self._copy)
-
-    @property
-    def is_restorable(self) -> bool:
-        """Whether there is a good copy of the file that keeps what was made."""
-        try:
-            return bool(_read_jobs(self._copy))
-        except InputError:
-            return False
-
-    def restore(self) -> None:
-        """Put the copy in place of a damaged file, which stays beside. Raises InputError: no damage or copy."""
-        with self._lock:
-            if not self.damage or not self.is_restorable:
-                raise InputError(self.damage or "what is known of the training is not damaged; nothing is restored")
-            restore_copy(self._file, self._copy)
-            self._open()
+        document = {"format": FORMAT, "version": VERSION, "wanted": request, "told": self._status}
+        with atomic_file(self._file) as temporary:
+            temporary.write_text(as_json(document, indent=1, ensure_ascii=False), encoding="utf-8")
 
 
-def _read_jobs(file: Path) -> tuple[TrainingJob, list[TrainingJob]]:
-    """Return the last job, and earlier ones. Raises InputError: the file cannot be read, or is of a later version."""
-
-    def make_job(content: Mapping[str, Any]) -> TrainingJob:
+def _read_job(file: Path) -> tuple[TrainingRequest | None, dict[str, Any]]:
+    """Return the last request and its status, if there is one; a file that cannot be read is set aside."""
+    if not file.exists():
+        return None, {}
+    try:
+        content = _STATE(from_json(read_text_file(file, "training")))
         request, status = content["wanted"], content["told"]
         VoiceOptions.stored(request.options)  # raises where there are no such options
-        state = INTERRUPTED if status["state"] == WORKING else status["state"]
-        request = replace(request, name=clean_name(request.name))
-        return TrainingJob(request, {**_create_status(), **status, "state": state})
-
-    text = read_text_file(file, "training")
-    try:
-        content = _STATE(from_json(text))
-        return make_job(content), [make_job(each) for each in content.get("made", ())]
     except ValueError as error:  # InputError is one
-        raise InputError(f"{file}: {error}") from error
+        place = set_aside(file)
+        LOG.warning("%s: cannot be read (%s), and is kept as %s; voices and faces stay", file, error, place.name)
+        return None, {}
+    state = INTERRUPTED if status["state"] == WORKING else status["state"]
+    return replace(request, name=clean_name(request.name)), {**_create_status(), **status, "state": state}
 
 
 _TEXT, _ANY = values.text(1 << 20), values.any_members(lambda value: value)
@@ -342,7 +274,7 @@ _STATUS = {
 }
 _JOB = {"wanted": values.value_of(TrainingRequest, _REQUEST, _REQUEST), "told": values.members(_STATUS, ["state"])}
 _HEAD = {"format": values.one_of([FORMAT]), "version": values.one_of([VERSION])}
-_STATE = values.members(_JOB | _HEAD | {"made": values.items(values.members(_JOB, _JOB))}, (*_HEAD, *_JOB))
+_STATE = values.members(_JOB | _HEAD, (*_HEAD, *_JOB))
 
 
 def _create_status() -> dict[str, Any]:

@@ -11,7 +11,7 @@ from formats.examples import generation as weights_of
 from formats.examples import written
 from lipmotion import read_motion as read_library_motion
 from lipmotion.types import Generation
-from lipmotion_blender.curves import at_frames, closures, control, matched, read_motion, spelling
+from lipmotion_blender.curves import at_frames, closures, matched, read_motion, spelling
 from lipmotion_blender.keying import add_sound, key_shapes
 
 NAMES = ("jawOpen", "mouthSmileLeft", "tongueOut")
@@ -101,14 +101,6 @@ def test_curves_find_their_shape_keys_by_any_spelling_of_one_name():
     assert {spelling(name) for name in names} == {"mouthsmileleft"}
 
 
-def test_controls_are_told_from_shapes():
-    assert control("jaw.master.rotation.x") == ("jaw.master", "rotation", "x")
-    assert control("rig bone[open]") == ("rig bone", "property", "open")
-    assert control("[lips]") == ("", "property", "lips")
-    assert control("jawOpen") is None
-    assert control("Jaw.rotateX") is None
-
-
 def test_frames_lie_on_straight_lines_and_lips_that_close_between_two_are_closed_at_the_nearer():
     times = [number / 100 for number in range(101)]
     curves = {"tongueOut": [float(number**2) for number in range(101)]}
@@ -124,11 +116,6 @@ def test_frames_lie_on_straight_lines_and_lips_that_close_between_two_are_closed
     assert sampled["eyeBlinkLeft"] == pytest.approx([number / 25 for number in range(26)])
     late = at_frames({"jawOpen": jaw, "mouthClose": [0.3 if n == 51 else 0.0 for n in range(101)]}, times, 25.0)
     assert late["mouthClose"][13] == pytest.approx(0.3)
-
-
-def test_curves_that_are_no_blendshapes_have_no_closures():
-    assert closures({"opening": [0.0, 0.1, 0.0]}, 3) == []
-    assert at_frames({"a": []}, [], 24.0) == {"a": []}
 
 
 def test_held_curves_are_not_interpolated_and_last_as_long_at_other_frames():

@@ -104,15 +104,8 @@ class Viewer(Client):
 
     def rests(self) -> list[tuple[float, list[LiveFrame]]]:
         """Return when frames of rest came in the midst of speech, and which."""
-        return [
-            (time_s, frames)
-            for time_s, now, frames in self.came
-            if now
-            and time_s > 1.0
-            and len(frames) == 5
-            and frames[-1]["viseme_sil"] > 0.999
-            and frames[-1]["opening"] < 0.005
-        ]
+        rests = [(time_s, frames) for time_s, now, frames in self.came if now and time_s > 1.0 and len(frames) == 5]
+        return [each for each in rests if each[1][-1]["viseme_sil"] > 0.999 and each[1][-1]["opening"] < 0.005]
 
 
 def bytes_of(frames: list[rtc.AudioFrame]) -> bytes:

@@ -6,7 +6,6 @@ from itertools import product
 import numpy as np
 import pytest
 
-from lipmotion import Corpus
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion.eigenlips import Eigenlips, eigenlips_from_arrays, eigenlips_to_arrays, fit_eigenlips
 from lipmotion.stats.pca import fit_pca
@@ -17,11 +16,8 @@ from lipmotion_faces.appearance.candidates import (
     Refiner,
     choose_candidates,
     draw_to_recorded,
-    find_best_sequence,
     make_candidates,
-    measure_details,
     sharpen,
-    square_distances,
 )
 from oracles.statistics import components, share
 
@@ -85,12 +81,6 @@ def test_what_nothing_can_be_chosen_from() -> None:
             choose_candidates(values, count)
 
 
-def test_squared_distances_are_those_of_the_definition() -> None:
-    some, others = mouths(1)[:9], mouths(2)[:5]
-    expected = [[float(np.square(a.astype(float) - b).sum()) for b in others] for a in some]
-    assert square_distances(some, others) == pytest.approx(np.array(expected), rel=1e-4, abs=1e-2)
-
-
 def test_a_candidate_is_its_eigenlips_and_its_detail_and_a_damaged_picture_is_none(space: Eigenlips) -> None:
     images = HELD_OUT[:20].copy()
     candidates = make_candidates(space, images)
@@ -110,24 +100,6 @@ def test_a_candidate_is_its_eigenlips_and_its_detail_and_a_damaged_picture_is_no
         make_candidates(space, images[7:8])
 
 
-def test_distances_between_details(space: Eigenlips) -> None:
-    candidates = make_candidates(space, HELD_OUT[:6])
-    for colour in range(3):
-        details = candidates.details[..., colour].astype(float)
-        expected = [[np.square(a - b).sum() for b in details] for a in details]
-        assert candidates.detail_distances[colour] == pytest.approx(np.array(expected), abs=1e-1)
-
-
-def test_details_are_what_the_eigenlips_leave_out(space: Eigenlips) -> None:
-    images = HELD_OUT[:20].copy()
-    images[3, :2] = 255 - images[3, :2]
-    codes = space.project(images)
-    details, deepest = measure_details(space, images, codes)
-    exact = np.rint(images - space.expand(codes))
-    assert np.array_equal(details, np.clip(exact, -100, 100).astype(np.int8))
-    assert deepest == pytest.approx(np.abs(exact).max(axis=(1, 2, 3)))
-
-
 def test_recorded_mouths_stay_where_they_are() -> None:
     values = mouths()[::5]
     assert draw_to_recorded(values, values) == pytest.approx(values, abs=0.2)  # they are up to 147 from 0
@@ -140,13 +112,6 @@ def test_a_mouth_between_recorded_ones_stays_and_one_far_away_comes_nearer() -> 
     assert far == pytest.approx([3.5, (1 - MIXTURE_SHARE) * 20 + MIXTURE_SHARE * 7], abs=0.5)  # 7 is the last recorded
     one = grid[:1]
     assert draw_to_recorded(one + 4, one) == pytest.approx(one + 4 * (1 - MIXTURE_SHARE), abs=1e-3)
-
-
-def test_mouths_are_drawn_smoothly_over_time() -> None:
-    recorded = mouths(1)[::3]
-    path = np.linspace(recorded[0], recorded[50], 400)
-    steps = np.linalg.norm(np.diff(draw_to_recorded(path.astype(np.float32), recorded), axis=0), axis=1)
-    assert steps.max() < 0.02 * np.linalg.norm(path[-1] - path[0])  # where the nearest ones change
 
 
 @pytest.fixture(scope="module")
@@ -220,50 +185,6 @@ def test_a_steadier_sequence_changes_detail_less(space: Eigenlips, refiner: Refi
     assert changes[0] > changes[1] > changes[2]
 
 
-def test_parts_of_a_video_are_those_of_the_whole(space: Eigenlips, refiner: Refiner) -> None:
-    wanted = space.project(HELD_OUT[:30])
-    steady = Refiner(space, refiner.candidates)
-    chosen, whole = steady.choose(wanted), refine(steady, wanted)
-    parts = [steady.refine(wanted[part], chosen[part]) for part in (slice(0, 11), slice(11, 30))]
-    assert np.abs(np.concatenate(parts).astype(int) - whole).max() <= 1  # products of other sizes may round otherwise
-
-
-def test_a_change_is_worth_its_cost() -> None:
-    costs = np.array([[[0.0, 5.0], [3.0, 0.0], [0.0, 5.0]]], np.float32)
-    numbers = np.tile([0, 1], (1, 3, 1))
-    change = np.array([[[0.0, 1.0], [1.0, 0.0]]], np.float32)
-    assert find_best_sequence(costs, numbers, change).tolist() == [[0, 1, 0]]
-    assert find_best_sequence(costs, numbers, 2 * change).tolist() == [[0, 0, 0]]
-
-
-@pytest.mark.long
-def test_the_mouths_of_a_corpus_become_sharper(toy_corpus: Corpus) -> None:
-    crops = {
-        split: np.concatenate([toy_corpus.utterance(name).track.crops for name in toy_corpus.names(split)])
-        for split in ("train", "val")
-    }
-    space = fit_eigenlips(crops["train"][::4], 2)
-    known = space.project(crops["train"])
-    refiner = Refiner(space, make_candidates(space, crops["train"][choose_candidates(known, 100)]))
-    wanted = space.project(crops["val"])
-    true, blurred, refined = map(edges, (crops["val"], space.restore(wanted), refine(refiner, wanted)))
-    assert blurred < 0.97 * true
-    assert abs(refined - true) < 0.5 * (true - blurred)
-
-
-def edges(images: np.ndarray) -> float:
-    """The energy of the gradient."""
-    return float(sum(np.square(np.diff(images.astype(float), axis=axis)).mean() for axis in (1, 2)))
-
-
-def test_short_videos_and_far_coefficients(space: Eigenlips, refiner: Refiner) -> None:
-    for options in (PAPER, RefinementOptions()):
-        for count in (0, 1, 2):
-            result = refine(Refiner(space, refiner.candidates, options), space.project(HELD_OUT[:2])[:count])
-            assert (result.shape, result.dtype) == ((count, 9, 12, 3), np.uint8)
-    assert {0, 255} <= set(np.unique(refine(refiner, np.array([[1e5] * 12, [-1e5] * 12]))))
-
-
 def test_what_cannot_be_refined(refiner: Refiner) -> None:
     for values, says in (
         (np.zeros((2, 11)), r"shape \(2, 11\), required finite ones of shape \(T, 12\)"),
@@ -316,31 +237,6 @@ def test_coefficients_are_what_the_paper_says(five: Eigenlips) -> None:
     for t, colour, k in np.ndindex(3, 3, 5):
         left = images[t, :, :, colour].astype(float).ravel() - five.mean[colour]
         assert coefficients[t, 5 * colour + k] == pytest.approx(five.basis[colour, k] @ left, abs=1e-2)
-
-
-def test_all_components_restore_the_pictures() -> None:
-    images = pictures(count=12)
-    five = fit_eigenlips(images, 30)
-    assert five.basis.shape[1] == 11  # twelve pictures span no more
-    assert np.abs(five.restore(five.project(images)).astype(int) - images).max() <= 1
-    assert five.explained == pytest.approx([1, 1, 1], abs=1e-6)
-
-
-def test_more_components_restore_better() -> None:
-    images = pictures(2)
-    spaces = [fit_eigenlips(images, count) for count in (1, 3, 6)]
-    errors = [np.square(five.restore(five.project(images)).astype(float) - images).mean() for five in spaces]
-    assert errors[0] > 2 * errors[1] > 4 * errors[2]
-    assert (np.diff([five.explained for five in spaces], axis=0) > 0).all()
-
-
-def test_restored_pictures_stay_within_black_and_white(five: Eigenlips) -> None:
-    extreme = np.zeros((2, 15), np.float32)
-    extreme[:, 0] = -1e6, 1e6
-    restored = five.restore(extreme)
-    assert (restored.dtype, restored.shape) == (np.uint8, (2, 9, 12, 3))
-    assert set(np.unique(restored[..., 0])) == {0, 255}
-    assert np.array_equal(five.restore(np.zeros((1, 15)))[0, :, :, 1].ravel(), np.rint(five.mean[1]))
 
 
 def test_channels_say_colour_and_number(five: Eigenlips) -> None:

@@ -6,9 +6,8 @@ import pytest
 
 from lipmotion import FilmedFace, types
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.stats.pca import choose_evenly
-from lipmotion_faces.appearance import candidates, lower_face, motion_map, person
-from lipmotion_faces.appearance.person import EDGE_PX, JAW_CANDIDATES, Appearance, FootagePictures, learn_appearance
+from lipmotion_faces.appearance import candidates, lower_face, motion_map
+from lipmotion_faces.appearance.person import JAW_CANDIDATES, Appearance, FootagePictures, learn_appearance
 from pipeline.damage import DAMAGES, UNREADABLE, damaged
 from testing.toy import toy_motion, toy_sentences
 from testing.toy_face import NOISE, SHAPE, toy_chin_px, toy_footage_pictures, toy_lower_faces
@@ -95,16 +94,6 @@ def test_a_closure_shows_a_recorded_mouth_that_is_closed(
     assert np.array_equal(pause, mixed)
 
 
-def test_pictures_of_the_mouth_in_any_light(appearance: Appearance, unseen: types.Motion) -> None:
-    drawn = toy_lower_faces(unseen, noise=0)[MOUTH]
-    dim = lower_face.relight(drawn, np.tile([0.6, 0.7, 0.9], (len(drawn), 1)))
-    bright, dark = appearance.measure_codes(drawn), appearance.measure_codes(dim)
-    assert bright.chin_px == pytest.approx(toy_chin_px(unseen), abs=1.0)
-    assert dark.chin_px == pytest.approx(bright.chin_px, abs=0.3)
-    assert np.abs(dark.mouth - bright.mouth).max() < 0.02 * np.abs(bright.mouth).max()
-    assert np.abs(dark.jaw - bright.jaw).max() < 0.05 * np.abs(bright.jaw).max()
-
-
 def test_a_jaw_of_sound_is_the_least_squares_line_of_its_level(
     appearance: Appearance, footage: FootagePictures, unseen: types.Motion
 ) -> None:
@@ -117,48 +106,6 @@ def test_a_jaw_of_sound_is_the_least_squares_line_of_its_level(
     assert middle.jaw == pytest.approx((quiet.jaw + loud.jaw) / 2, abs=1e-2)
     slope, start = np.polyfit(footage.levels_db, footage.chin_px, 1)
     assert appearance.from_sound[:, -1] == pytest.approx([start, slope], rel=0.01)
-
-
-def test_jaws_differ_in_the_jaw_alone(appearance: Appearance) -> None:
-    """Their mouth is the mean one, and so is what is further away from the jaw than cloning reads."""
-    same = (appearance.jaws == appearance.jaws[0]).all(axis=(0, 3))
-    inside = lower_face.mark_replaced(SHAPE, 1)
-    assert same[lower_face.mark_mouth(1)].all()
-    assert not same[inside & ~lower_face.mark_mouth(1)].any()
-    rows, columns = np.nonzero(~same)
-    reach = np.nonzero(inside)
-    for found, wanted in ((rows, reach[0]), (columns, reach[1])):
-        assert (found.min(), found.max()) == (wanted.min() - EDGE_PX, wanted.max() + EDGE_PX)
-
-
-@pytest.mark.long
-def test_all_pictures_are_in_one_light(footage: FootagePictures) -> None:
-    """A clip under another lamp is learned as if it had been the same."""
-    lamp = np.tile([0.7, 0.8, 0.9], (len(footage.clips[1]), 1))
-    dimmed = replace(footage, clips=(footage.clips[0], lower_face.relight(footage.clips[1], lamp), *footage.clips[2:]))
-    found, wanted = learn_appearance(dimmed), learn_appearance(footage)
-    assert found.light == pytest.approx(wanted.light, abs=0.5)
-    light = np.tile(found.light, (len(found.mouths), 1))
-    assert lower_face.measure_cheek_light(found.mouths) == pytest.approx(light, abs=0.5)
-    motion = types.Motion(footage.motion[::5], 25.0, footage.channels)
-    pictures = [each.mouth.restore(each.predict_codes(motion).mouth).astype(int) for each in (found, wanted)]
-    assert np.abs(pictures[0] - pictures[1]).mean() < 1.0
-
-
-@pytest.mark.long
-def test_damaged_pictures_are_no_candidates(footage: FootagePictures, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A blue square, as errors of video leave it, in a picture from which no component is learned."""
-    monkeypatch.setattr(person, "TRAINING_PICTURES", 120)
-    learned = set(choose_evenly(120, len(footage.motion)))
-    damaged = next(n for n in range(20, 60) if n not in learned)
-    clip = footage.clips[0].copy()
-    rows, columns = lower_face.find_mouth_part(1)
-    clip[damaged, rows.start + 20 : rows.start + 28, columns.start + 30 : columns.start + 38] = [0, 0, 255]
-    found = learn_appearance(replace(footage, clips=(clip, *footage.clips[1:])))
-    whole = learn_appearance(footage)
-    assert len(found.mouths) == len(whole.mouths) - 1
-    blue = (found.mouths[:, 20:28, 30:38].astype(int) @ [-1, -1, 1]).mean(axis=(1, 2))
-    assert blue.max() < 100
 
 
 @pytest.mark.parametrize(
@@ -219,18 +166,6 @@ def test_a_channel_that_never_moves_is_left_out(fitted: motion_map.MotionMap) ->
     assert fitted.predict(motion(other)) == pytest.approx(fitted.predict(motion(moved)), abs=1e-6)
 
 
-def test_components_have_unit_variance_and_are_as_many_as_move() -> None:
-    draw = np.random.default_rng(3)
-    for values, count in ((draw.normal(0, 1, (600, 6)) @ draw.normal(0, 0.1, (6, 50)), 6),
-                          (draw.normal(0, 1, (900, 30)), motion_map.COMPONENTS)):  # fmt: skip
-        found = motion_map.fit_motion_map(
-            values, tuple(types.Channel(f"x_{n}") for n in range(values.shape[1])), values[:, :2]
-        )
-        assert found.basis.shape == (values.shape[1], count)
-        components = (values - found.mean) / found.scale @ found.basis
-        assert np.cov(components.T) == pytest.approx(np.eye(count), abs=0.01)
-
-
 def test_far_from_all_footage_it_is_as_at_its_edge(fitted: motion_map.MotionMap) -> None:
     directions = poses(200, seed=4)[:, [0, 1, 3]] - fitted.mean
     wanted = pictured(poses())
@@ -242,34 +177,6 @@ def test_far_from_all_footage_it_is_as_at_its_edge(fitted: motion_map.MotionMap)
         assert (predicted > wanted.min(axis=0) - margin).all()
         assert (predicted < wanted.max(axis=0) + margin).all()
         assert fitted.predict(motion(further)) == pytest.approx(predicted, abs=1e-4)
-
-
-def test_limits_leave_out_the_outermost_poses() -> None:
-    values = poses()
-    values[17] = [40.0, -30.0, 0.37, 9.0]  # one frame in which the tracker was wrong
-    found = motion_map.fit_motion_map(values, CHANNELS, pictured(poses()))
-    components = (values[:, [0, 1, 3]] - found.mean) / found.scale @ found.basis
-    outside = (components < found.limits[0]) | (components > found.limits[1])
-    assert outside[17].any()
-    assert outside.mean(axis=0) == pytest.approx([2 * motion_map.OUTER_PERCENTAGE / 100] * 3, abs=1e-3)
-
-
-def test_short_footage_is_trusted_less(fitted: motion_map.MotionMap) -> None:
-    """What footage does not say is the mean picture: coefficients shrink as frames become few."""
-    sizes = []
-    for frames in (30, 300, FRAMES):
-        values, wanted = poses(frames), pictured(poses(frames))
-        found = fitted if frames == FRAMES else motion_map.fit_motion_map(values, CHANNELS, wanted)
-        sizes.append((found.predict(motion(values)).std(axis=0)[:3] / wanted.std(axis=0)[:3]).mean())
-    assert sizes[0] < 0.6 < sizes[1] < sizes[2] < 1.01
-
-
-def test_the_fewest_frames_give_about_the_mean() -> None:
-    for frames in (motion_map.FRAMES_PER_CENTRE, 10):
-        values = poses(frames)
-        found = motion_map.fit_motion_map(values, CHANNELS, pictured(values))
-        assert len(found.centres) == frames // motion_map.FRAMES_PER_CENTRE
-        assert found.predict(motion(values)).mean(axis=0) == pytest.approx(pictured(values).mean(axis=0), abs=0.05)
 
 
 def test_motion_that_cannot_be_learned_from() -> None:
@@ -287,14 +194,6 @@ def test_motion_that_nobody_can_map(fitted: motion_map.MotionMap) -> None:
     values[3, 0] = np.inf
     with pytest.raises(InputError, match="not finite; give whole curves"):
         fitted.predict(motion(values))
-
-
-def test_channels_are_found_by_name(fitted: motion_map.MotionMap) -> None:
-    values = poses(50, seed=5)
-    order = [3, 1, 2, 0]
-    turned = types.Motion(values[:, order], 25.0, tuple(CHANNELS[n] for n in order))
-    assert motion_map.select_channels(turned, ("opening", "width")) == pytest.approx(values[:, :2])
-    assert fitted.predict(turned) == pytest.approx(fitted.predict(motion(values)))
 
 
 def test_as_arrays_and_back_and_damaged_arrays(fitted: motion_map.MotionMap) -> None:
@@ -377,15 +276,6 @@ def test_the_jaw_moves_less_towards_its_joints() -> None:
     assert steps[0] > steps[1] + 0.3 > steps[2] + 1 > steps[3]
     mirrored = [line_px(moved[0], -x) - line_px(picture[0], -x) for x in (0.5, 20.5, 40.5, 50.5)]
     assert mirrored == pytest.approx(steps, abs=0.05)
-
-
-def test_the_part_that_may_differ_holds_all_that_does() -> None:
-    for scale in (1, 2):
-        part = lower_face.mark_moved(scale)
-        assert part.shape == (lower_face.HEIGHT * scale, lower_face.WIDTH * scale)
-        assert not np.concatenate([part[[0, -1]].ravel(), part[:, [0, -1]].ravel()]).any()
-        inside = lower_face.mark_replaced(lower_face.FaceShape(44.0, 120.0), scale)
-        assert (part & inside).sum() == inside.sum()
 
 
 def test_no_chin_folds_or_tears() -> None:

@@ -27,9 +27,8 @@ from lipmotion_faces.appearance.lower_face import (
     mark_replaced,
     measure_cheek_light,
     measure_shape,
-    relight,
 )
-from lipmotion_faces.appearance.placing import cut, feather, invert_map, place
+from lipmotion_faces.appearance.placing import cut, feather, place
 from lipmotion_faces.kernels.affine import resample
 
 TURNED = np.array([[0.7, -0.1, 12.3], [0.12, 0.68, 8.6]])
@@ -45,22 +44,6 @@ def test_whole_pixels_move_exactly_and_pixels_outside_repeat_the_outermost() -> 
     for x, y, size in ((0, 0, (20, 30)), (4, 7, (10, 20)), (-4, -4, (28, 38))):
         made = resample(pictures, np.array([[1.0, 0, x], [0, 1, y]]), size)
         assert made == pytest.approx(padded[:, y + 4 : y + 4 + size[0], x + 4 : x + 4 + size[1]], abs=1e-4)
-
-
-def test_smooth_functions_are_exact_between_pixels() -> None:
-    def function(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        return (3 + x - 2 * y) ** 2
-
-    y, x = np.mgrid[:60, :60] / 60
-    made = resample(np.repeat(function(x, y)[None, :, :, None], 3, axis=3), TURNED, (40, 40))[0, :, :, 2]
-    row, column = np.mgrid[:40, :40]
-    at_x, at_y = (TURNED[i, 0] * column + TURNED[i, 1] * row + TURNED[i, 2] for i in range(2))
-    assert made == pytest.approx(function(at_x / 60, at_y / 60), abs=1e-4)
-
-
-def test_there_and_back() -> None:
-    back, point = invert_map(TURNED), np.array([3.0, 5.0])
-    assert back[:, :2] @ (TURNED[:, :2] @ point + TURNED[:, 2]) + back[:, 2] == pytest.approx(point)
 
 
 def test_the_weight_rises_from_the_edge() -> None:
@@ -114,12 +97,6 @@ def test_what_does_not_fit_is_refused() -> None:
             place(other, patch, weight, TURNED)
 
 
-def test_a_patch_of_pixels_as_large_as_the_frames_is_resampled() -> None:
-    frame = noise((60, 60, 3))
-    assert (cut(frame, TURNED, (20, 24)) == resample(frame[None], TURNED, (20, 24))[0]).all()
-    assert cut(frame, TURNED, (20, 24)).dtype == np.float32
-
-
 def test_pixels_of_a_large_frame_are_averaged() -> None:
     """A patch whose pixels are blocks of the frame's holds the means of these blocks."""
     frame = noise((60, 90, 3))
@@ -128,20 +105,6 @@ def test_pixels_of_a_large_frame_are_averaged() -> None:
         patch = cut(frame, to_frame, (60 // samples, 90 // samples))
         blocks = frame.reshape(60 // samples, samples, 90 // samples, samples, 3).mean((1, 3))
         assert patch == pytest.approx(blocks, abs=1e-3)
-
-
-def test_no_pixel_of_a_large_frame_is_skipped() -> None:
-    """Every pixel of the frame counts about as much in the patch as every other."""
-    for scale in (1.6, 3.4):
-        turned = np.column_stack([scale * np.array([[0.95, -0.3], [0.3, 0.95]]), [9.3, 4.1]])
-        frame = np.zeros((60, 60, 3), np.uint8)
-        seen = np.zeros((7, 7))
-        for row, column in np.ndindex(7, 7):
-            frame[24 + row, 24 + column] = 200
-            seen[row, column] = cut(frame, turned, (36, 36)).sum()
-            frame[24 + row, 24 + column] = 0
-        assert (0.9 * seen.mean() < seen).all()
-        assert (seen < 1.1 * seen.mean()).all()
 
 
 def test_what_was_cut_is_placed_where_it_was() -> None:
@@ -165,16 +128,6 @@ def test_every_pixel_has_its_place_in_the_frame(scale: int) -> None:
         face = np.array([CORNER[0] + (column + 0.5) / scale, CORNER[1] + (row + 0.5) / scale])
         wanted = PLACE[:, :2] @ face + PLACE[:, 2] - 0.5
         assert to_frame[:, :2] @ [column, row] + to_frame[:, 2] == pytest.approx(wanted)
-
-
-@pytest.mark.parametrize("scale", [1, 2])
-def test_a_frame_of_the_face_alone_is_cut_out_to_the_bit(scale: int) -> None:
-    """Where a frame has ``scale`` pixels for each of the face, nothing is resampled."""
-    picture = np.random.default_rng(0).integers(0, 256, (40 * scale + HEIGHT * scale, 200 * scale, 3), np.uint8)
-    place = np.array([[scale, 0, 100.0 * scale], [0, scale, 8.0 * scale]])
-    left, top = round((100 + CORNER[0]) * scale), round((8 + CORNER[1]) * scale)
-    found = cut(picture, map_region(place, scale), (HEIGHT * scale, WIDTH * scale))
-    assert np.array_equal(np.rint(found), picture[top : top + HEIGHT * scale, left : left + WIDTH * scale])
 
 
 @pytest.mark.parametrize(
@@ -238,15 +191,6 @@ def test_light_is_that_of_the_corners(scale: int) -> None:
     for shape in ((2, 56, 72), (2, 50, 72, 3), (2, 56, 144, 3), (2, 57, 72, 3)):
         with pytest.raises(InputError, match=r"required \(T, 56 · n, 72 · n, 3\)"):
             measure_cheek_light(np.zeros(shape, np.uint8))
-
-
-def test_relit_pictures_are_lighter_by_their_gains() -> None:
-    pictures = np.random.default_rng(1).integers(0, 256, (3, 20, 10, 3), np.uint8)
-    gains = np.array([[1, 1, 1], [1.3, 0.5, 0], [2, 1, 1.1]])
-    made = relight(pictures, gains)
-    assert made.dtype == np.uint8
-    assert np.array_equal(made, np.clip(np.rint(pictures * gains[:, None, None]), 0, 255))
-    assert np.array_equal(made[0], pictures[0])
 
 
 def face(seed: int) -> np.ndarray:

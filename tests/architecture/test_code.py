@@ -12,25 +12,14 @@ from portable.run import NUMERIC
 SOURCE = Path(__file__).parents[2] / "src"
 EMPTY_NAMES = {"utils", "util", "helpers", "helper", "common", "core", "misc"}
 """Module names without meaning."""
-FRAGMENTS = {"And", "But", "Less", "Of", "Or"}
-"""Words with which a docstring does not begin: it is read alone."""
-ADVERBS = set(
-    "ALMOST ALONE APART AWAY BELOW DEEP ENOUGH EXACT FAR FEW LARGE LOUD MANY MOST NEAR NEARLY NONE OFTEN".split()
-)
-ADVERBS |= set("QUIET RATHER SELDOM SHOWN SMALL STRONG TIGHT WHOLLY WIDE LEAST LARGEST LONGEST SMALLEST WIDEST".split())
-"""Words that do not say alone what a number measures: its name is a noun, with its unit."""
 PICKLES = {"pickle", "shelve", "marshal", "dill"}
-Definition = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
 Rule = Callable[[str], Iterator[int]]
 
 
-parsed = lru_cache(maxsize=1)(ast.parse)  # the trees of all modules are 200 MB
-
-
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=1)  # the trees of all modules are 200 MB
 def nodes(text: str) -> list[ast.AST]:
     """Return all nodes of a module."""
-    return list(ast.walk(parsed(text)))
+    return list(ast.walk(ast.parse(text)))
 
 
 def calls(text: str, *last_names: str) -> Iterator[tuple[ast.Call, str]]:
@@ -40,31 +29,6 @@ def calls(text: str, *last_names: str) -> Iterator[tuple[ast.Call, str]]:
             last = getattr(node.func, "attr", getattr(node.func, "id", ""))
             if last.startswith(last_names):
                 yield node, ast.unparse(node.func)
-
-
-def public(body: list[ast.stmt]) -> Iterator[Definition]:
-    """Give the public functions and classes of a module, and their public methods."""
-    for node in body:
-        if isinstance(node, Definition) and not node.name.startswith("_"):
-            yield node
-            if isinstance(node, ast.ClassDef):
-                yield from public(node.body)
-
-
-def without_docstring(text: str) -> Iterator[int]:
-    """What overrides a documented method says so with ``noqa: D102``."""
-    tree, lines = parsed(text), text.splitlines()
-    if not ast.get_docstring(tree):
-        yield 1
-    for node in public(tree.body):
-        signature = lines[node.lineno - 1 : max(node.body[0].lineno - 1, node.lineno)]
-        if not ast.get_docstring(node) and not any("noqa: D102" in line for line in signature):
-            yield node.lineno
-
-
-def asserted(text: str) -> Iterator[int]:
-    """Input is checked by raising an error that says what to do."""
-    return (node.lineno for node in nodes(text) if isinstance(node, ast.Assert))
 
 
 def pickled(text: str) -> Iterator[int]:
@@ -82,9 +46,9 @@ def pickled(text: str) -> Iterator[int]:
 
 def changeable(text: str) -> Iterator[int]:
     """The data that flows is frozen."""
-    for node in public(parsed(text).body):
-        for decorator in node.decorator_list:
-            written = ast.unparse(decorator)
+    for node in nodes(text):
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+            written = " ".join(map(ast.unparse, node.decorator_list))
             if written.startswith("dataclass") and "frozen=True" not in written:
                 yield node.lineno
 
@@ -97,41 +61,12 @@ def printed(text: str) -> Iterator[int]:
 
 
 def by_chance(text: str) -> Iterator[int]:
-    """Chance comes from ``np.random.default_rng(seed)``: no hidden state, no clock."""
-    if "random" not in text:
-        return
-    for node in nodes(text):
-        if isinstance(node, ast.Import) and any(alias.name == "random" for alias in node.names):
-            yield node.lineno
-    for call, name in calls(text, ""):
-        if re.fullmatch(r"np\.random\.\w+", name) and (name != "np.random.default_rng" or not call.args):
-            yield call.lineno
-
-
-def fragmentary(text: str) -> Iterator[int]:
-    """A docstring, also that of a constant, is clear to a reader who meets it alone."""
-    for node in nodes(text):
-        if not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)):
-            continue
-        if str(node.value.value).strip().partition(" ")[0] in FRAGMENTS:
-            yield node.lineno
-
-
-def adverbial(text: str) -> Iterator[int]:
-    """A constant that is a number is a noun."""
-    for node in parsed(text).body:
-        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value:
-            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            names = {
-                name.id.lstrip("_") for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)
-            }
-            numbers = (each.value for each in ast.walk(node.value) if isinstance(each, ast.Constant))
-            if names & ADVERBS and any(isinstance(number, int | float) for number in numbers):
-                yield node.lineno
+    """Chance comes from ``np.random.default_rng(seed)``; hidden states are found by ruff (NPY002, S311)."""
+    return (call.lineno for call, name in calls(text, "default_rng") if not call.args)
 
 
 def test_rules_are_kept() -> None:
-    rules = (without_docstring, asserted, pickled, changeable, by_chance, fragmentary, adverbial, printed)
+    rules = (pickled, changeable, by_chance, printed)
     found = []
     for path in sorted(SOURCE.rglob("*.py")):
         text, name = path.read_text(encoding="utf-8"), path.relative_to(SOURCE).as_posix()
@@ -142,32 +77,17 @@ def test_rules_are_kept() -> None:
 
 
 OFFENCES: list[tuple[Rule, str, list[int]]] = [
-    (without_docstring, '"""A."""\ndef a(): ...\ndef _b(): ...\n', [2]),
-    (without_docstring, '"""A."""\nclass A:\n    """A."""\n    def b(self): ...\n', [4]),
-    (without_docstring, "x = 1\n", [1]),
-    (without_docstring, '"""A."""\nclass A:\n    """A."""\n    def b(self):  # noqa: D102\n        return 1\n', []),
-    (asserted, "x = 1\nassert x\n", [2]),
     (pickled, "import pickle\n", [1]),
-    (pickled, "from pickle import loads\n", [1]),
-    (pickled, "import joblib\n", [1]),
     (pickled, "from joblib import load\n", [1]),
     (pickled, "from joblib import Parallel, delayed\n", []),
     (pickled, "np.load(path)\n", [1]),
     (pickled, "np.load(path, allow_pickle=False)\njson.load(file)\n", []),
-    (changeable, "@dataclass\nclass A: ...\n", [2]),
     (changeable, "@dataclass(eq=False)\nclass A: ...\n", [2]),
     (changeable, "@dataclass(frozen=True)\nclass A: ...\n", []),
     (printed, "print(1)\n", [1]),
     (printed, "import sys\nsys.stdout.write('a')\nsys.__stderr__.writelines([])\nsys.stdout.flush()\n", [2, 3]),
-    (by_chance, "np.random.normal(3)\n", [1]),
     (by_chance, "rng = np.random.default_rng()\n", [1]),
     (by_chance, "rng = np.random.default_rng(seed)\nrng.normal(3)\n", []),
-    (by_chance, "import random\n", [1]),
-    (fragmentary, 'A = 1\n"""Of all, the first."""\n', [2]),
-    (fragmentary, 'def f():\n    """But less."""\n', [2]),
-    (fragmentary, '"""Often, and of all."""\nA = "Of"\n', []),
-    (adverbial, "NEAR, WIDTH = 1, -2.0\n_FAR: Final = 3\n", [1, 2]),
-    (adverbial, 'NEAR_S = 1\nFEW = ("a", "b")\ndef f():\n    FAR = 1\n', []),
 ]
 
 
@@ -191,37 +111,6 @@ def test_a_class_name_has_one_meaning() -> None:
 
 
 TESTS = Path(__file__).parents[1]
-STARTERS = re.compile(r"os\.(fork\w*|system|popen|spawn\w+|posix_spawnp?|exec[lv]\w*)|\w+\.create_subprocess_\w+")
-MODULES = {"subprocess", "pty"}
-ALLOWED = {"children.py"}
-"""The one module that starts processes; the fuzzer's own start by ``multiprocessing``, and are watched by it."""
-
-
-def starts(text: str) -> Iterator[int]:
-    """Give the lines of a program that could start a process other than by ``children``."""
-    suspect = STARTERS.search(text) or any(re.search(rf"\b{module}\b", text) for module in MODULES)
-    for node in ast.walk(ast.parse(text)) if suspect else ():
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            named = {alias.name for alias in node.names} | {getattr(node, "module", "")}
-            if named & MODULES:
-                yield node.lineno
-        elif isinstance(node, ast.Call) and STARTERS.fullmatch(ast.unparse(node.func)):
-            yield node.lineno
-
-
-def test_children_are_started_in_one_place() -> None:
-    found = {
-        str(path.relative_to(TESTS)): lines
-        for path in sorted(TESTS.rglob("*.py"))
-        if (lines := list(starts(path.read_text(encoding="utf-8"))))
-    }
-    assert found.keys() == ALLOWED, found
-
-
-def test_the_rule_finds_what_breaks_it() -> None:
-    for text in ("import subprocess", "def f():\n    from subprocess import run", "os.system('a')", "os.fork()"):
-        assert list(starts(text)), text
-    assert list(starts("from children import run_child\nrun_child(['a'])\nos.execute = 1\n")) == []
 
 
 def test_planted_faults_still_fit_the_source() -> None:

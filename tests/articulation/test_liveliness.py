@@ -6,8 +6,9 @@ from lipmotion.articulation import expression, liveliness
 from lipmotion.articulation.liveliness import compute_liveliness
 from lipmotion.articulation.mouth import EXPRESSED, ROUND_WIDTH, find_mouth
 from lipmotion.pipeline.outputs.deliver import FACTORS, deliver, with_detected, with_manners
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import Channel, Generation, Motion, Prosody, Span, Timeline, Unit, VoiceEvent
-from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
+from lipmotion.types.audio import BREATH, LAUGHTER
 from lipmotion.types.delivery import MANNERS, MOODS, NEUTRAL, PLAIN, Delivery, MoodKey, format_moods, parse_moods
 from meshes.speech import motion, units
 
@@ -43,13 +44,6 @@ def test_every_blink_is_seen_at_25_frames_a_second():
         assert liveliness.lid_closure(time_s, [begin]).max() > 0.85
 
 
-def test_blinks_prefer_the_ends_of_phrases():
-    ends = np.array([end for _, end in liveliness.find_phrases(SAID)])
-    lids = (compute_liveliness(frames(100), MINUTE, SAID, None, seed=seed).lids for seed in range(10))
-    near = [np.abs(ends - blink / 100).min() < 0.2 for each in lids for blink in closings(each)]
-    assert np.mean(near) > 0.25  # 0.4 of every 4 s: 0.1 by chance
-
-
 CURVES = ("lids", "brows", "gaze", "turn")
 
 
@@ -59,11 +53,9 @@ def test_nothing_depends_on_the_frame_rate():
         assert getattr(slow, name) == pytest.approx(getattr(fast, name)[::2])
 
 
-def test_a_seed_gives_the_same_and_another_seed_something_else():
-    first, same, other = (compute_liveliness(frames(25), MINUTE, SAID, None, seed=seed) for seed in (1, 1, 2))
-    for name in CURVES:
-        assert np.array_equal(getattr(first, name), getattr(same, name))
-        assert np.abs(getattr(first, name) - getattr(other, name)).max() > 0
+def test_another_seed_gives_something_else():
+    first, other = (compute_liveliness(frames(25), MINUTE, SAID, None, seed=seed) for seed in (1, 2))
+    assert all(np.abs(getattr(first, name) - getattr(other, name)).max() > 0 for name in CURVES)
 
 
 @pytest.mark.parametrize(("part", "curve"), [("blinks", "lids"), ("brows", "brows"), ("head", "turn")])
@@ -95,13 +87,6 @@ def test_loud_and_high_moments_raise_the_brows_and_nod_the_head():
         assert difference[soon].mean() > difference[~soon].mean() + 0.005
 
 
-def test_glances_are_steps_between_rests_and_of_limited_size():
-    moved = compute_liveliness(frames(100), MINUTE, SAID, None, head=False)
-    assert np.abs(moved.gaze[:, 0]).max() <= liveliness.LARGEST_GLANCE[0]
-    assert np.abs(moved.gaze[:, 0]).max() > 0.08
-    assert (np.abs(np.diff(moved.gaze[:, 0])) < 1e-6).mean() > 0.8
-
-
 def test_brows_are_level_at_rest_and_never_below():
     brows = compute_liveliness(frames(25), MINUTE, SILENT, Prosody(np.full(6001, -30.0), np.full(6001, np.nan))).brows
     assert brows.min() >= 0
@@ -116,12 +101,6 @@ def test_the_head_moves_slowly_and_less_in_silence():
     assert 0 < silent.std(axis=0).max() < 0.7 * turn.std(axis=0).max()
 
 
-def test_without_time_and_phones_nothing_fails():
-    nothing = Motion(np.zeros((1, 1)), 100.0, (Channel("opening"),))
-    moved = compute_liveliness(np.zeros(1), nothing, Timeline(()), None)
-    assert len(moved.lids) == len(moved.turn) == 1
-
-
 ACTION_UNITS = {1, 2, 4, 5, 6, 7, 9, 10, 12, 14, 15, 17, 20, 23, 24, 25, 26, 43, 53, 54, 55, 56, 57, 58, 64}
 """Those that faces show."""
 SOURCES = {"EMFACS", "Ekman2003", "Harrigan1996", "Sundelin2013", "ours"}
@@ -133,7 +112,8 @@ PROTOTYPES = {
 
 
 def test_every_mood_has_known_action_units_with_intensities_and_sources():
-    rows = [(row["mood"], int(row["action_unit"]), row["source"]) for row in expression.list_mood_rows()]
+    table = read_shipped_table("lipmotion.articulation", "moods.csv")
+    rows = [(row["mood"], int(row["action_unit"]), row["source"]) for row in table]
     assert {mood for mood, *_ in rows} == {*MOODS}
     assert len({(mood, unit) for mood, unit, _ in rows}) == len(rows)
     assert {source for *_, source in rows} == SOURCES
@@ -249,13 +229,13 @@ def test_a_manner_holds_until_the_next_and_moods_do_not_count(generation: Genera
 @pytest.mark.parametrize(
     ("asked", "shown"),
     [
-        ("", "whisper:0.5 at 1, plain at 2, happy at 3, neutral at 4, shout:0.8 at 5, plain at 6"),
-        ("sad", "sad at 0, whisper:0.5 at 1, plain at 2, shout:0.8 at 5, plain at 6"),
+        ("", "happy at 3, neutral at 4"),
+        ("sad", "sad at 0"),
         ("plain", "plain at 0, happy at 3, neutral at 4"),
         ("mumble at 1, angry at 2", "mumble at 1, angry at 2"),
     ],
 )
 def test_what_is_detected_is_shown_where_nothing_of_its_kind_is_asked_for(asked: str, shown: str) -> None:
-    kinds = ((1, WHISPER, 0.5), (3, LAUGHTER, 0.9), (4.5, BREATH, 1), (5, SHOUT, 0.8))
+    kinds = ((3, LAUGHTER, 0.9), (4.5, BREATH, 1))
     events = [VoiceEvent(start_s, start_s + 1, kind, strength) for start_s, kind, strength in kinds]
     assert format_moods(with_detected(parse_moods(asked), events)) == shown

@@ -2,16 +2,7 @@ import numpy as np
 import pytest
 
 from lipmotion.articulation.contact import opening_to_gap
-from lipmotion.articulation.mouth import (
-    LIP_SPEED,
-    PURSED_GAP,
-    TUCKED_GAP,
-    WIDTH_REACH,
-    SpokenMouth,
-    find_mouth,
-    measure_jaw_drop,
-    weigh_upper,
-)
+from lipmotion.articulation.mouth import LIP_SPEED, PURSED_GAP, TUCKED_GAP, WIDTH_REACH, find_mouth, measure_jaw_drop
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Motion, Timeline, Unit
 from meshes.speech import said
@@ -28,19 +19,6 @@ def in_phone(phone: str, opening: float = 0.06, width: float = 0.57) -> dict[str
     """Return the mouth in the middle of a phone after silence, whatever is measured there."""
     moved = motion(100.0, opening=np.full(101, opening), width=np.where(np.arange(101) < 25, 0.57, width))
     return list(find_mouth(moved, said((0, 0.2, "sil"), (0.3, 0.7, phone))).rows())[50]
-
-
-def test_there_is_a_frame_for_every_picture_to_the_end_of_the_motion():
-    moved = motion(100.0, opening=np.linspace(0, 0.2, 201))
-    for fps in (25.0, 29.97):
-        mouth = find_mouth(moved, NOTHING_SAID, fps)
-        assert mouth.rate_hz == fps
-        assert len(mouth.gap) == len(mouth.teeth) == int(2.0 * fps + 1e-6) + 1
-        middle = round(fps)
-        assert mouth.gap[middle] == pytest.approx(float(opening_to_gap(np.array(0.1 * middle / fps))), abs=1e-3)
-    mouth = find_mouth(moved, NOTHING_SAID)
-    assert isinstance(mouth, SpokenMouth)
-    assert mouth.at(100.0) is mouth
 
 
 def test_speakers_with_different_rest_poses_move_alike():
@@ -69,13 +47,6 @@ def test_width_is_as_measured_but_not_without_end():
     assert 1 - WIDTH_REACH <= width[90] < 0.72
 
 
-def test_the_opening_alone_is_enough():
-    mouth = find_mouth(motion(opening=[0, 0.1, 0.3]), NOTHING_SAID)
-    assert mouth.width[0] == mouth.fullness[0] == 1
-    assert mouth.width[2] < mouth.width[1] < 1
-    assert mouth.jaw == pytest.approx(measure_jaw_drop(mouth.gap))
-
-
 def test_the_tracked_chin_moves_the_jaw_within_reason():
     opening = np.r_[np.zeros(20), np.full(60, 0.1)]
     chin = np.r_[np.full(20, -1.4), np.full(20, -1.475), np.full(20, -1.4), np.full(20, -2.0)]
@@ -84,12 +55,6 @@ def test_the_tracked_chin_moves_the_jaw_within_reason():
     assert 0.75 * usual < jaw[30] < 1.15 * usual + 0.01
     assert jaw[50] == pytest.approx(0.75 * usual)
     assert jaw[70] == pytest.approx(1.15 * usual + 0.01)
-
-
-def test_the_upper_lip_rises_less_than_the_lower_one_falls():
-    gap = np.linspace(0.01, 0.45, 50)
-    assert (weigh_upper(gap) < 0.32 * gap).all()
-    assert (weigh_upper(gap) < 0.06).all()
 
 
 def test_f_and_v_tuck_the_lip_and_show_the_teeth():
@@ -186,7 +151,7 @@ def test_unusable_motion_is_refused():
     for curves, words in wrong:
         with pytest.raises(InputError, match=words):
             find_mouth(motion(**curves), NOTHING_SAID)  # type: ignore[arg-type]
-    for fps in (0, -1, float("nan"), float("inf")):
+    for fps in (0, float("nan")):
         with pytest.raises(InputError, match="frame rate"):
             find_mouth(motion(opening=[0.0]), NOTHING_SAID, fps)
 

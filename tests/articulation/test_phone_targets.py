@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lipmotion.articulation.lip_points import make_symmetrical
-from lipmotion.articulation.phone_targets import GESTURES, TIP_OUT, gesture_curves, with_gestures
+from lipmotion.articulation.phone_targets import GESTURES, gesture_curves, with_gestures
 from lipmotion.types import WEIGHT, Channel, Motion, Span, Timeline, Unit
 from meshes.speech import motion
 
@@ -20,19 +20,11 @@ def middle(phones: tuple[str, ...], number: int, name: str) -> float:
 
 
 def test_a_phone_reaches_its_target_whatever_is_beside_it():
-    for name, phone in (
-        ("lip_tuck", "f"), ("lip_tuck", "v"), ("tongue", "th"), ("tongue", "dh"), ("protrusion", "uw"),
-        ("protrusion", "w"), ("spread", "iy"), ("lip_press", "p"), ("lip_press", "b"), ("lip_press", "m"),
-        ("teeth", "s"),
-    ):  # fmt: skip
+    asked = {"f": "lip_tuck", "th": "tongue", "uw": "protrusion", "iy": "spread", "p": "lip_press", "s": "teeth"}
+    for phone, name in asked.items():
         for left in ("aa", "iy", "uw", "m", "f", "th", "sil"):
             if left != phone:
                 assert middle((left, phone, "aa"), 1, name) > 0.85
-
-
-def test_the_tip_of_the_tongue_is_up_but_not_out():
-    for phone in ("l", "t", "d", "n"):
-        assert 0.4 < middle(("aa", phone, "aa"), 1, "tongue") < 0.75 < TIP_OUT
 
 
 def test_lips_round_before_the_vowel_that_needs_it_and_other_targets_end_where_they_cannot_be():

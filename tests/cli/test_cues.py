@@ -225,7 +225,7 @@ def test_under_its_name(run_outside):
     assert json.loads(done.err[-1])["type"] == "failure"
 
 
-@pytest.mark.parametrize("verb", ["animate", "cues"])
+@pytest.mark.parametrize("verb", ["animate", "words", "cues"])
 def test_the_recording_behind_the_outputs(run, here, verb):
     """The message is of the recording, not that there is none."""
     for words in (["-o", "out.json", "missing.wav"], ["-o", "out.json", "a.json", "missing.wav"]):

@@ -19,9 +19,10 @@ from lipmotion.cli import command_line
 from lipmotion.cli.arguments.declared import pick_part
 from lipmotion.pipeline.job import DETAILS
 from lipmotion.types import Delivery, Staging
+from meshes.heads import head, write_glb
 
 LINE = """animate a.wav --transcript t.txt --model m.lipmotion --pauses natural -o a.json b.mp4 -o c.vtt --channels
-opening,width --fps 30 --face man --jaw none --control-points --still blinks,head --face-seed 3 --stepped
+opening,width --fps 30 --face man --jaw none --control-points --to csv,mp4 --still blinks,head --face-seed 3 --stepped
 --offset-ms -40 --background #102030"""
 SAME = Job(
     Request(Path("a.wav"), "t.txt", pauses="natural", model=Path("m.lipmotion")),
@@ -33,6 +34,7 @@ SAME = Job(
         background="#102030",
         jaw="none",
         control_points=True,
+        kinds=("csv", "mp4"),
     ),
     Delivery(offset_ms=-40.0, stepped=True),
     Staging(blinks=False, head=False, seed=3),
@@ -50,6 +52,7 @@ face = "man"
 background = "#102030"
 jaw = "none"
 control_points = true
+kinds = ["csv", "mp4"]
 [delivery]
 offset_ms = -40
 stepped = true
@@ -71,7 +74,9 @@ needs_toml = pytest.mark.skipif(sys.version_info < (3, 11), reason="Python 3.10 
 
 def parsed(*words: str) -> Job:
     options = command_line.parse_words(words, argparse.Namespace())
-    return pick_part(options, options.start)
+    speech = options.speech[0] if isinstance(options.speech, list) else options.speech
+    request = pick_part(options, options.start.request, recording=speech)
+    return pick_part(options, options.start, request=request)
 
 
 def test_the_command_line_makes_the_same_job():
@@ -206,7 +211,7 @@ def test_what_edit_refuses(run, speech, toy_model_file, tmp_path):
         (["edit", file, "phone 3 is p"], "no such file; begin one: lipmotion edit"),
         (["render", file, "-o", tmp_path / "a.csv"], "a.edits.json: cannot be read"),
         (["animate", speech, "--edits", file, "-o", tmp_path / "a.csv"], "a.edits.json: no such edits file"),
-        (["edit", tmp_path / "a.csv", *of], "is called .json, not"),
+        (["edit", tmp_path / "a.csv", *of], "a file of edits is called .json"),
         (["edit", file, *of], ""),
         (["edit", file, "--of", speech], "exists; add edits without --of"),
         (["edit", file, "--undo", 2], "2 edits to take back, required 0 to 0"),
@@ -217,6 +222,70 @@ def test_what_edit_refuses(run, speech, toy_model_file, tmp_path):
         assert (done.code != 0) == bool(message)
         assert message in "\n".join(done.err)
     assert json.loads(file.read_text())["steps"] == []
+
+
+def test_a_folder_of_recordings(run, takes, toy_model_file, here):
+    done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "{name}.TextGrid", "--to", "json,csv")
+    assert done == (0, ["out/a.json", "out/a.csv", "a.TextGrid", "out/b.json", "out/b.csv", "b.TextGrid"], [])
+    assert (here / "out" / "a.csv").read_bytes() == (here / "out" / "b.csv").read_bytes()
+
+
+def test_a_folder_and_a_file_for_one_recording(run, takes, toy_model_file, here):
+    (here / "made").mkdir()
+    recording = next(takes.glob("a.*"))
+    done = run("animate", recording, "--model", toy_model_file, "-o", "new/", "made", "b.csv")
+    assert done == (0, ["new/a.json", "made/a.json", "b.csv"], [])
+
+
+def test_words_beside_recordings_are_used(run, takes, toy_model_file, toy_sentence, here):
+    (takes / "a.txt").write_text(" ".join(toy_sentence.words))
+    assert run("animate", takes, "--model", toy_model_file, "-o", "out/").code == 0
+    documents = [json.loads((here / "out" / f"{name}.json").read_text()) for name in ("a", "b")]
+    assert [document["outlook"]["words"] == "transcript" for document in documents] == [True, False]
+
+
+def test_what_fails_does_not_stop_the_others(run, takes, toy_model_file):
+    """The exit code is the highest of those that failed."""
+    (takes / "0.wav").write_text("no sound")
+    (takes / "a.txt").write_text("five " * 10_000)
+    done = run("animate", takes, "--model", toy_model_file, "-o", "out/")
+    assert (done.code, done.out) == (5, ["out/b.json"])
+    assert len(done.err) == 3
+    assert all("skipped" in line for line in done.err[:2])
+    assert "2 of 3 recordings were not animated" in done.err[2]
+    done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "--machine-readable")
+    lines = [json.loads(line) for line in done.out]
+    outcomes = [line["outcome"] for line in lines if line["type"] == "item"]
+    assert outcomes == ["skipped", "skipped", "animated"]
+    assert lines[-1]["type"] == "failure"
+    shares = [line["value"] for line in lines if line["type"] == "progress"]
+    assert shares == sorted(shares)
+
+
+def test_what_belongs_to_one_recording(run, takes, toy_model_file):
+    done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "--transcript", "bin blue")
+    check_refused(done, 3, "--transcript belongs to one recording, and there are 2")
+    assert not (takes.parent / "out").exists()
+
+
+def test_places_that_cannot_be(run, takes, toy_model_file):
+    for words, code, message in (
+        (["-", "-o", "out/"], 3, "comes through a pipe has no name"),
+        (["takes/a.wav", "-", "-o", "out/"], 3, "comes through a pipe has no name"),
+        (["takes", "-o", "out/", "b.json"], 7, "b.json: is one file, and there are 2 recordings"),
+        (["takes/a.wav", "-o", "out/", "-"], 7, "-: is one file, and no folder"),
+        (["takes", "-o", "out/in/", "--to", "jsn"], 7, "unknown format '.jsn'"),
+    ):
+        check_refused(run("animate", *words, "--model", toy_model_file), code, message)
+        assert not (takes.parent / "out").exists()
+
+
+@pytest.mark.long
+def test_a_character_of_several(run, takes, toy_model_file, here):
+    write_glb(here / "head.glb", head())
+    done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "--character", "head.glb")
+    assert done == (0, ["out/a.json", "out/b.json"], [])
+    assert read_motion(here / "out" / "b.json")[0].names[0] == "jawOpen"
 
 
 @pytest.mark.long

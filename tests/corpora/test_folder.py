@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.types import Channel
 from lipmotion_faces.corpus.captured_faces import read_bare_motion, read_channels
 from lipmotion_faces.corpus.folder import discover, read_aligned_words, spell_name
-from lipmotion_faces.corpus.source_recordings import MotionFile, RecordingFolder, add_separate_sounds, read_offsets
+from lipmotion_faces.corpus.source_recordings import MotionFile, add_separate_sounds, read_offsets
 
 
 def touch(folder: Path, *names: str) -> None:
@@ -200,13 +201,6 @@ def test_hostile_word_times_are_refused(tmp_path):
     assert read_aligned_words(file) == ("näh", "o'clock", "well-known", "真")
 
 
-def read(folder: Path) -> list[tuple[str, str, str | None]]:
-    """Return name, speaker and words of the recordings in a folder that has no problems."""
-    found: RecordingFolder = discover(folder)
-    assert found.problems == {}
-    return [(each.name, each.speaker, " ".join(each.words) if each.words else None) for each in found.recordings]
-
-
 SECOND = "0 1000 sil\n1000 2000 bin\n2000 3000 green\n"
 GRID_VIDEOS = {
     "as on Zenodo": ("{}/bbaf2n.mpg", "alignments/{}/bbaf2n.align"),
@@ -237,71 +231,22 @@ def test_grid_of_all_speakers(tmp_path: Path, lies: str) -> None:
     assert by_name["s1-bbaf2n"].rights["licence"] == "CC BY 4.0"
 
 
-def test_crema_d_says_its_sentences_in_its_names(tmp_path: Path) -> None:
-    names = "1001_DFA_ANG_XX", "1001_IEO_HAP_LO", "1091_WSI_SAD_X"
-    touch(tmp_path, *(f"VideoFlash/{name}.flv" for name in names), *(f"AudioWAV/{name}.wav" for name in names))
-    said = [
-        ("1001_DFA_ANG_XX", "1001", "don't forget a jacket"),
-        ("1001_IEO_HAP_LO", "1001", "it's eleven o'clock"),
-        ("1091_WSI_SAD_X", "1091", "we'll stop in a couple of minutes"),
-    ]
-    assert read(tmp_path) == read(tmp_path / "VideoFlash") == said
-    assert discover(tmp_path).kind == "CREMA-D"
+LAYOUTS = json.loads(Path(__file__).with_name("layouts.json").read_text("utf-8"))
+"""Files of corpora that are known by their folders, and what is read there, or in a folder within."""
 
 
-def test_tcd_timit_from_the_front_with_its_scripts(tmp_path: Path) -> None:
-    clips = "volunteers/01M/Clips/straightcam", "volunteers/02F/straightcam", "lipspeakers/Lipspkr1/Clips/straightcam"
-    touch(tmp_path, *(f"{folder}/sa1.mp4" for folder in clips), "volunteers/01M/Clips/30degcam/sa1.mp4")
-    (tmp_path / clips[0] / "SA1.txt").write_text("0 8000 sil\n8000 9100 She\n9100 9900 had,\n9900 12000 YOUR\n")
-    (tmp_path / clips[1] / "sa1.txt").write_text("She had your dark suit.\n")
-    assert read(tmp_path) == [
-        ("01M-sa1", "01M", "she had your"),
-        ("02F-sa1", "02F", "she had your dark suit"),
-        ("Lipspkr1-sa1", "Lipspkr1", None),
-    ]
-    assert read(tmp_path / "volunteers" / "01M") == [("01M-sa1", "01M", "she had your")]
-    assert "Harte" in discover(tmp_path).recordings[0].rights["attribution"]
-
-
-def test_mead_from_the_front(tmp_path: Path) -> None:
-    views = "front", "down", "left_30", "left_60", "right_30", "right_60", "top"
-    touch(tmp_path, *(f"M003/video/{view}/happy/level_1/001.mp4" for view in views))
-    touch(tmp_path, "W009/video/front/sad/level_2/001.mp4", "M003/audio/happy/level_1/001.m4a")
-    (tmp_path / "M003/video/front/happy/level_1/001.txt").write_text("Hello there.")
-    assert read(tmp_path) == [("M003-happy-level_1-001", "M003", "hello there"), ("W009-sad-level_2-001", "W009", None)]
-
-
-LRS2 = "Text:  WHEN YOU'RE COOKING\nConf:  4\n\nWORD START END ASDSCORE\nWHEN 0.10 0.20 7.1\nYOU'RE 0.2 0.5 8\n"
-
-
-def test_lrs_texts_lists_and_sets(tmp_path: Path) -> None:
-    touch(tmp_path, "main/635/00001.mp4", "main/635/00002.mp4", "main/77/00001.mp4", "pretrain/77/00001.mp4")
-    (tmp_path / "main/635/00001.txt").write_text("Text:  IT'S {LG} TWENTY PAST\nConf:  4\n")
-    (tmp_path / "main/77/00001.txt").write_text("Text:  HELLO\n")
-    (tmp_path / "pretrain/77/00001.txt").write_text(LRS2)
-    (tmp_path / "val.txt").write_text("635/00002\n")
-    (tmp_path / "test.txt").write_text("77/00001 NF MV\n")
-    assert read(tmp_path) == [
-        ("635-00001", "635", "it's twenty past"),
-        ("635-00002", "635", None),
-        ("77-00001", "77", "hello"),
-        ("pretrain-77-00001", "77", "when you're"),
-    ]
-    assert [each.split for each in discover(tmp_path).recordings] == ["train", "val", "test", "train"]
-    assert [name for name, *_ in read(tmp_path / "main")] == ["635-00001", "635-00002", "77-00001"]
-
-
-def test_the_test_folder_of_lrs3_is_the_test_list(tmp_path: Path) -> None:
-    touch(tmp_path, "trainval/0Amg53UuRqE/50001.mp4", "test/0Fi83BHQsMA/00002.mp4")
-    found = {each.name: each.split for each in discover(tmp_path).recordings}
-    assert found == {"0Amg53UuRqE-50001": "train", "0Fi83BHQsMA-00002": "test"}
-
-
-def test_other_folders_are_read_as_before(tmp_path: Path) -> None:
-    touch(tmp_path, "main/anna/hello.mp4", "1001_DFA_ANG_XX.mp4", "s1/day.mp4", "ben/straightcam.mp4")
-    found = discover(tmp_path)
-    assert found.kind == "folder of videos"
-    assert [each.speaker for each in found.recordings] == ["", "ben", "main", "s1"]
+@pytest.mark.parametrize("corpus", LAYOUTS)
+def test_known_corpora(tmp_path: Path, corpus: str) -> None:
+    layout = LAYOUTS[corpus]
+    touch(tmp_path, *layout["files"])
+    for name, text in layout["texts"].items():
+        (tmp_path / name).write_text(text)
+    for folder, recordings in layout["within"].items():
+        found = discover(tmp_path / folder)
+        assert found.problems == {}
+        read = [(each.name, each.speaker, " ".join(each.words or ()) or None, each.split) for each in found.recordings]
+        assert read == [*map(tuple, recordings)]
+        assert layout["rights"] in found.recordings[0].rights.get("attribution", "")
 
 
 NAMES = np.array(["jaw", "smile", "brow"])

@@ -16,6 +16,7 @@ from lipmotion.types import Audio
 from lipmotion_studio.study.answers import write_answers
 from meshes.heads import head, lip_points, write_glb, write_obj
 from pipeline.made import write_sound
+from studio.toy_recordings import write_takes
 from study.simulated import Effects, rated_answers, ratings
 from testing.toy import ToySentence, toy_sentences, toy_utterances
 
@@ -44,7 +45,7 @@ def set_desk(folder: Path, models: dict[str, Path]) -> None:
     segments = [{"start": 0.1, "end": 1.0, "text": words}]
     (folder / "talk.json").write_text(json.dumps({"segments": segments}), encoding="utf-8")
     for name in ("RECORDINGS", "takes"):
-        _takes(folder / name)
+        write_takes(folder / name, 3)
     _motion(folder, words)
     _of_other_programs(folder, words)
     _characters(folder)
@@ -66,18 +67,6 @@ def _speech(folder: Path, sentence: ToySentence) -> str:
         (folder / name).parent.mkdir(exist_ok=True)
         write_sound(folder / f"{name}.wav", sound)
     return word
-
-
-def _takes(folder: Path) -> None:
-    """Write recordings with motion and words beside them."""
-    folder.mkdir(parents=True)
-    for utterance in toy_utterances(3):
-        write_sound(folder / f"{utterance.name}.wav", utterance.audio)
-        (folder / f"{utterance.name}.txt").write_text(" ".join(utterance.words or ()), encoding="utf-8")
-        motion = utterance.track.motion
-        table = np.column_stack([motion.time_s, motion.values])
-        head_line = ",".join(("time_s", *motion.names))
-        np.savetxt(folder / f"{utterance.name}.csv", table, "%.4f", ",", header=head_line, comments="")
 
 
 def _motion(folder: Path, words: str) -> None:

@@ -1,12 +1,11 @@
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 from lipmotion import errors, types
-from lipmotion.engines import ENGINES, Engine, base, engine_named
-from lipmotion.testing import ENGINE_CHECKS, TrainedEngine, examples, speech, timeline
+from lipmotion.engines import ENGINES, base, engine_named
+from lipmotion.testing import ENGINE_CHECKS, TrainedEngine, speech, timeline
 
 SENTENCE = ("t", "aa", "p", "iy", "m", "uw", "s", "aa")
 SYSTEMS = {
@@ -105,40 +104,5 @@ def test_pins_at_both_ends_are_inside(trained):
 def test_trees_can_be_read(trained):
     text = trained.engine.describe(trained.model)
     assert ("leaf (" in text) is (trained.engine.name in ("trajectory", "joint"))  # the others have no trees
-    assert text
-    assert max(map(len, text.splitlines())) < 200
-
-
-PLAIN = {"articulation": False, "closures": False, "components": 1}
-OPTIONS = {
-    "coupled": {"chains": "2vis 2vis", "mixtures": 1, "asynchrony": 0, "states": 1, "acoustic_regression": False},
-    "joint": {"units": "2vis", "mixtures": 1, "states": 1},
-    "selection": {"joint_recogniser": False, "guide": 0.0, "candidates": 5, "beam": 3},
-    "trajectory": {"units": "2vis", "states": 1, "silent_states": 1, "acoustic_regression": False, "conditions": 0},
-}
-FILTERED_SPEECH = speech(timeline(("aa", "iy", "t", "uw", "s", "aa")))
-
-
-FILTERED = [pytest.param(name, marks=[pytest.mark.long] * (name == "selection")) for name in OPTIONS]
-"""Recorded units are compressed, which takes a second."""
-
-
-@pytest.mark.parametrize("name", FILTERED)
-def test_it_is_learned_and_stored_and_unknown_voices_do_without(name: str) -> None:
-    engine: Engine = engine_named(name, {**PLAIN, **OPTIONS[name], "modulation_filter": 1.0})
-    model = engine.fit(examples(4), types.silent_monitor).model
-    arrays = engine.to_arrays(model)
-    taps = arrays.pop("modulation")
-    assert taps.sum(axis=0) == pytest.approx(1)
-    off = engine_named(name, {**PLAIN, **OPTIONS[name], "modulation_filter": 0.0})
-    plain, again = off.from_arrays(arrays), engine.from_arrays({**arrays, "modulation": taps})
-    with pytest.raises(errors.ModelFormatError):
-        engine.from_arrays(arrays)
-
-    def opening(learned: object, voice: float) -> np.ndarray:
-        return engine.generate(learned, replace(FILTERED_SPEECH, voice=voice)).motion["opening"]
-
-    assert opening(again, 1.0) == pytest.approx(opening(model, 1.0), abs=2e-3)  # half precision
-    assert np.abs(opening(again, 1.0) - opening(plain, 1.0)).max() > 1e-4
-    assert opening(again, 0.0) == pytest.approx(opening(plain, 0.0), abs=1e-12)
-    assert "modulation" not in engine.to_arrays(plain)
+    assert bool(text) is ("leaf (" in text)
+    assert max(map(len, text.splitlines()), default=0) < 200

@@ -1,4 +1,3 @@
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.conftest import SETTINGS, copied, renamed
+from experiments.conftest import SETTINGS, copied
 from lipmotion import Corpus, Selection, errors, train
 from lipmotion.measures import closures, curves
 from lipmotion.speech.recognition.recogniser import open_recogniser
@@ -47,14 +46,6 @@ def by_hand(toy_corpus: Corpus) -> list[ComparedClip]:
 
 
 @pytest.mark.long
-def test_what_was_done(figures):
-    assert (figures["folds"], figures["seed"], figures["clips"]) == (3, 0, 8)
-    assert figures["trained_on"] == [5, 5, 6]
-    assert list(figures["conditions"]) == CONDITIONS
-    assert json.loads(json.dumps(figures, allow_nan=False))
-
-
-@pytest.mark.long
 def test_figures_are_of_all_clips_as_one_split(figures, by_hand):
     generated = np.concatenate([clip.generated[:, 0] for clip in by_hand])
     original = np.concatenate([clip.original[:, 0] for clip in by_hand])
@@ -65,13 +56,6 @@ def test_figures_are_of_all_clips_as_one_split(figures, by_hand):
     assert row["global_variance"] == pytest.approx(np.mean([g for g, _ in spread]) / np.mean([o for _, o in spread]))
     low, high = row["acc_95"]
     assert low <= row["acc"] <= high
-
-
-def test_corpora_that_cannot_be(toy_corpus, tmp_path):
-    with pytest.raises(errors.CorpusError, match="no utterances of split 'train'"):
-        cross_validate(copied(toy_corpus, tmp_path / "a", lambda utterance: replace(utterance, split="test")))
-    with pytest.raises(errors.CorpusError, match="compared by the channel 'opening', which is not in it"):
-        cross_validate(renamed(toy_corpus, tmp_path / "b", "smile", "frown"))
 
 
 def replace_training(
@@ -196,16 +180,9 @@ def test_figures_are_those_of_the_measures(clips):
     assert evaluate.sum_closings(some, others, 50).value == pytest.approx(100 * score)
 
 
-def test_nothing_closes():
-    assert np.isnan(evaluate.sum_closings([np.ones((5, 1))], [np.ones((5, 1))], 0.5).value)
-
-
-def test_a_channel_that_stands_still_explains_nothing(clips):
-    original, near, _ = clips
-    still = [np.concatenate([g[:, :2], np.full((len(g), 1), 0.1)], axis=1) for g in near]
-    assert evaluate.sum_correlations(still, original).value == pytest.approx(
-        curves.correlate_pooled(still, original).mean(), abs=1e-12
-    )
+def test_what_leaves_out_nothing_is_marked():
+    marks = {(0.1, 0.2): "*", (-2, -0.1): "*", (-0.1, 0.1): "", (0, 0): "", (2e-10, 7e-9): "", (None, None): ""}
+    assert {gain: evaluate.mark_significance(gain) for gain in marks} == marks
 
 
 def test_the_interval_is_that_of_drawn_clips(clips):
@@ -224,14 +201,6 @@ def test_the_interval_is_that_of_drawn_clips(clips):
     assert evaluate.mark_significance(one.compute_gain(other, 7)) == "*"
     assert one.compute_gain(one, 7) == (0, 0)
     assert evaluate.ClipStatistic([np.array([3.0, 2.0])], evaluate.divide_sums).compute_interval(0) == (1.5, 1.5)
-
-
-@pytest.mark.parametrize(
-    ("gain", "wanted"),
-    [((0.1, 0.2), "*"), ((-2, -0.1), "*"), ((-0.1, 0.1), ""), ((0, 0), ""), ((2e-10, 7e-9), ""), ((None, None), "")],
-)
-def test_marks(gain, wanted):
-    assert evaluate.mark_significance(gain) == wanted
 
 
 def test_in_blocks_each_clip_is_compared_once_by_systems_that_did_not_see_it(toy_corpus, tmp_path):

@@ -1,7 +1,6 @@
 import json
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +8,14 @@ import numpy as np
 import pytest
 
 from engines.selection.drawn_units import PHONE_S, costs_of, inventory, target_of
-from experiments.conftest import SETTINGS, copied, few_sets, renamed, states
+from experiments.conftest import SETTINGS, few_sets, states
 from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import create_engine
 from lipmotion.engines.selection.concatenation import to_pieces
 from lipmotion.engines.selection.costs import SelectionConfig
-from lipmotion.errors import CorpusError
 from lipmotion_lab import minnis2000
 from lipmotion_lab.evaluation.held_out import ComparedClip, HeldOutRecordings
 from lipmotion_lab.hofer2008 import PhoneticTableOptions, run_hofer2008
-from lipmotion_lab.report.sections import build_hofer_section
 from testing.toy import SMALL
 
 LONG = pytest.mark.long
@@ -147,15 +144,6 @@ def test_a_row_is_what_the_preset_trains_and_evaluate_says(hofer_figures, toy_co
 
 
 @pytest.mark.long
-def test_what_was_finished_is_not_trained_again(hofer_figures, toy_corpus, work):
-    before = states(work)
-    with few_sets():
-        again = run_hofer2008(toy_corpus, TWO, work=work, settings=SETTINGS)
-    assert states(work) == before
-    assert build_hofer_section(again).as_text() == build_hofer_section(hofer_figures).as_text()
-
-
-@pytest.mark.long
 def test_pins_move_the_lips_of_the_same_units(hofer_figures):
     """Of given words: of recognised units, only those that are p b m alone are pinned."""
     printed, pinned = (
@@ -164,10 +152,3 @@ def test_pins_move_the_lips_of_the_same_units(hofer_figures):
     assert pinned["recall_p_b_m"] == 100
     assert pinned["nrmse"] != printed["nrmse"]
     assert pinned["gaussians"] == printed["gaussians"]
-
-
-def test_nothing_to_train_on_or_to_compare_with(toy_corpus, tmp_path):
-    with pytest.raises(CorpusError, match="no utterances of split 'val'"):
-        run_hofer2008(copied(toy_corpus, tmp_path, partial(replace, split="test")))
-    with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
-        run_hofer2008(renamed(toy_corpus, tmp_path / "b", "shape 0", "shape 1", "shape 2"))

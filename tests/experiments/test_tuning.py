@@ -33,14 +33,6 @@ def test_a_model_on_the_way_is_that_of_its_own_training():
     assert two.model.chains.parameters > one.model.chains.parameters == 26 * (2 * sum(groups) + 1)
 
 
-def test_training_goes_on_from_a_model():
-    sentences = examples(3)
-    one, two = systems.train_stages(SMALL | {"mixtures": 2}, sentences)
-    (found,) = systems.train_stages(SMALL | {"mixtures": 2}, sentences, one=one)
-    assert found.engine.config == two.engine.config
-    assert found.model.chains.parameters == two.model.chains.parameters
-
-
 @pytest.mark.long
 def test_systems_are_judged_by_the_correlation_of_what_they_make(validation):
     found = [*systems.judge_systems(systems.train_stages(SMALL | {"mixtures": 2}, examples(3)), validation)]

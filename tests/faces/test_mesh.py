@@ -1,11 +1,9 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from lipmotion import Staging
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.model.mesh import HEAD, NECK, Bone, Material, Mesh, MeshPart
+from lipmotion.meshes.model.mesh import Material, Mesh, MeshPart
 from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.mesh import MeshFace, MeshStage
 from lipmotion_faces.testing import check_face
@@ -70,23 +68,6 @@ def test_a_colour_is_the_background_and_a_transparent_one_has_alpha(character):
     assert picture[40, 128, 3] == 255
     solid = drawn(character, Staging())[0]
     assert np.abs(picture[40, 128, :3].astype(int) - solid[40, 128]).max() <= 2
-
-
-def test_bones_say_what_follows_the_head(character):
-    """A head bone that holds the whole sheet turns it as a whole; one that holds the neck's share turns it less."""
-    mesh = character.mesh
-    rows = np.arange(len(mesh.vertices))
-    place = np.array([0.0, -6.0, -9.0])
-    head_bone = Bone(HEAD, place, rows, np.ones(len(rows)))
-    neck_bone = Bone(NECK, place, rows, np.ones(len(rows)))
-    turned = [
-        MeshStage(replace(character, mesh=replace(mesh, bones=bones)), 256, 144).draw(mesh.vertices, (0.2, 0, 0))
-        for bones in ((head_bone, neck_bone), (neck_bone,), ())
-    ]
-    still = MeshStage(character, 256, 144).draw(mesh.vertices)
-    assert all((each != still).any() for each in turned)
-    assert (turned[0] != turned[2]).any()
-    assert (turned[1] == turned[2]).all()  # without a head bone, heights say it
 
 
 def test_the_head_turns_to_its_left(character):

@@ -1,8 +1,10 @@
 """Generations for writers of curves and of cues, and the shortest way to write them."""
 
+import json
 from collections.abc import Sequence
 from itertools import accumulate
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +13,10 @@ from lipmotion.formats.label_files import read_transcript
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, TimedTranscript, Timeline, Unit
 from testing.toy import toy_motion
 
+_CASES = Path(__file__).with_name("label_cases.json").read_text(encoding="utf-8")
+LABEL_CASES: dict[str, dict[str, Any]] = {case["name"]: case for case in json.loads(_CASES)}
+"""Labels of every kind as programs and services write them (a text, or a value of JSON), and what is read of each:
+words and lines in time, phones with their words and the end of one, or the error."""
 NOTHING_SAID: Timeline[Unit] = Timeline(())
 
 

@@ -1,7 +1,6 @@
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import av
 import numpy as np
@@ -101,20 +100,6 @@ def test_rows_are_the_rounded_values():
     assert list(format_rows(np.zeros((0, 3)))) == []
 
 
-PLAIN = st.recursive(
-    st.one_of(st.none(), st.booleans(), st.integers(-(10**9), 10**9), st.floats(allow_nan=False), st.text(max_size=5)),
-    lambda inner: st.one_of(st.lists(inner, max_size=3), st.dictionaries(st.text(max_size=3), inner, max_size=3)),
-    max_leaves=8,
-)
-
-
-@pytest.mark.long
-@given(document=st.dictionaries(st.text(max_size=4), PLAIN, max_size=5), indent=st.sampled_from([None, 1, "\t"]))
-def test_what_is_no_row_is_read_as_json_reads_it(document: dict[str, Any], indent: Any) -> None:
-    text = json.dumps(document, indent=indent, ensure_ascii=False)
-    assert read_members(f" {text}\n", "the rows") == json.loads(text)
-
-
 @given(st.lists(st.lists(st.floats(allow_nan=False), min_size=2, max_size=2), max_size=5), st.sampled_from([None, 1]))
 def test_rows_become_an_array(rows: list[list[float]], indent: int | None) -> None:
     found = read_members(json.dumps({"a": 1, "values": rows, "b": []}, indent=indent), "values")
@@ -158,30 +143,15 @@ def test_the_document_is_as_specified(path, generation):
     assert values == np.round(generation.motion.values, 5).tolist()
 
 
-WRONG: list[tuple[dict[str, object], str]] = [
-    ({"format": "other"}, "not a motion document"),
-    ({"version": 2}, "version 2, this lipmotion reads up to 1: upgrade lipmotion"),
-    ({"version": "1"}, "version '1', required 1"), ({"rate_hz": 0}, "rate is 0"), ({"rate_hz": "fast"}, "damaged"),
-    ({"channels": [{"name": "opening"}]}, "unit is missing"), ({"channels": []}, "shape"),
-    ({"values": [[1.0], [1.0, 2.0]]}, "damaged"), ({"values": [1.0, 2.0]}, "shape"),
-    ({"values": [[float("nan"), 1.0]]}, "not finite"),
-    ({"units": [{"start_s": 0.3, "end_s": 0.1, "phone": "m", "unit": "m"}]}, "before its start"),
-    ({"units": 3}, "damaged"), ({"recognised": 3}, "damaged"), ({"recognised": [[0.0, 0.3, "sil"]]}, "damaged"),
-    ({"recognised": [[0.0, 0.3, "sil", 1.5]]}, "1.5, required a number from 0 to 1"),
-]  # fmt: skip
+DAMAGED = json.loads(Path(__file__).with_name("damaged_files.json").read_text(encoding="utf-8"))
+"""Files of motion and cues, what they hold, and the error; a name of a file comes with several errors."""
 
 
-def test_what_is_wrong_is_said(path, generation):
-    assert formats.read_motion(path)[1] == generation.units
-    document = json.loads(path.read_text(encoding="utf-8"))
-    for change, message in WRONG:
-        path.write_text(json.dumps({**document, **change}), encoding="utf-8")
-        with pytest.raises(InputError, match=message):
-            formats.read_motion(path)
-    for missing in ("rate_hz", "channels", "units"):
-        path.write_text(json.dumps({key: document[key] for key in document if key != missing}), encoding="utf-8")
-        with pytest.raises(InputError, match=f"{missing} is missing"):
-            formats.read_motion(path)
+@pytest.mark.parametrize("case", DAMAGED, ids=lambda case: f"{case['file']}: {case['error'][:40]}")
+def test_damaged_files_are_refused(tmp_path: Path, case: dict[str, str]) -> None:
+    (tmp_path / case["file"]).write_bytes(case["content"].encode())
+    with pytest.raises(InputError, match=case["error"]):
+        formats.read_motion(tmp_path / case["file"])
 
 
 @pytest.fixture

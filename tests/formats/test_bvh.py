@@ -100,13 +100,12 @@ def test_blender_shows_the_same_places(talking_bvh, written_bvh, tmp_path):
 
 def test_what_cannot_be_placed_is_refused(tmp_path, talking_bvh):
     other = Motion(np.zeros((3, 1)), 50.0, (Channel("jawOpen", "weight"),))
-    with pytest.raises(ExportError, match="no channel 'opening' to place lip points by"):
+    with pytest.raises(ExportError, match="3 frames of jawOpen, required 1 or more of opening"):
         write(tmp_path / "a.bvh", of_motion(other, talking_bvh.units))
 
 
 VMD_FRAMES = 31
 NAMES = ("aa", "ih", "ou", "ee", "oh", "closed", "eyeBlinkLeft", "eyeBlinkRight", *ANGLES)
-
 BROWS = tuple(Channel(name, WEIGHT) for name in ("browDownLeft", "browDownRight", "a", "b", "c"))
 
 
@@ -307,7 +306,7 @@ def test_blendshapes_open_it_as_well(tmp_path, talking_live2d):
 
 def test_what_does_not_open_is_refused(tmp_path, talking_live2d):
     still = replace(talking_live2d, motion=Motion(np.zeros((5, 1)), 100.0, (Channel("brow", WEIGHT),)))
-    with pytest.raises(ExportError, match="no channel 'opening' or 'jawOpen'"):
+    with pytest.raises(ExportError, match="required 2 or more of opening or jawOpen"):
         written(tmp_path / "a.motion3.json", still)
     assert not list(tmp_path.iterdir())
 
@@ -330,7 +329,7 @@ def test_what_is_written_is_read_with_moods_where_there_are_some(path, talking_v
     happy = generation("aa", "happy")
     read = read_motion(written(tmp_path / "b.vrma", happy))[0]
     assert read["mood_happy"] == pytest.approx(happy.motion["happy"], abs=1e-6)
-    with pytest.raises(ExportError, match="none of the vowels aa ih ou ee oh"):
+    with pytest.raises(ExportError, match="required 2 or more of aa or ih or ou or ee or oh"):
         written(tmp_path / "c.vrma", generation("jawOpen"))
 
 

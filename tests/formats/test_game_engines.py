@@ -10,7 +10,7 @@ import pytest
 
 from formats.examples import generation, of_motion, written
 from lipmotion.articulation.contact import opening_to_gap
-from lipmotion.errors import ExportError, InputError
+from lipmotion.errors import ExportError
 from lipmotion.formats import read_motion
 from lipmotion.formats.fap import FAP, MOUTH_TO_NOSE, PARAMETERS, STEPS, move_faps
 from lipmotion.formats.game_engines import write_addon
@@ -58,8 +58,8 @@ def test_godot_parser_reads_the_same_tracks(tmp_path: Path) -> None:
     ("name", "channel", "message"),
     [
         ("a.tres", "Face.jawOpen", r"'Face\.jawOpen' has one of the letters"),
-        ("a.tres", "headYaw", "no blendshapes"),
-        ("a.anim", "headYaw", "no blendshapes, or no two frames"),
+        ("a.tres", "headYaw", "required 1 or more of weight"),
+        ("a.anim", "headYaw", "required 2 or more of weight"),
     ],
 )
 def test_names_and_motion_without_weights_are_refused(tmp_path: Path, name: str, channel: str, message: str) -> None:
@@ -165,23 +165,7 @@ def test_files_of_others(tmp_path):
     assert motion.values.tolist() == [[11, 22], [33, 22], [33, 22]]
 
 
-WRONG = [
-    ([], "begins with ''"), (["1.0 a 25 1"], "begins with '1.0 a 25 1', required 2.1 NAME FPS FRAMES"),
-    (["2.1 a 25"], "begins with '2.1 a 25', required 2.1 NAME FPS FRAMES"),
-    (["2.1 a 25 0"], "0 frames, required 1 to"), (["2.1 a 25 999999999999"], "999999999999 frames, required"),
-    (["2.1 a 25 2", marks(3), "0 5"], "frame 1 of 2 has 0 marks, required 68"),
-    (["2.1 a 25 1", marks(3) + " 1", "0 5"], "has 69 marks"),
-    (["2.1 a 25 1", marks(3), "0 5 6"], "frame 0 of 1 has 2 values, required 1"),
-    (["2.1 a 25 1", marks(3), "0 wide"], "invalid literal"),
-    (["2.1 a 25 1", marks(3), "0 99999999999999999999"], "has a value over 1000000"),
-    (["2.1 a nan 1", marks(3), "0 5"], "rate is nan Hz"),
-]  # fmt: skip
-
-
-def test_what_is_wrong_is_said(tmp_path):
-    for lines, message in WRONG:
-        with pytest.raises(InputError, match=message):
-            read(tmp_path, *lines)
+def test_what_is_no_parameter_is_refused(tmp_path):
     other = replace(fap_generation(), motion=Motion(np.zeros((2, 1)), 25.0, (Channel("opening"),)))
     with pytest.raises(ExportError, match="no parameters of MPEG-4 but opening"):
         written(tmp_path / "a.fap", other)
@@ -228,14 +212,6 @@ def test_it_holds_curves_rate_and_sound(path: Path) -> None:
     assert names["spelling"]("mouthSmile_L") == "mouthsmileleft"
     assert {"key_frames", "key_shapes", "at_frames", "main"} <= set(names)
     assert names["MOTION"]["jawOpen"] == pytest.approx(np.random.default_rng(5).random((7, 2))[:, 0].tolist(), abs=1e-5)
-
-
-def test_it_imports_nothing_but_the_standard_library_and_bpy(path: Path) -> None:
-    tree = ast.parse(path.read_text())
-    modules = [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
-    modules += [each.name for node in ast.walk(tree) if isinstance(node, ast.Import) for each in node.names]
-    assert set(modules) <= {"__future__", "typing", "bisect", "bpy", "csv", "json", "math", "os", "re"}
-    assert all(node.level == 0 for node in ast.walk(tree) if isinstance(node, ast.ImportFrom))
 
 
 def test_the_archive_has_one_folder_with_code_and_manifest(tmp_path: Path) -> None:

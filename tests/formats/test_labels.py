@@ -1,21 +1,16 @@
 import html
-import math
 import re
-from itertools import accumulate
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
+from formats.examples import LABEL_CASES
 from lipmotion.errors import InputError
 from lipmotion.formats import label_files, label_tiers
 from lipmotion.formats.annotations import parse_interval_tiers, write_textgrid
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import PHONES, group_words
+from lipmotion.units import group_words
 from lipmotion.units.text_normalisation import LARGEST_TRANSCRIPT_BYTES
-
-SPOKEN = [phone for phone in PHONES if phone not in ("sil", "sp")]
 
 
 @pytest.fixture
@@ -28,40 +23,6 @@ def rows(found) -> list[tuple[float, float, str]]:
 
 
 SAID = [(0, 0.13, "sil"), (0.13, 0.205, "hh"), (0.205, 0.3, "iy")]
-STATES = [(t, phone, state) for t, (phone, state) in enumerate((p, s) for p in "ttk" for s in (2, 3, 4))]
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("0 1300000 sil\n1300000 2050000 hh -31.5\n2050000 3000000 IY1 -20 he\n", SAID),
-        ("0 sil\n1300000 hh\n2050000 iy\n", [*SAID[:2], (0.205, math.inf, "iy")]),
-        ("0.13 sil\n0.205 hh\n0.3 iy\n", SAID),
-        ("signal b\nnfields 1\n#\n 0.1300 26 sil\n 0.205 26 hh ; x\n 0.3 26 iy\n", SAID),
-        ("0.0 sil\n0.13 hh\n0.205 iy\n", [*SAID[:2], (0.205, math.inf, "iy")]),
-        ('#!MLF!#\r\n"*/a.rec"\r\n0 1300000 sil -3.1\r\n1300000 2050000 hh\r\n2050000 3000000 iy\r\n.\r\n', SAID),
-        (  # phones between their neighbours
-            "0 1000000 sil-hh+iy\n1000000 2000000 x^hh-iy+t=ae@1_2/A:0-1-2@1-1&1+4\n2000000 3000000 iy-t+sil\n",
-            [(0, 0.1, "hh"), (0.1, 0.2, "iy"), (0.2, 0.3, "t")],
-        ),
-        (  # states of a phone are one phone
-            "\n".join(f"{t * 100_000} {(t + 1) * 100_000} sil-{p}+sil[{s}]" for t, p, s in STATES),
-            [(0, 0.03, "t"), (0.03, 0.06, "t"), (0.06, 0.09, "k")],
-        ),
-        (
-            "0 1000000 p[2]\n1000000 2000000 p[3]\n2000000 3000000 aa[2]\n3000000 4000000 aa[3]\n",
-            [(0, 0.2, "p"), (0.2, 0.4, "aa")],
-        ),
-        (  # stress decides which vowels are reduced
-            "0 1000000 AH0\n1000000 2000000 B\n2000000 3000000 AH1\n3000000 4000000 T\n4000000 5000000 ER0\n",
-            [(0, 0.1, "ax"), (0.1, 0.2, "b"), (0.2, 0.3, "ah"), (0.3, 0.4, "t"), (0.4, 0.5, "axr")],
-        ),
-    ],
-)
-def test_htk_counts_in_hundred_nanoseconds(read, text, expected):
-    found = read(text)
-    assert rows(found) == expected
-    assert found.words is None
 
 
 def test_audacity_counts_in_seconds_and_words_in_time_are_a_transcript(read):
@@ -83,52 +44,16 @@ def test_plain_text(read):
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "count", "message"),
     [
-        ("0 1300000 sil\nhello\n", "line 2 is 'hello'; required, as in line 1: start end label"),
-        ("0.0 0.5 sil\n\n0.5 x hh\n", "line 3 is '0.5 x hh'"),
-        ("0 sil\nhh\n2050000 iy\n", "line 2 is 'hh'; required, as in line 1: start label"),
-        (
-            "0 1300000 hh\n1300000 2000000 iy\n2000000 3000000 t\n3000000 4000000 s\n4000000 5000000 qx\n",
-            "line 5 is 'qx'",
-        ),
-        ("0 1300000 hh\n1200000 2000000 iy\n", "line 2 starts at 0.12 s, before the one ahead of it ends"),
-        ("0 1300000 hh\n1400000 2000000 iy\n", "line 2 starts at 0.14 s, the one before it ends at 0.13 s"),
-        (f"0 1000000 p\n1000000 2000000 p\n2000000 3000000 p\n3000000 4000000 p[{'9' * 5000}]\n", "which is no phone"),
-        ("1300000 20000 Hello\n", "line 1 ends at 0.002 s, before its start at 0.13 s"),
-        ("hh\niy\nsil\n", "a list of phones without times"),
-        ("0 20000000 ...\n", "holds no word"),
-        (f"0 {'9' * 5000} p\n", f"line 1 has the time '{'9' * 79}..., required a finite one"),
-        (f"0 sil\n1000000 p\n{'9' * 5000} aa\n", "line 3 has the time '9"),
-        (f"0.0\t{'9' * 400}.0\tp\n", "line 1 has the time '9"),
-        ("0 1000000 p\n", "more than 250000 labels; give those of one recording"),
-        ("a", "4194305 characters, required at most 4194304: is it a transcript"),
-        (" ", "16777217 bytes, required at most 16777216"),
+        ("0 1000000 p\n", label_tiers.MAX_LABELS, "more than 250000 labels; give those of one recording"),
+        ("a", LARGEST_TRANSCRIPT_BYTES, "4194305 characters, required at most 4194304: is it a transcript"),
+        (" ", label_files.LARGEST_LABELS, "16777217 bytes, required at most 16777216"),
     ],
 )
-def test_what_cannot_be_used_is_named_with_its_line(read, text, message):
-    most = {"0 1000000 p\n": label_tiers.MAX_LABELS, "a": LARGEST_TRANSCRIPT_BYTES, " ": label_files.LARGEST_LABELS}
-    with pytest.raises(InputError) as error:
-        read(text * (1 + most.get(text, 0)))
-    assert "a.lab" in str(error.value)
-    assert message in str(error.value)
-
-
-@settings(max_examples=25)
-@given(st.lists(st.tuples(st.sampled_from(SPOKEN), st.integers(1, 40)), min_size=1, max_size=30))
-def test_what_is_written_is_read(tmp_path_factory, phones):
-    """Every phone of the inventory, in HTK's and Audacity's form."""
-    path = tmp_path_factory.mktemp("labels") / "a.lab"
-    names, lengths = zip(*phones, strict=True)
-    edges = [0, *accumulate(lengths)]
-    spans = list(zip(edges, edges[1:], names, strict=False))
-    path.write_text("".join(f"{a * 100_000} {b * 100_000} {name}\n" for a, b, name in spans))
-    htk = rows(label_files.read_labels(path))
-    path.write_text("".join(f"{a / 100:.6f}\t{b / 100:.6f}\t{name.upper()}\n" for a, b, name in spans))
-    for found in (htk, rows(label_files.read_labels(path))):
-        assert tuple(name for *_, name in found) == names
-        assert [round(100 * start_s) for start_s, *_ in found] == edges[:-1]
-        assert [round(100 * end_s) for _, end_s, _ in found] == edges[1:]
+def test_more_than_a_recording_has_is_refused(read, text, count, message):
+    with pytest.raises(InputError, match=rf"a\.lab: .*{message}"):
+        read(text * (count + 1))
 
 
 def test_without_stress_the_word_decides(read):
@@ -186,18 +111,6 @@ def test_real_ones(recordings: Path):
     assert found.words == ("he", "was", "not", "an", "ill", "disposed", "young", "man")
 
 
-OTHER = {
-    "master labels": ('#!MLF!#\n"*/a.lab"\n0 1000000 sil\n.\n"*/b.lab"\nhi\n.\n', "is a master label file"),
-    "SCC": ("Scenarist_SCC V1.0\n\n00:00:00:01\t94ae 9420\n", "closed captions"),
-    "Spruce's STL": ("00:00:00:01 , 00:00:01:22 , hello\n", "two times as in subtitles"),
-    "one time a line": ("0.2 hi\n0.5 you\n", "one time a line, 0.2 in the first, which may be its start or its end"),
-    "RTF": ("{\\rtf1\\ansi hello}", "begins with '{|rich-text"),
-    "HTML": ("\n<html><body>hello</body></html>", "begins with '<html>|web page"),
-    "NUL": ("hello you\0 there", "holds NUL characters"),
-    "mixed seconds": ("0 0.5 p\n0.5 1 aa\n", "its lines hold times"),
-    "a start of NaN": ("nan 1000000 sil\n1000000 2000000 p\n2000000 3500000 aa\n", "its lines hold times"),
-    "a last start of 0": ("0 sil\n1000000 p\n0 aa\n", "its lines hold times"),
-}
 TIMED = {
     "SubRip": ("1\n00:00:01,000 --> 00:00:02,000\nhello\n", "is a file of subtitles"),
     "WebVTT": ("WEBVTT\n\n00:01.000 --> 00:02.000\nhello\n", "is a file of subtitles"),
@@ -212,13 +125,10 @@ LABEL_WORDS = [
 ]  # fmt: skip
 
 
-def test_what_would_be_read_as_words_is_refused(read, write) -> None:
-    for text, message in OTHER.values():
-        for suffix in (".txt", ".lab"):
-            with pytest.raises(InputError, match=message):
-                read(text, f"a{suffix}")
-        with pytest.raises(InputError, match=message):
-            label_files.read_plain_text(write(text, "a.lab"))
+def test_what_would_be_read_as_words_is_refused(write) -> None:
+    for case in (case for name, case in LABEL_CASES.items() if name.startswith("no plain text")):
+        with pytest.raises(InputError, match=case["error"]):
+            label_files.read_plain_text(write(case["content"], "a.lab"))
 
 
 def test_words_and_labels_in_time_are_no_plain_text_and_words_with_numbers_are(read, write) -> None:
@@ -285,7 +195,6 @@ def test_others_read_it(tmp_path: Path) -> None:
 
 
 Interval = tuple[float, float, str]
-
 TEXTGRID_WORDS: list[Interval] = [(0, 0.4, ""), (0.4, 0.9, 'say ""hi""'), (0.9, 1.5, "Bob"), (1.5, 2.0, "")]
 TEXTGRID_PHONES: list[Interval] = [
     *[(0.0, 0.4, "sil"), (0.4, 0.6, "S"), (0.6, 0.75, "EY1"), (0.75, 0.8, "HH"), (0.8, 0.9, "AY1")],
@@ -350,15 +259,6 @@ def test_two_tiers_of_phones_and_binary_grids_are_refused(write):
             label_files.read_labels(write(content, "a.TextGrid"))
 
 
-@pytest.mark.recordings
-def test_a_real_one(recordings: Path):
-    found = label_files.read_labels(recordings / "speech-open" / "61-70968-0000.TextGrid")
-    assert found.words is not None
-    assert found.words[:4] == ("he", "began", "a", "confused")
-    assert found.words == label_files.read_labels(recordings / "speech-open" / "61-70968-0000.lab").words
-    assert found.phones is None
-
-
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -408,13 +308,6 @@ def test_a_word_that_is_said_again_stays_another_word(write):
     units = label_files.read_phones(write(short_form({"words": words, "phones": phones}), "a.TextGrid"))
     assert [span.label for span in group_words(units)] == ["city", "city", "", "city"]
     assert [span.label.again for span in units] == [n == 3 for n in range(9)]
-
-
-def test_vowels_are_reduced_word_by_word(write):
-    words: list[Interval] = [(i, i + 1, "about") for i in range(40)]
-    phones: list[Interval] = [(n / 4, (n + 1) / 4, phone) for n, phone in enumerate(["AH", "B", "AW", "T"] * 40)]
-    found = label_files.read_labels(write(short_form({"words": words, "phones": phones}), "a.TextGrid")).phones
-    assert [span.label.phone for span in found] == ["ax", "b", "aw", "t"] * 40
 
 
 ROWS = [(0.0, 0.31, "sil", ""), (0.31, 0.4, "m", "ma"), (0.4, 0.52, "aa", "ma"), (0.52, 3599.9996, "dh", "r&d <the>")]

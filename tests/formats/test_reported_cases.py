@@ -1,6 +1,5 @@
 """Labels that users of other tools have reported, and their siblings: words and phones as they are said."""
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from formats.examples import timed
+from formats.examples import LABEL_CASES, timed
 from lipmotion import Request
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import list_speakers, read_labels, read_phones, read_transcript
@@ -126,21 +125,7 @@ def test_samples_are_read_where_their_rate_is_known(write: Any) -> None:
         read_labels(write("3000 8140 my\n8180 15520 mother\n15520 29920 moved\n", "a.txt"))
 
 
-TWO = {"ann__words": [(0.3, 0.7, "mama")], "ann__phones": [(0.3, 0.5, "M"), (0.5, 0.7, "AA1")]}
-TWO |= {"bob__words": [(0.5, 1.0, "papa")], "bob__phones": [(0.5, 0.8, "P"), (0.8, 1.0, "AA1")]}
-ELAN = """<?xml version="1.0" encoding="UTF-8"?>
-<ANNOTATION_DOCUMENT><TIME_ORDER>
-<TIME_SLOT TIME_SLOT_ID="s1" TIME_VALUE="300"/><TIME_SLOT TIME_SLOT_ID="s2" TIME_VALUE="1200"/>
-<TIME_SLOT TIME_SLOT_ID="s3" TIME_VALUE="1000"/><TIME_SLOT TIME_SLOT_ID="s4" TIME_VALUE="1900"/></TIME_ORDER>
-<TIER TIER_ID="said" PARTICIPANT="ann"><ANNOTATION>
-<ALIGNABLE_ANNOTATION ANNOTATION_ID="a1" TIME_SLOT_REF1="s1" TIME_SLOT_REF2="s2">
-<ANNOTATION_VALUE>mama [laughs]</ANNOTATION_VALUE></ALIGNABLE_ANNOTATION></ANNOTATION></TIER>
-<TIER TIER_ID="meaning" PARENT_REF="said"><ANNOTATION><REF_ANNOTATION ANNOTATION_ID="a2" ANNOTATION_REF="a1">
-<ANNOTATION_VALUE>Mutter</ANNOTATION_VALUE></REF_ANNOTATION></ANNOTATION></TIER>
-<TIER TIER_ID="other" PARTICIPANT="bob"><ANNOTATION>
-<ALIGNABLE_ANNOTATION ANNOTATION_ID="a3" TIME_SLOT_REF1="s3" TIME_SLOT_REF2="s4">
-<ANNOTATION_VALUE>papa</ANNOTATION_VALUE></ALIGNABLE_ANNOTATION></ANNOTATION></TIER></ANNOTATION_DOCUMENT>
-"""
+SPEAKERS = {case["file"]: case["content"] for case in LABEL_CASES.values() if "speakers" in case}
 
 
 def test_textgrids_as_people_spell_them(write: Any) -> None:
@@ -156,31 +141,13 @@ def test_times_of_elan_are_those_of_its_recording(write: Any, caplog: pytest.Log
         media = (
             f'<HEADER TIME_UNITS="{unit}"><MEDIA_DESCRIPTOR MEDIA_URL="a.wav" TIME_ORIGIN="1000"/></HEADER><TIME_ORDER>'
         )
-        path = write(ELAN.replace("<TIME_ORDER>", media).encode("utf-16"), "a.eaf")
+        path = write(SPEAKERS["a.eaf"].replace("<TIME_ORDER>", media).encode("utf-16"), "a.eaf")
         if unit == "milliseconds":
             assert timed(path, speaker="bob").lines[0].start_s == pytest.approx(2)
             assert "1.00 s after the start of a.wav" in caplog.text
         else:
             with pytest.raises(InputError, match="PAL-frames, required milliseconds"):
                 read_transcript(path)
-
-
-MFA = {name.replace("__", " - "): {"entries": [list(row) for row in rows]} for name, rows in TWO.items()}
-SPEAKERS = {
-    "a.TextGrid": grid(**TWO),
-    "b.TextGrid": grid(ann=[(0.3, 0.7, "mama")], bob=[(0.7, 1.0, "papa")]),
-    "mfa.json": {"start": 0, "end": 2, "tiers": MFA},
-    "a.eaf": ELAN,
-    "a.csv": "Begin,End,Label,Type,Speaker\n0.3,0.7,mama,words,ann\n0.5,1.0,papa,words,bob\n",
-    "rev.json": {
-        "monologues": [
-            {"speaker": who, "elements": [{"type": "text", "value": said, "ts": start, "end_ts": start + 0.4}]}
-            for who, said, start in (("ann", "mama", 0.3), ("bob", "papa", 0.7))
-        ]
-    },
-    "a.stm": "take 1 ann 0.3 0.7 <o,f0> mama\ntake 1 bob 0.5 1.0 <o,f0> papa\n",
-    "a.ctm": "take ann 0.3 0.4 mama\ntake bob 0.5 0.5 papa\n",
-}
 
 
 @pytest.mark.parametrize("name", SPEAKERS)
@@ -195,7 +162,7 @@ def test_a_speaker_is_chosen_and_several_are_named(write: Any, caplog: pytest.Lo
 
 
 def test_phones_of_a_speaker_are_chosen_by_the_request_too(write: Any, tmp_path: Path) -> None:
-    for path in (write(grid(**TWO), "a.TextGrid"), write(SPEAKERS["mfa.json"], "mfa.json")):
+    for path in (write(SPEAKERS[name], name) for name in ("a.TextGrid", "mfa.json")):
         assert phones(path, speaker="bob") == phones(path, tier="bob - phones") == ["p", "aa"]
         assert phones(path) == ["m", "aa", "p", "aa"]  # who began goes on
         assert list_speakers(path) == ("ann", "bob")
@@ -236,153 +203,6 @@ def test_no_form_of_words_speaks_what_is_no_word(write: Any) -> None:
         assert words(write(content, name)) == "mama uh", name
 
 
-DOT = {"type": "punctuation", "alternatives": [{"content": "."}]}
-SERVICES: dict[str, Any] = {
-    "AWS": {"results": {"transcripts": [{"transcript": "no"}], "items": [
-        *({"start_time": str(a), "end_time": str(b), "type": "pronunciation", "alternatives": [{"content": w}]}
-          for w, a, b in W), DOT]}},
-    "AssemblyAI": {
-        "audio_duration": 2, "utterances": None, "chapters": [{"summary": "no", "start": 0, "end": 2000}],
-        "words": [{"text": w, "start": round(1000 * a), "end": round(1000 * b), "speaker": None} for w, a, b in W]},
-    "Google": {"results": [{"alternatives": [
-        {"words": [{"word": w, "startTime": f"{a:.3f}s", "endTime": f"{b:.3f}s"} for w, a, b in W]},
-        {"transcript": "jello"}]}]},
-    "Google in Python": {"results": [{"alternatives": [{"words": [
-        {"word": w, "start_time": {"seconds": int(a), "nanos": round(a % 1 * 1e9)},
-         "end_time": {"seconds": str(int(b)), "nanos": round(b % 1 * 1e9)}} for w, a, b in W]}]}]},
-    "Speechmatics": {"format": "2.9", "results": [
-        *({"type": "word", "start_time": a, "end_time": b, "alternatives": [{"content": w}]} for w, a, b in W),
-        DOT | {"start_time": 1.6, "end_time": 1.6}]},
-    "Watson": {"results": [{"alternatives": [{"transcript": "no", "timestamps": [list(row) for row in W]}]}]},
-    "Azure": {"Offset": 4_000_000, "Duration": 12_000_000, "NBest": [{"Display": "No.", "Words": [
-        {"Word": w, "Offset": round(a * 1e7), "Duration": round((b - a) * 1e7)} for w, a, b in W]}]},
-    "ElevenLabs Scribe": {"text": "no", "words": [
-        *({"text": w, "start": a, "end": b, "type": "word"} for w, a, b in W),
-        {"text": " ", "start": 1.6, "end": 1.7, "type": "spacing"},
-        {"text": "(laughter)", "start": 1.7, "end": 2, "type": "audio_event"}]},
-    "words under another name": {"answer": {"list": [{"word": w, "start": a, "duration": b - a} for w, a, b in W]}},
-    "a table": "start;end;word\n" + "".join(f"{a}".replace(".", ",") + f";{b};{w}\n" for w, a, b in W),
-    "JSON lines": "".join(json.dumps({"word": w, "start": a, "end": b}) + "\n" for w, a, b in W),
-    "JSON with a mark": b"\xef\xbb\xbf" + json.dumps([{"text": w, "from": a, "to": b} for w, a, b in W]).encode(),
-    "TTML of words": '<tt xmlns="http://www.w3.org/ns/ttml"><body begin="0.1s"><p begin="0.1s" end="2s">'
-    + " ".join(f'<span begin="{a - 0.2:.2f}s" end="{b - 0.2:.2f}s">{w}</span>' for w, a, b in W) + "</p></body></tt>",
-}  # fmt: skip
-
-
-MS = [(w, 1000 * a, 1000 * b) for w, a, b in W]
-OTHERS: dict[str, Any] = {
-    "Speechify": [
-        {"type": "word", "start": 6 * i, "end": 6 * i + 5, "start_time": a, "end_time": b, "value": w}
-        for i, (w, a, b) in enumerate(MS)
-    ],
-    "Soniox": {"tokens": [
-        {"text": text, "start_ms": a, "end_ms": b}
-        for text, a, b in (("hel", 400, 600), ("lo", 600, 800), (" big", 850, 1100), (" moon", 1200, 1600))
-    ]},
-    "Hume": [{"text": w, "time": {"begin": a, "end": b}} for w, a, b in MS],
-    "PlayHT": [{"type": "word", "word": w, "time": {"start": a, "end": b}} for w, a, b in W],
-    "MiniMax": [{"timestamped_words": [{"word": w, "time_begin": a, "time_end": b} for w, a, b in MS]}],
-    "Gladia, version 1": {"prediction": [{"words": [{"word": w, "time_begin": a, "time_end": b} for w, a, b in W]}]},
-    "Qwen's lists": [list(row) for row in W],
-    "lists, times first": [[a, b, w] for w, a, b in W],
-    "Deepgram, live": [
-        {"channel_index": [0, 1], "is_final": final, "channel": {"alternatives": [{"words": [
-            {"word": w, "start": a, "end": b}]}]}}
-        for w, a, b in W for final in (False, True)
-    ],
-    "seconds in the names": [{"text": w, "start_sec": a, "end_sec": b} for w, a, b in W],
-    "a table in milliseconds": "start_ms,End (ms),word\n" + "".join(f"{a:.0f},{b:.0f},{w}\n" for w, a, b in MS),
-    "Inworld": {"timestampInfo": {"wordAlignment": {
-        "words": [w for w, *_ in W],
-        "wordStartTimeSeconds": [a for _, a, _ in W],
-        "wordEndTimeSeconds": [b for *_, b in W],
-    }}},
-    "milliseconds with decimals": [{"word": w, "start": a + 0.01, "end": b + 0.01} for w, a, b in MS],
-    "milliseconds as lines": "".join(f"{a:.1f}\t{b:.1f}\t{w}\n" for w, a, b in MS),
-    "a table of clocks": "start,end,text\n" + "".join(f"0:0{a:.3f},00:00:0{b:.3f},{w}\n" for w, a, b in W),
-    "a table in seconds": "start\tend\ttext\n" + "".join(f"{a}\t{b}\t{w}\n" for w, a, b in W),
-    "numbers between commas": "".join(f"{a:.0f},{b:.0f},{w}\n" for w, a, b in MS),
-    "letters as objects": {"characters": [
-        {"text": letter, "start": a + k * (b - a) / len(w), "end": a + (k + 1) * (b - a) / len(w)}
-        for w, a, b in W for k, letter in enumerate(w + " ")]},
-    "ELAN's table": "Begin Time - ss.msec\tEnd Time - ss.msec\tAnnotation\n"
-    + "".join(f"{a}\t{b}\t{w}\n" for w, a, b in W),
-    "Speechmatics, live": [
-        {"message": f"Add{kind}Transcript", "results": [
-            {"type": "word", "start_time": a, "end_time": b, "alternatives": [{"content": w}]}]}
-        for w, a, b in W for kind in ("Partial", "")
-    ],
-    "Azure, assessed": {"NBest": [{"Words": [
-        {"Word": w, "Offset": round(1e4 * a), "Duration": round(1e4 * (b - a)),
-         "PronunciationAssessment": {"ErrorType": e, "AccuracyScore": 0}}
-        for w, a, b, e in [*((*row, "None") for row in MS), ("silent", 0, 0, "Omission")]]}]},
-    "minutes of ISO": [{"word": w, "offset": f"PT0M{a}S", "duration": f"PT{b - a:.3f}S"} for w, a, b in W],
-    "two units": [{"word": w, "start": f"{a}s", "duration": f"{1000 * (b - a):.0f}ms"} for w, a, b in W],
-    "hundredths": [{"word": w, "start": round(a / 10), "end": round(b / 10)} for w, a, b in MS],
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", [*SERVICES, *OTHERS])
-def test_word_times_of_services_and_voices(write: Any, name: str) -> None:
-    path = write((SERVICES | OTHERS)[name])
-    assert words(path) == "hello big moon"
-    expected = [t for _, *pair in W for t in pair]
-    assert [t for pair in times(path) for t in pair] == pytest.approx(expected, abs=1e-3 if name in OTHERS else None)
-
-
-TTML = '<tt xmlns="http://www.w3.org/ns/ttml" xmlns:p="http://www.w3.org/ns/ttml#parameter" {}>{}</tt>'
-BODY = '<body><p begin="{}" {}="{}">hello<br/>big <span>moon</span></p></body>'
-RATES = 'p:frameRate="25" p:tickRate="10000000"'
-LINES = {
-    "aeneas' table": 'f000001,0.400,1.600,"hello big moon"\n',
-    "whisper.cpp prints": "Detecting language\n[00:00:00.400 --> 00:00:01.600]   hello big moon\n",
-    "faster-whisper prints": "[0.40s -> 1.60s] hello big moon\n",
-    "subtitles of an old Mac": "1\r00:00:00,400 --> 00:00:01,600\rhello big\rmoon\r",
-    "ELAN's text": "default\t\t00:00:00.400\t0.4\t00:00:01.600\t1.6\t00:00:01.200\t1.2\thello big moon\n",
-    "HTML's breaks": "1\n00:00:00,400 --> 00:00:01,600\nhello<br/>big&lt;br&gt;moon\n",
-    "SubViewer": "[INFORMATION]\n[TITLE]no\n[SUBTITLE]\n00:00:00.40,00:00:01.60\nhello big[br]moon\n",
-    "ruby": "WEBVTT\n\n00:00.400 --> 00:01.600\n<ruby>hello<rt>no</rt></ruby> big moon\n",
-    "MPL2": "[4][16]hello big|/moon\n[16][17]\n",
-    "SBV": "0:00:00.400,0:00:01.600\nhello big\nmoon\n",
-    "TTML": TTML.format("", BODY.format("00:00:00.4", "end", "1600ms")),
-    "TTML in ticks": TTML.format(RATES, BODY.format("4000000t", "dur", "12000000t")),
-    "TTML in frames": TTML.format(RATES, BODY.format("00:00:00:10", "end", "40f")),
-    "YouTube": '<transcript><text start="0.4" dur="1.2">hello big moon</text></transcript>',
-    "YouTube's JSON": {"events": [{"tStartMs": 400, "dDurationMs": 1200, "segs": [{"utf8": "hello big"}, {"utf8":
-        " moon"}]}]},
-    "Azure in batch": {"recognizedPhrases": [{"offset": "PT0.4S", "offsetInTicks": 4e6, "durationInTicks": 1.2e7,
-        "nBest": [{"display": "hello big moon"}]}]},
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", LINES)
-def test_lines_in_time(write: Any, name: str) -> None:
-    line = timed(write(LINES[name])).lines[0]
-    assert " ".join(word.word for word in line.words) == "hello big moon"
-    assert (line.start_s, line.end_s) == pytest.approx((0.4, 1.6))
-
-
-MAMA = (("m", 0, 0.1), ("aa", 0.1, 0.3), ("m", 0.3, 0.4), ("ax", 0.4, 0.6))
-MAMA_OF = [{"phoneme": p, "start": a, "end": b} for p, a, b in MAMA]
-PHONES: dict[str, Any] = {
-    "Kaldi's CTM": "".join(f"take 1 {a:.2f} {b - a:.2f} {p}_I\n" for p, a, b in MAMA),
-    "a table": "Start,End,Text\n" + "".join(f'"{a}","{b}","{p}"\n' for p, a, b in MAMA),
-    "lists": [[a, b, p] for p, a, b in MAMA],
-    "objects": MAMA_OF,
-    "beside words": {"words": [{"word": "mama", "start": 0, "end": 0.6}], "phonemes": MAMA_OF},
-    "within words": {"segments": [{"start": 0, "end": 1, "text": "mama", "words": [
-        {"word": "mama", "start": 0, "end": 0.6, "phones": MAMA_OF}]}]},
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", PHONES)
-def test_phones_are_no_words(write: Any, name: str) -> None:
-    path = write(PHONES[name])
-    assert phones(path) == [p for p, *_ in MAMA]
-    if "words" in name:
-        assert words(path) == "mama"
-
-
 def test_times_that_are_none_are_missing(write: Any) -> None:
     for start, end in ((math.nan, math.nan), (None, None), (math.inf, -math.inf), ("NaN", ""), (-5, None)):
         word = {"word": "big", "start": start, "end": end}
@@ -399,24 +219,6 @@ def test_every_form_may_be_wide_text(write: Any, encoding: str) -> None:
     ):
         assert words(write(content.encode(encoding), "a.txt")) == "mama"
     assert read_transcript(write("mama went home".encode(encoding), "a.txt")) == "mama went home"
-
-
-@pytest.mark.parametrize(
-    ("content", "named"),
-    [
-        ({"FrameIndex": 0, "BlendShapes": [[0.0] * 55]}, "55.*motion"),
-        ({"metadata": {}, "mouthCues": [{"start": 0, "end": 1, "value": "X"}]}, "mouth cues"),
-        ({"foo": [{"bar": 1}]}, "it has foo; known are segments"),
-        ("SPEAKER take 1 0.30 0.40 <NA> <NA> ann <NA> <NA>\n", "RTTM"),
-        (b"\x1f\x8b\x08\x00", "archive|gzip"),
-        ("<tt><body><p begin='soon'>a</p></body></tt>", "a time is 'soon'"),
-        ("<tt><body>", "damaged XML"),
-        ('<!DOCTYPE a [<!ENTITY b "c">]><tt>&b;</tt>', "entities|begins with"),
-    ],
-)
-def test_what_is_none_is_named(write: Any, content: Any, named: str) -> None:
-    with pytest.raises(InputError, match=named):
-        read_labels(write(content))
 
 
 XSAMPA = {"4": "d", "{": "ae", "3`": "er", "@U": "ow", "t_h": "t", '"i:': "iy", "r\\": "r", "n=": "en", "tS": "ch"}

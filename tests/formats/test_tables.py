@@ -27,37 +27,9 @@ def test_the_table_is_as_specified(tmp_path, generation):
     assert table[:, 1:] == pytest.approx(generation.motion.values, abs=5.1e-6)
 
 
-WRONG = [
-    ("time_s\n0\n", "first line is 'time_s'"),
-    ("opening\n0\n", "first line is 'opening', required 'time_s,opening"),
-    ("time_s,opening\n0,a\n0.1,b\n", "not a table of numbers"),
-    ("time_s,opening\n0,1\n0.1\n", "not a table of numbers"),
-    ("time_s,opening\n0,1,2\n0.1,1,2\n", "required 2 numbers in each"),
-    ("time_s,opening\n0,1\n", "fewer than two rows"), ("time_s,opening\n0.1,1\n0.2,1\n", "begin at 0"),
-    ("time_s,opening\n0,1\n0.1,1\n0.3,1\n", "even steps"), ("time_s,opening\n0,1\n0,1\n", "even steps"),
-    ("time_s,opening\n0,1\ninf,1\n", "values that are no times, required seconds up to"),
-    ("time_s,opening\n0,1\n1,nan\n", "1 values that are not finite, the first is 'opening' in frame 1"),
-    ("time_s,opening,opening\n0,1,1\n0.1,1,1\n", "names repeat"),
-    ("time_s,jawOpen\n0,0\n0.1,55\n", "jawOpen goes up to 55, required 0 to 1; divide percent by 100"),
-    *(
-        (f"time_s,{field}\n0,1\n1,1\n", "begins as a spreadsheet's formula")
-        for field in ("=1", "@A", "-1", "+x", "\t=1")
-    ),
-    ("time,jaw\n0,1\n", "1 rows with values, required two or more"),
-    ("time,jaw\n0,1\n0,2\n", "1 rows with values, required two or more"),
-    ("time,jaw\n" + "0,1\n" * 5 + "1,1\n", "4 of 6 rows are not later than those before, as row 2"),
-    ("time,jaw\n0,inf\n1,nan\n", "0 rows with values"),
-    ("frame,jaw\n0,1\n1,1\n", "first line is 'frame,jaw', required .* a column of times"),
-    ("time,jaw\nsoon,1\n1,1\n", "line 2: could not convert"),
-    ("time,jaw\n0,1\n0.01,1\n0.02,1\n0.03,1\n99,1\n", "most of the time there are none; cut the take"),
-]  # fmt: skip
-
-
-def test_what_is_wrong_is_said(write):
-    without_end = ("time_s," + "a," * 600_000 + "b\n0,1\n", "fields, required")  # such a line is not read whole
-    for text, message in (*WRONG, without_end):
-        with pytest.raises(InputError, match=message):
-            read_motion(write(text, "a.csv"))
+def test_a_first_line_without_end_is_not_read_whole(write):
+    with pytest.raises(InputError, match="fields, required"):
+        read_motion(write("time_s," + "a," * 600_000 + "b\n0,1\n", "a.csv"))
 
 
 def test_names_that_other_separators_would_part_are_refused_and_odd_ones_come_back(tmp_path, generation):
@@ -204,31 +176,6 @@ def test_what_is_a_table_of_the_app(write):
         assert not is_live_link_file(write(f"{head}\n", "a.csv"))
 
 
-GOOD_ROWS = [row(f"10:00:00:{n:02d}.000") for n in range(10)]
-
-
-WRONG_TAKES = [
-    ([], "there are no rows"),
-    (GOOD_ROWS[:1], "1 rows with values, required two or more"),
-    ([*GOOD_ROWS, "10:00:00:12.000,61,0.1"], "line 12 has 1 curves, required 61; delete it if it is the last"),
-    ([*GOOD_ROWS, row("soon")], "line 12 begins with 'soon', required a timecode as"),
-    ([*GOOD_ROWS, row("10:61:00:00.000")], "line 12 begins with '10:61:00:00.000', required a timecode"),
-    ([*GOOD_ROWS, row("10:00:00:13.000", "wide")], "could not convert string to float"),
-    ([*GOOD_ROWS, row("09:00:00:00.000")], r"the time of row 11 goes back by 3600"),
-    ([*GOOD_ROWS, row("11:00:00:00.000")], "11 rows in 3600.0 s at 60 rows a second: most of the time there are none"),
-    ([row(f"10:00:00:{n:02d}.000", count=0) for n in range(5)], "could not|0 rows with values"),
-    ([row(f"10:00:0{n // 200}:{n % 200}.000") for n in range(300)], "has frame 199, required less than 120"),
-]
-
-
-def test_what_is_wrong_in_a_take_is_said(write):
-    for lines, message in WRONG_TAKES:
-        with pytest.raises(InputError, match=message):
-            read_motion(write("\n".join([HEAD, *lines]), "take.csv"))
-    with pytest.raises(InputError, match="not a table of"):
-        read_motion(write(HEAD.encode() + b"\n\xff\xfe\x00", "take.csv"))
-
-
 OWN = {"exportFps": 30, "trackPath": "talk.wav", "numPoses": 4, "numFrames": 2}
 OWN |= {"facsNames": ["jawDrop", "jawDropLipTowards", "lipCornerPullerL", "eyesCloseR"], "joints": ["jaw"]}
 OWN |= {"weightMat": [[0.0, 0.0, 0.25, 0.0], [0.5, 0.25, 0.0, 1.0]], "rotations": [[[0, 0, 0, 1]], [[0, 0, 0, 1]]]}
@@ -258,22 +205,3 @@ def test_the_names_of_its_own_solver_are_understood(write: Any) -> None:
         "jawOpen": [0.0, 0.75], "mouthClose": [0.0, 0.25], "mouthSmileLeft": [0.25, 0.0], "eyeBlinkRight": [0.0, 1.0],
     }  # fmt: skip
     assert with_mouth(motion)["lip_gap"][0] == 0 < with_mouth(motion)["lip_gap"][1]
-
-
-ERRORS = {
-    "no rate": ({**OWN, "exportFps": None}, r"a\.json: the file of Audio2Face is damaged"),
-    "no names": ({**OWN, "facsNames": 3}, "facsNames is 3, required a list"),
-    "a name too many": (
-        {**OWN, "facsNames": ["jawDrop"]}, r"'weightMat' has \(2, 4\) rows and columns, required a column for each"),
-    "uneven rows": ({**OWN, "weightMat": [[0.0], [0.0, 1.0]]}, "row 2 of the values is not a list of as many numbers"),
-    "a name twice": ({**OWN, "facsNames": ["a", "a", "b", "c"]}, "motion channel names repeat"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", ERRORS)
-def test_damaged_files_are_refused(write: Any, name: str) -> None:
-    document, message = ERRORS[name]
-    with pytest.raises(InputError, match=message):
-        read_motion(write(document))
-    with pytest.raises(InputError, match="exportFps is missing"):
-        read_motion(write(json.dumps(OWN).replace('"exportFps"', '"fps"'), "b.a2f.json"))

@@ -15,5 +15,5 @@ def good(toy_corpus: Corpus, toy_model_file: Path, coupled_model_file: Path) -> 
 
 @pytest.fixture(scope="module")
 def worker(good: Good) -> Iterator[Worker]:
-    with Worker(good, lines=False) as process:
+    with Worker(good) as process:
         yield process

@@ -7,11 +7,10 @@ import zlib
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from PIL import Image
 
 from fuzz.inputs import Files
-from meshes.gltf import document, glb, packed_attributes, textured_document
+from meshes.gltf import document, glb, textured_document
 from robustness.motion_cases import GOOD
 
 Change = Callable[[dict[str, Any]], None]
@@ -90,18 +89,6 @@ def _expressions(binds: int) -> Change:
     return change
 
 
-def _packed(count: int, mode: str, stride: int) -> Files:
-    """Return a view of many elements in few bytes."""
-    extra = packed_attributes(np.zeros((4, 12), np.uint8)) if mode == "ATTRIBUTES" else b"\xe1" + b"\0" * 40
-
-    def change(content: dict[str, Any]) -> None:
-        place = {"buffer": 0, "byteOffset": content["buffers"][0]["byteLength"], "byteLength": len(extra)}
-        packed = place | {"mode": mode, "count": count, "byteStride": stride}
-        content["bufferViews"][0]["extensions"] = {"EXT_meshopt_compression": packed}
-
-    return _gltf(change, extra)
-
-
 def _png(width: int, height: int, colour: int = 6, bits: int = 8) -> bytes:
     """Return a picture of one colour, of any size, in little."""
     rows, body = zlib.compressobj(9), b""
@@ -166,37 +153,24 @@ def _obj(text: bytes, **others: bytes) -> Files:
 SQUARE = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 LIBRARY = b"".join(b"newmtl m%d\nmap_Kd skin.png\n" % n for n in range(2000))
 USED = SQUARE + b"".join(b"usemtl m%d\nf 1 2 3\n" % n for n in range(2000))
-
 CHARACTER_FLOODS: dict[str, Callable[[], Files]] = {
     "matrices without bytes": lambda: _gltf(_matrices),
-    "20,000 primitives": lambda: _gltf(_primitives(20_000)),
     "2,000 primitives": lambda: _gltf(_primitives(2000)),
     "3,000 nodes with one mesh": lambda: _gltf(_nodes(3000)),
-    "2,000 nodes with one mesh": lambda: _gltf(_nodes(2000)),
-    "2,000 nodes, and 8,000 more": lambda: _gltf(_nodes(1999, extra=[{"name": "Head"}] * 8000)),
     "a million nodes": lambda: _gltf(_nodes(333_000)),
     "cycles outside of the scene": lambda: _gltf(_cycles),
     "factors that are multiplied": lambda: _gltf(_chain),
     "many targets of many parts": lambda: _gltf(_targets(1000, 900)),
-    "20 targets of 1,000 parts": lambda: _gltf(_targets(1000, 20)),
     "targets": lambda: _gltf(_targets(1, 100_000)),
     "vertices without bytes": lambda: _gltf(_zeros(200_000)),
     "too many vertices without bytes": lambda: _gltf(_zeros(10**9)),
-    "targets without bytes": lambda: _gltf(_zeros(200_000, targets=1000)),
     "100,000 binds": lambda: _gltf(_expressions(100_000)),
     "9,000 binds": lambda: _gltf(_expressions(9_000)),
-    "compressed zeros": lambda: _packed(4_000_000, "ATTRIBUTES", 12),
-    "too many compressed zeros": lambda: _packed(500_000_000, "ATTRIBUTES", 12),
-    "compressed triangles": lambda: _packed(12_000_000, "TRIANGLES", 4),
     "a picture of 8192 by 8192": lambda: _pictured(_png(8192, 8192, 2)),
-    "a clear picture of 8192 by 8192": lambda: _pictured(_png(8192, 8192)),
-    "a picture of 8192 by 8192 with a palette": lambda: _pictured(_png(8192, 8192, 3)),
-    "a picture of 8000 by 8000 of 16 bits": lambda: _pictured(_png(8000, 8000, 2, 16)),
     "20 textures of one picture": lambda: _pictured(_png(8192, 8192, 2), 20),
     "20 pictures of 8192 by 8192": lambda: _pictured(_png(8192, 8192, 2), 20, copies=True),
     "a picture of 60000 by 60000": lambda: _pictured(_png(60_000, 8)[:16] + struct.pack(">II", 60_000, 60_000)),
     "a JPEG that lies": lambda: _pictured(_jpeg(65_000, 1000)),
-    "a progressive JPEG that lies": lambda: _pictured(_jpeg(8000, 8000, progressive=True)),
     "5,000 scans": lambda: _pictured(_scans(5000)),
     "12 million empty chunks": lambda: _chunks(12_000_000),
     "lists of lists": lambda: _json(b"[" + b"[]," * 1_000_000 + b"0]"),
@@ -208,7 +182,6 @@ CHARACTER_FLOODS: dict[str, Callable[[], Files]] = {
     "nested lists": lambda: _json(b"[" * 900 + b"]" * 900),
     "a name of 30 million letters": lambda: _json(b'"' + b"\xf0\x9f\x98\x80" * 7_000_000 + b'"'),
     "12 million vertices": lambda: _obj(b"v 0 0 0\n" * 12_000_000 + b"f 1 2 3\n"),
-    "200,000 vertices": lambda: _obj(b"v 0 0 0\n" * 200_000 + b"f 1 2 3\n" * 400_000),
     "30 million bare lines": lambda: _obj(b"v\n" * 30_000_000),
     "90 million empty lines": lambda: _obj(b"\n" * 90_000_000),
     "one line of 200 million letters": lambda: _obj(b"f" + b" 1" * 100_000_000),
@@ -216,17 +189,15 @@ CHARACTER_FLOODS: dict[str, Callable[[], Files]] = {
     "polygons of 1,000 corners": lambda: _obj(SQUARE + (b"f" + b" 1" * 1000 + b"\n") * 5000),
     "parts": lambda: _obj(SQUARE + b"".join(b"g p%d\nf 1 2 3\n" % n for n in range(100_000))),
     "2,000 materials with one picture": lambda: _obj(
-        b"mtllib head.mtl\n" + USED, head_mtl=LIBRARY, skin_png=_png(8192, 8192, 2)
+        b"mtllib head.mtl\n" + USED, head_mtl=LIBRARY, skin_png=_png(8192, 8192)
     ),
     "one material with 40,000 pictures": lambda: _obj(
         b"mtllib head.mtl\nusemtl m\n" + SQUARE + b"f 1 2 3\n",
         head_mtl=b"newmtl m\n" + b"map_Kd skin.png\n" * 40_000,
-        skin_png=_png(4096, 4096, 2),
+        skin_png=_png(4096, 4096),
     ),
 }
 """By what they are."""
-
-
 TIER = b'"ooTextFile"\n"TextGrid"\n0\n2\n<exists>\n1\n"%s"\n"a"\n0\n2\n1\n0\n2\n"x"\n'
 
 

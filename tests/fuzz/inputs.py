@@ -16,8 +16,7 @@ from lipmotion import Corpus, Model, load_model, write
 from lipmotion.types import Audio, Generation, Motion
 from lipmotion.types.motion import LARGEST_MAGNITUDE
 
-Files = dict[str, bytes]
-"""One input: contents of files by name; a name may include folders."""
+Files = dict[str, bytes]  # one input: contents of files by name; a name may include folders
 
 
 class ImplausibleError(AssertionError):
@@ -72,8 +71,7 @@ def picked_up(folder: Path) -> Files:
 GENERATED = {"eye_distance": 10.0, "weight": 100.0, "grey": 1e6}
 """Largest plausible value of generated motion, by unit: a whole head is two eye distances high."""
 LONGEST_S = 3600.0
-SHORT = slice(6000, 18_000)
-"""Samples of the toy sentence: its first word."""
+SHORT = slice(6000, 18_000)  # samples of the toy sentence: its first word
 
 
 def require(holds: bool, text: str) -> None:

@@ -5,7 +5,7 @@ import re
 import shutil
 import traceback
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from fuzz.inputs import Files, Good, ImplausibleError, Reader, lay_out, picked_up
@@ -13,11 +13,8 @@ from lipmotion.cli.terminal.progress import describe_outcome
 
 READ, REFUSED = "read", "refused"
 ERROR, IMPLAUSIBLE, LEFT, MEMORY, HANG, CRASH = "error", "implausible", "left behind", "memory", "hang", "crash"
-WRONG = (ERROR, IMPLAUSIBLE, LEFT, MEMORY, HANG, CRASH)
-LONGEST_LINE = 2000
-"""Most characters of an error message."""
-OBEYED = re.compile("[\x00-\x1f\x7f-\x9f]")
-"""Terminal control characters."""
+LONGEST_LINE = 2000  # most characters of an error message
+OBEYED = re.compile("[\x00-\x1f\x7f-\x9f]")  # terminal control characters
 
 
 @dataclass(frozen=True)
@@ -27,13 +24,11 @@ class Result:
     kind   : read, refused, or a kind of defect
     where  : identifies a defect
     detail : description for people
-    lines  : lines of the package that ran for the first time
     """
 
     kind: str
     where: str = ""
     detail: str = ""
-    lines: frozenset[str] = field(default_factory=frozenset)
 
 
 def read_result(reader: Reader, files: Files, folder: Path, good: Good) -> Result:

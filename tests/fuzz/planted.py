@@ -8,7 +8,6 @@ import numpy as np
 
 from fuzz.inputs import Files, Good, ImplausibleError, Reader
 from lipmotion.errors import InputError
-from lipmotion.units import split_words
 
 MEGABYTES = 80
 
@@ -35,7 +34,6 @@ def read(folder: Path, _: Good) -> None:
         (folder / "a.txt").write_bytes(b"")
     if b"lie" in order:
         raise ImplausibleError("planted")
-    split_words("baby")
 
 
 def readers() -> dict[str, Reader]:

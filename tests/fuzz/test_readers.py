@@ -15,8 +15,7 @@ from fuzz.worker import Worker
 FOUND = Path(__file__).parent / "found"
 FOLDERS = sorted(path for path in FOUND.glob("*/*") if path.is_dir())
 ROUNDS = 12
-LONG = ("live", "requests")
-"""Readers that have much to prepare, or to do."""
+LONG = ("live",)  # readers that have much to prepare, or to do
 INPUTS = {"model": 4, "face": 4, "video": 6, "transcript": 8, "lexicon": 8, "character": 4}
 """Numbers of changed inputs of slower readers."""
 

@@ -12,57 +12,13 @@ import signal
 import sys
 import tempfile
 from contextlib import suppress
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from types import CodeType, FrameType, TracebackType
+from types import TracebackType
 from typing import Any
 
-import lipmotion
 from fuzz.inputs import Files, Good, Reader
 from fuzz.judge import CRASH, HANG, LEFT, MEMORY, READ, REFUSED, Result, quiet, read_result
-
-ROOT = str(Path(lipmotion.__file__).parent)
-FREQUENT_HITS, RARE_HITS = 500, 50
-"""After so many calls without a new line, a function is traced only once in so many calls."""
-
-
-class LineCoverage:
-    """Records every line of the package when it first runs; later runs of the line cost little."""
-
-    def __init__(self) -> None:
-        self._new: set[str] = set()
-
-    def taken(self) -> set[str]:
-        """Return the lines that first ran since the last call."""
-        new, self._new = self._new, set()
-        return new
-
-    def watch(self) -> None:
-        self._missing: dict[CodeType, set[int]] = {}
-        self._calls: dict[CodeType, int] = {}
-        sys.settrace(self._called)
-
-    def _called(self, frame: FrameType, *_: object) -> Any:
-        code = frame.f_code
-        missing = self._missing.get(code)
-        if missing is None:
-            own = code.co_filename.startswith(ROOT)
-            missing = self._missing[code] = {line for *_, line in code.co_lines() if line} if own else set()
-        if not missing:
-            return None
-        calls = self._calls[code] = self._calls.get(code, 0) + 1
-        return self._run if calls < FREQUENT_HITS or calls % RARE_HITS == 0 else None
-
-    def _run(self, frame: FrameType, *_: object) -> Any:
-        code, line = frame.f_code, frame.f_lineno
-        missing = self._missing[code]
-        if line in missing:
-            missing.remove(line)
-            self._calls[code] = 0
-            self._new.add(f"{code.co_filename[len(ROOT) + 1 :]}:{line}")
-        return self._run if missing else None
-
 
 try:
     import resource
@@ -83,8 +39,7 @@ class Memory:
 
     def __init__(self, most_mb: int) -> None:
         self._most_mb = most_mb
-        self._first_mb = _now_mb("VmRSS")
-        self._before_mb = self._first_mb
+        self._first_mb = self._before_mb = _now_mb("VmRSS")
         limit = round((_now_mb("VmSize") + 3 * most_mb) * MB)
         if resource is not None and sys.platform == "linux":
             resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
@@ -95,13 +50,10 @@ class Memory:
             PEAK.write_text("5")  # resets the peak
         self._before_mb = _now_mb("VmRSS")
 
-    def grown_mb(self) -> float:
-        """Return the largest growth since ``begin``, in megabytes."""
-        return _now_mb("VmHWM") - self._before_mb
-
-    def too_much(self) -> bool:
-        """Return whether the growth counts as a defect."""
-        return self.grown_mb() > self._most_mb
+    def excess_mb(self) -> float:
+        """Return the largest growth since ``begin``, in megabytes, where it counts as a defect, else 0."""
+        grown_mb = _now_mb("VmHWM") - self._before_mb
+        return grown_mb if grown_mb > self._most_mb else 0.0
 
     def retains_much(self) -> bool:
         """Return whether the process keeps so much memory that it should be replaced."""
@@ -110,10 +62,7 @@ class Memory:
 
 def _now_mb(name: str) -> float:
     """Return a figure of this process in megabytes; 0 where the system does not provide it."""
-    try:
-        lines = STATUS.read_text().splitlines()
-    except OSError:
-        return 0.0
+    lines = STATUS.read_text().splitlines() if STATUS.is_file() else []
     return next((int(line.split()[1]) / 1024 for line in lines if line.startswith(f"{name}:")), 0.0)
 
 
@@ -129,8 +78,7 @@ def busy_s(process: int) -> float:
 HANG_S = 20.0
 PATIENCE = 3
 """Factor between clock time and processor time that is allowed where other processes keep the processor busy."""
-START_S = 300.0
-"""Longest start of the process: the first import compiles kernels."""
+START_S = 300.0  # longest start of the process: the first import compiles kernels
 Readers = dict[str, Reader]
 
 
@@ -139,19 +87,12 @@ class Worker:
 
     readers : a function that returns the readers by name; None: all readers
     hang_s  : processor time after which a reader counts as hanging; ``PATIENCE`` times as long by the clock
-    lines   : whether the lines that ran are told, which takes time
     """
 
     def __init__(
-        self,
-        good: Good,
-        *,
-        hang_s: float = HANG_S,
-        memory_mb: int = Memory.MAX_MB,
-        readers: Any = None,
-        lines: bool = True,
+        self, good: Good, *, hang_s: float = HANG_S, memory_mb: int = Memory.MAX_MB, readers: Any = None
     ) -> None:
-        self._arguments = (good, memory_mb, readers, lines)
+        self._arguments = (good, memory_mb, readers)
         self._hang_s = hang_s
         self._process: Any = None
         self._folder = tempfile.TemporaryDirectory(prefix="lipmotion-fuzz-")
@@ -229,7 +170,7 @@ class Worker:
         self._process = None
 
 
-def serve(pipe: Any, folder: str, good: Good, memory_mb: int, readers: Any, tell_lines: bool) -> None:
+def serve(pipe: Any, folder: str, good: Good, memory_mb: int, readers: Any) -> None:
     """Read the inputs that arrive through the pipe, in a folder that must stay empty."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is handled by the parent process
     here, log = Path(folder) / "here", (Path(folder) / "log").open("a")
@@ -243,16 +184,14 @@ def serve(pipe: Any, folder: str, good: Good, memory_mb: int, readers: Any, tell
     tempfile.tempdir = str(here)
     quiet()
     known = import_module("fuzz.readers").READERS if readers is None else readers()
-    lines, memory = LineCoverage(), Memory(memory_mb)
-    if tell_lines:
-        lines.watch()
+    memory = Memory(memory_mb)
     pipe.send("ready")
     with suppress(EOFError, OSError):
         while True:
             reader, files = pipe.recv()
             memory.begin()
             result = read_result(known[reader], files, Path(folder) / "bad", good)
-            pipe.send((replace(_checked(result, memory, here), lines=frozenset(lines.taken())), memory.retains_much()))
+            pipe.send((_checked(result, memory, here), memory.retains_much()))
 
 
 def _checked(result: Result, memory: Memory, here: Path) -> Result:
@@ -260,8 +199,8 @@ def _checked(result: Result, memory: Memory, here: Path) -> Result:
     left = sorted(path.name for path in here.iterdir())
     for name in left:
         shutil.rmtree(here / name, ignore_errors=True) if (here / name).is_dir() else (here / name).unlink()
-    if result.kind in (READ, REFUSED) and memory.too_much():
-        return Result(MEMORY, result.where or result.kind, f"{memory.grown_mb():.0f} MB; {result.detail}")
+    if result.kind in (READ, REFUSED) and (excess_mb := memory.excess_mb()):
+        return Result(MEMORY, result.where or result.kind, f"{excess_mb:.0f} MB; {result.detail}")
     if result.kind in (READ, REFUSED) and left:
         return Result(LEFT, "beside it", ", ".join(left))
     return result

@@ -71,18 +71,6 @@ def test_the_e_step_agrees_with_the_enumeration_of_all_paths():
     assert keep == pytest.approx(np.clip(stays[visits > 0] / visits[visits > 0], 0.05, 11 / 12), abs=1e-4)
 
 
-def test_utterances_together_are_as_each_alone_in_any_order():
-    hmm, data, said = disturbed(6, 1.0)
-    before = hmm.mixtures.means.copy()
-    better, log_likelihood = step(hmm, data, said)
-    assert np.array_equal(hmm.mixtures.means, before)  # the old models stay as they were
-    alone = [step(hmm, [x], [units])[1] for x, units in zip(data, said, strict=True)]
-    assert np.average(alone, weights=[len(x) for x in data]) == pytest.approx(log_likelihood, abs=1e-6)
-    same, figure = step(hmm, data[::-1], said[::-1])
-    assert figure == pytest.approx(log_likelihood, abs=1e-9)
-    assert same.mixtures.means == pytest.approx(better.mixtures.means, abs=1e-4)
-
-
 @given(sizes=st.lists(st.tuples(st.integers(1, 3000), st.integers(1, 600)), min_size=1, max_size=20))
 def test_long_utterances_do_not_fill_the_memory(sizes):
     frames, states = zip(*sizes, strict=True)
@@ -91,16 +79,6 @@ def test_long_utterances_do_not_fill_the_memory(sizes):
     for batch in batches:
         padded = len(batch) * max(frames[i] for i in batch) * max(states[i] for i in batch)
         assert len(batch) == 1 or padded <= unit_training.CELLS
-
-
-def test_an_utterance_too_short_for_its_units_counts_for_nothing():
-    hmm, data, said = disturbed(8, 1.0)
-    floor = replace(hmm, config=replace(hmm.config, variance_floor=1e-9))  # the floor depends on all data
-    better, log_likelihood = step(floor, data, said)
-    same, figure = step(floor, [*data, data[0][:10]], [*said, said[0]])
-    assert figure == pytest.approx(log_likelihood, abs=1e-9)
-    assert same.mixtures.means == pytest.approx(better.mixtures.means, abs=1e-5)
-    assert same.log_stay == pytest.approx(better.log_stay, abs=1e-6)
 
 
 def test_no_state_may_last_longer_than_its_limit():

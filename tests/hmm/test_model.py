@@ -69,13 +69,6 @@ def test_names_of_states_say_the_neighbour_that_counts():
     assert TABLE.name("b", "sil", "ih", 2) == "sil.2"
 
 
-def test_only_seen_contexts_have_densities_of_their_own():
-    assert TABLE.names[TABLE.density("b", 0, "ih")] == "b.0<ih"
-    assert TABLE.names[TABLE.density("b", 2, "sil")] == "b.2>sil"
-    for state, neighbour in ((0, "sil"), (2, "ih"), (1, "ih"), (0, None), (0, "unknown")):
-        assert TABLE.names[TABLE.density("b", state, neighbour)] == f"b.{state}"
-
-
 INVENTORY = (SILENCE, "a", "b")
 
 
@@ -119,13 +112,6 @@ def test_a_known_sequence_is_recovered():
         assert bounds == pytest.approx(edges, abs=1)
 
 
-def test_silence_alone_is_silence_however_unlikely_it_is_to_follow_itself():
-    who = speaker()
-    hmm = known_hmm(who, list(map(within_silence, sentences(1, 40))), HmmConfig(mixtures=1, bigram_weight=20.0))
-    features, edges = who.say(np.random.default_rng(1), (SILENCE,))
-    assert decoded(hmm, features, (SILENCE, *UNITS)) == ((SILENCE,), edges)
-
-
 def test_short_silence_at_the_start_is_not_priced_out():
     """Silence never follows silence, nor the silence before a recording that begins in silence."""
     who = speaker(spread=2.0)
@@ -142,12 +128,6 @@ def test_the_bigram_decides_between_units_that_sound_alike():
     for first, second in (("a", "e"), ("b", "d")):
         features, _ = who.say(np.random.default_rng(2), (SILENCE, first, second, SILENCE))
         assert decoded(hmm, features, (SILENCE, *UNITS))[0] == (SILENCE, first, second, SILENCE)
-
-
-def test_a_price_on_units_leaves_fewer():
-    features = np.random.default_rng(4).normal(0, 1.5, (60, 2)).astype(np.float32)
-    cheap, dear = (random_hmm(4, config=HmmConfig(3, bigram_weight=1.0, insertion=price)) for price in (8.0, -8.0))
-    assert len(decoded(dear, features)[0]) < len(decoded(cheap, features)[0])
 
 
 def test_chains_name_states_in_context_and_fall_back_where_unseen():
@@ -191,15 +171,6 @@ def test_the_pronunciation_and_the_pauses_that_were_said_are_chosen():
         wanted.append((-1, 0, (SILENCE,)))
         features, _ = who.say(np.random.default_rng(first + 2 * last), [unit for part in wanted for unit in part[2]])
         assert choose(known_hmm(who), features, WORDS) == wanted
-
-
-def test_a_pause_inside_of_a_pronunciation_may_be_left_out():
-    who = speaker()
-    for said in (("a", "b"), ("a", PAUSE, "b"), ("c", PAUSE, "d"), ("c", "d")):
-        features, _ = who.say(np.random.default_rng(3), (SILENCE, *said, SILENCE))
-        found = choose(known_hmm(who), features, [[("a", PAUSE, "b"), ("c", PAUSE, "d")]])
-        assert [item.units for item in found] == [(SILENCE,), said, (SILENCE,)]
-        assert found[1][:2] == (0, int(said[0] == "c"))
 
 
 def test_pronunciations_without_number_are_refused_before_a_network_is_built():

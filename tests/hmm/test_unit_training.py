@@ -47,13 +47,6 @@ def test_pauses_are_found_where_they_were_made(trained):
     assert [synthetic.chosen_units(hmm, utterance.features, utterance.words) for utterance in transcribed] == said
 
 
-def test_pauses_are_found_in_noise():
-    """A pause has the density of silence before any is chosen; otherwise a unit beside it learns both sounds."""
-    transcribed, said, _ = synthetic.recordings(0, 20, synthetic.speaker(0, spread=0.8), pauses=True)
-    hmm = unit_training.train_hmm(transcribed, synthetic.INVENTORY, CONFIG, silent_monitor)
-    assert [synthetic.chosen_units(hmm, utterance.features, utterance.words) for utterance in transcribed] == said
-
-
 def test_new_sentences_are_recognised(trained):
     hmm, who, _, said, *_ = trained
     seen = {pair for units in said for pair in pairwise(units)}
@@ -63,39 +56,6 @@ def test_new_sentences_are_recognised(trained):
         found, bounds = synthetic.decode(hmm, features, (synthetic.SILENCE, *synthetic.UNITS))
         assert found == units, f"{set(pairwise(units)) - seen} were never seen in training"
         assert bounds == pytest.approx(edges, abs=2)
-
-
-def test_the_pronunciation_said_is_learned():
-    """Half of the time a word is not pronounced as the first variant of the lexicon."""
-    who, draw = synthetic.speaker(5), np.random.default_rng(5)
-    variants = (("a", "b"), ("c", "b"))
-    transcribed, said = [], []
-    for number, words in enumerate(synthetic.sentences(5, 30)):
-        said.append(synthetic.within_silence([variants[number % 2], *words]))
-        features, _ = who.say(draw, said[-1])
-        transcribed.append(unit_training.TranscribedUtterance(features, (variants, *((word,) for word in words))))
-    hmm = unit_training.train_hmm(transcribed, synthetic.INVENTORY, CONFIG, silent_monitor)
-    assert [synthetic.chosen_units(hmm, utterance.features, utterance.words) for utterance in transcribed] == said
-
-
-def test_clicks_in_the_silence_behind_the_last_word_do_not_become_part_of_it():
-    """One word always comes last: only its sound distinguishes it from the silence that always follows it."""
-    who, draw = synthetic.speaker(6), np.random.default_rng(6)
-    transcribed, said, edges = [], [], []
-    for number, sentence in enumerate(synthetic.sentences(6, 30, words=3)):
-        words = [tuple("a" if unit == "e" else unit for unit in word) for word in sentence]
-        words.append(("b", "c") if number % 2 else ("e",))
-        said.append(synthetic.within_silence(words))
-        features, where = who.say(draw, said[-1])
-        room = np.repeat(who.means[synthetic.SILENCE][:1], 60, axis=0) + draw.normal(0, who.spread, (60, 4))
-        for click in draw.integers(5, 55, size=3):
-            room[click : click + 2] = draw.normal([3.0, 0, 0, 0], 2, (2, 4))
-        sound = np.r_[features, room].astype(np.float32)
-        transcribed.append(unit_training.TranscribedUtterance(sound, tuple((word,) for word in words)))
-        edges.append([*where[:-1], where[-1] + 60])
-    hmm = unit_training.train_hmm(transcribed, synthetic.INVENTORY, CONFIG, silent_monitor)
-    for utterance, units, where in zip(transcribed, said, edges, strict=True):
-        assert np.abs(synthetic.align(hmm, utterance.features, units) - where).max() <= 3
 
 
 def test_the_bigram_is_that_of_what_was_said_pauses_being_silence(trained):

@@ -5,15 +5,15 @@ import numpy as np
 from lipmotion.kernels.network import ForwardBackwardNetwork
 
 
-def network_posteriors(log_emission, emission, arc_from, arc_log, arc_start, log_initial, log_final):
+def network_posteriors(log_emission, emission, arc_from, arc_log, arc_start, log_initial, **_):
     """Return posteriors [shape=(T, S)], expected arc counts [shape=(E,)] and log likelihood of one recording.
 
     log_emission : [shape=(T, G)];  the rest as in ``lipmotion.kernels.paths.NetworkArrays``
     """
-    network = ForwardBackwardNetwork.of(arc_from, arc_log, arc_start, log_initial, log_final)
+    network = ForwardBackwardNetwork.of(arc_from, arc_start)
     order, place = network.layout.order, network.layout.place
-    found = network.posteriors([log_emission], [emission[order]], np.array([len(log_emission)]))
-    return found.posterior[:, place], found.counts, float(found.log_likelihood[0])
+    found = network.posteriors(arc_log, log_initial, [log_emission], [emission[order]])
+    return found.posterior[:, place], found.counts, found.log_likelihood
 
 
 def arrays_of(arcs: dict, states: int) -> dict:

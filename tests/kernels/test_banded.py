@@ -68,9 +68,3 @@ def test_the_compiled_form_gives_the_same_bits(frames, channels, monkeypatch):
     pins = {(frames // 2, 0): 0.5, (frames - 1, channels - 1): -1.0}
     plain, fast = forms(monkeypatch, lambda: solve_mlpg(mean, precision, pins))
     assert np.array_equal(plain, fast)
-
-
-@pytest.mark.parametrize("shape", [(0, 1), (0, 3), (5, 0)])
-def test_solutions_have_the_shape_of_the_system_where_there_is_nothing_in_it(shape):
-    values, variance = solve(tuple(np.ones(shape) for _ in range(4)))
-    assert values.shape == variance.shape == shape

@@ -12,7 +12,7 @@ from children import environment, run_child
 from kernels.conftest import load_numba
 from kernels.networks import network_posteriors, phone_loop
 from lipmotion.kernels import banded, compiler, factorial, factorial_loops, forward_backward
-from lipmotion.kernels.compiler import limit_threads, list_blas_kernels
+from lipmotion.kernels.compiler import limit_threads
 from lipmotion_faces.kernels import affine, painting, raster, shading
 from lipmotion_faces.kernels.textured import CLEAR, SOLID, TexturedTriangles, draw_textured
 
@@ -169,16 +169,6 @@ def test_a_damaged_cache_is_written_again(tmp_path: Path, monkeypatch: pytest.Mo
             assert after.kernel.stats.cache_hits, "it is whole again"
 
 
-@pytest.mark.long
-def test_a_cache_that_takes_nothing_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    kernel = keep_in(tmp_path, monkeypatch)
-    for folder in tmp_path.iterdir():  # it has become a file
-        folder.rmdir()
-        folder.touch()
-    assert kernel(1.0, 2.0) == 3.0
-    assert kernel.kernel.stats.cache_misses
-
-
 def threads() -> set[int]:
     return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
 
@@ -223,8 +213,3 @@ def test_blocks_that_overlap_in_threads_of_python_leave_nothing_behind():
         for job in [pool.submit(first), pool.submit(second)]:
             job.result()
     assert threads() == {2}
-
-
-def test_kernels_are_named():
-    assert list_blas_kernels() == list_blas_kernels() == sorted(list_blas_kernels())
-    assert all(len(name.split()) >= 3 for name in list_blas_kernels())

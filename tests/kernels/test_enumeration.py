@@ -100,6 +100,15 @@ def chain(draw, frames, states, spread, extreme):
     return log_emission, stay, move
 
 
+def test_two_loops_without_a_path_have_probability_0():
+    draw = np.random.default_rng(7)
+    audio, visual, logs = factorial_model(draw, 5, 30.0, False)
+    logs.visual[3] = logs.pair[3] = -np.inf
+    found = factorial.infer_factorial(audio, visual, logs)
+    assert found.log_likelihood == find_factorial_path(audio, visual, logs)[2] == -np.inf
+    assert not any(part.any() for part in (*found[:2], *found.audio_counts, *found.visual_counts))
+
+
 SPREADS = (30.0, 100.0, 300.0, 1e3, 1e4, 1e5)
 
 
@@ -119,21 +128,22 @@ def of_network(draw, spread, extreme, kind=np.float64, chains_of=1, block=False)
     frames = int(draw.integers(1, 4 if block else 6))
     states = 16 if block else int(draw.integers(1, 5))
     arrays, arcs = network_with_block(draw, extreme) if block else network(draw, states, extreme)
-    prepared = ForwardBackwardNetwork.of(**arrays)
+    prepared = ForwardBackwardNetwork.of(arrays["arc_from"], arrays["arc_start"])
     sizes = draw.integers(1, 17 if block else 4, chains_of)
     logs = [log_densities(draw, frames, size, spread).astype(kind) for size in sizes]
     columns = [draw.integers(size, size=states) for size in sizes]
     order, place = prepared.layout.order, prepared.layout.place
-    found = prepared.posteriors(logs, [column[order] for column in columns], np.array([frames]))
+    starts = arrays["arc_log"], arrays["log_initial"]
+    found = prepared.posteriors(*starts, logs, [column[order] for column in columns])
     joint = sum(log.astype(np.longdouble)[:, column] for log, column in zip(logs, columns, strict=True))
-    ends = arrays["log_initial"], arrays["log_final"]
+    ends = arrays["log_initial"], np.zeros(states)
     posterior, counts, log_likelihood = paths.posteriors(joint, np.arange(states), arcs, *ends)
     ordered = [counts[arc] for arc in sorted(arcs, key=lambda arc: arc[1])]
     single = kind is np.float32
     return (
         near(found.posterior[:, place], posterior, spread, single)
         and near(found.counts, ordered, spread, single, frames)
-        and near(found.log_likelihood[0], log_likelihood, spread, single)
+        and near(found.log_likelihood, log_likelihood, spread, single)
     )
 
 

@@ -7,7 +7,7 @@ from lipmotion_faces.kernels import affine, painting
 from oracles import drawing
 
 WITHOUT_NUMBA = SimpleNamespace(
-    paint_band=drawing.paint_band, warp=painting.warp_arrays, stack=painting.stack_arrays,
+    paint_band=painting.paint_band, warp=painting.warp_arrays, stack=painting.stack_arrays,
     warp_bytes=lambda source, *rest: painting.warp_packed_arrays(source.view(np.uint64)[..., 0], *rest),
 )  # fmt: skip
 
@@ -102,19 +102,3 @@ def test_every_blended_pixel_is_that_of_the_definition(seed):
     assert np.abs(result[2:12, 3:11] - wanted).max() <= 0.501
     result[2:12, 3:11] = frame[2:12, 3:11]
     assert (result == frame).all()
-
-
-def test_any_layout_of_the_arrays_is_accepted():
-    picture, frame = noise((20, 20, 3)), noise((30, 40, 3), 1)
-    picture.flags.writeable = False
-    plain = affine.resample(picture[None], TURNED, (12, 12))
-    flipped = affine.resample(picture[None, ::-1].copy()[:, ::-1], TURNED, (12, 12))
-    assert (plain == flipped).all()
-    assert affine.resample(picture[None].astype(float), TURNED, (12, 12)) == pytest.approx(plain, abs=1e-3)
-    weight = np.ones((20, 20))
-    wide = np.zeros((30, 80, 3), np.uint8)
-    wide[:, ::2] = frame
-    affine.blend(wide[:, ::2], (0, 0), (30, 40), picture, weight, TURNED)
-    affine.blend(frame, (0, 0), (30, 40), picture, weight, TURNED)
-    assert (wide[:, ::2] == frame).all()
-    assert not wide[:, 1::2].any()

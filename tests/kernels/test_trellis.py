@@ -1,5 +1,3 @@
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -67,15 +65,6 @@ def test_no_division_is_cheaper(frames: int, labels: int, hold: int, change: flo
     assert paths.is_division(found, frames, hold)
     _, least = paths.best_division(cost, hold, change)
     assert paths.division_cost(found, cost, change) == pytest.approx(least, abs=1e-9)
-
-
-@settings(max_examples=25)
-@given(st.integers(1, 60), st.integers(1, 5), st.integers(0, 2**32 - 1))
-def test_ties_neither_split_nor_shorten(frames: int, hold: int, seed: int) -> None:
-    cost = np.random.default_rng(seed).integers(0, 2, (frames, 3)).astype(float)
-    found = find_segments(cost, hold, 0.0)
-    assert all(before[1] != after[1] for before, after in pairwise(found))
-    assert paths.is_division(found, frames, hold)
 
 
 def test_without_a_hold_it_is_the_cheapest_of_every_frame_and_a_dear_change_leaves_one_segment() -> None:

@@ -167,17 +167,13 @@ def test_hours_need_no_more_memory_than_minutes(sound: np.ndarray) -> None:
     stream, sizes = Stream(), []
     line = np.concatenate([sound, np.zeros(80_000, np.float32)])
     tracemalloc.start()
-    try:
-        for number in range(8):
-            stream.add_words([("welcome", stream.begins_s + 0.3, stream.begins_s + 0.8)])
-            for first in range(0, len(line), 640):
-                stream.push(line[first : first + 640])
-            stream.flush()
-            if number > 1:
-                gc.collect()
-                sizes.append(tracemalloc.get_traced_memory()[0])
-    finally:
-        tracemalloc.stop()
+    for number in range(8):
+        stream.add_words([("welcome", stream.begins_s + 0.3, stream.begins_s + 0.8)])
+        all_of(stream, line, [640])
+        if number > 1:
+            gc.collect()
+            sizes.append(tracemalloc.get_traced_memory()[0])
+    tracemalloc.stop()
     assert max(sizes[3:]) - max(sizes[:3]) < 7_500  # of 32 s of sound, 1,600 frames
 
 

@@ -1,8 +1,6 @@
 import numpy as np
 import picture_measures  # type: ignore[import-not-found]
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter
 
 from lipmotion.errors import InputError
@@ -28,11 +26,22 @@ def rectangle(margin: int = 16):
     return region
 
 
-def test_each_frame_has_its_own_psnr():
+def test_figures_by_hand():
     true = blobs(0).astype(float)
     made = true + np.array([1, 2, 4, 8])[:, None, None, None]
     assert picture_measures.psnr_db(made, true) == pytest.approx(20 * np.log10(255 / np.array([1, 2, 4, 8])))
-    assert picture_measures.psnr_db(blobs(0), blobs(0)) == pytest.approx([100] * 4)
+    assert picture_measures.sharpness(ramp(3.0)) == pytest.approx([9] * 4)
+    halves = np.zeros((3, HEIGHT, WIDTH, 3))
+    halves[:, :, WIDTH // 2 :] = (60, 90, 120)
+    assert picture_measures.contrast(halves) == pytest.approx([45] * 3)
+    for colour, edges in (((1, 1, 1), 0), ((1, 0, 0), 9 / 2), ((0, 1, 0), 9)):
+        assert picture_measures.colour_edges(ramp(3.0) * colour) == pytest.approx([edges] * 4)
+    light = np.array([0, 2, 0, 2, 0, 2])[:, None, None, None]
+    assert picture_measures.flicker(ramp(1, 6) + light) == pytest.approx([4] * 4)
+    figures = picture_measures.picture_figures(true, true)
+    assert (figures.pop("psnr_db"), *figures.values()) == pytest.approx((100, *[1] * 5))
+    with pytest.raises(InputError, match="required"):
+        picture_measures.psnr_db(made, true[:, 1:])
 
 
 def test_similarity_is_that_of_scikit_image():
@@ -44,48 +53,6 @@ def test_similarity_is_that_of_scikit_image():
     assert picture_measures.structural_similarity(made, true) == pytest.approx(wanted, abs=1e-5)
 
 
-@given(light=st.integers(1, 255), other=st.integers(1, 255))
-@settings(max_examples=20)
-def test_similarity_of_flat_pictures_is_that_of_their_light(light, other):
-    made, true = (np.full((1, 20, 20, 3), level, np.uint8) for level in (light, other))
-    stable = (0.01 * 255) ** 2
-    expected = (2 * light * other + stable) / (light**2 + other**2 + stable)
-    assert picture_measures.structural_similarity(made, true) == pytest.approx([expected], abs=1e-3)
-
-
-def test_a_blurred_picture_is_less_similar_and_less_sharp():
-    true = blobs(3, spread=1.0)
-    made = gaussian_filter(true.astype(float), (0, 1, 1, 0))
-    assert (picture_measures.structural_similarity(made, true) < 0.9).all()
-    assert (picture_measures.sharpness(made) < 0.5 * picture_measures.sharpness(true)).all()
-    assert picture_measures.picture_figures(made, true)["sharpness"] == pytest.approx(
-        picture_measures.sharpness(made).mean() / picture_measures.sharpness(true).mean()
-    )
-
-
-def test_sharpness_of_a_ramp_is_the_square_of_its_slope():
-    assert picture_measures.sharpness(ramp(3.0)) == pytest.approx([9] * 4)
-    assert picture_measures.sharpness(ramp(3.0).swapaxes(1, 2)) == pytest.approx([9] * 4)
-
-
-def test_contrast_is_the_deviation_of_the_brightness():
-    halves = np.zeros((3, HEIGHT, WIDTH, 3))
-    halves[:, :, WIDTH // 2 :] = (60, 90, 120)
-    assert picture_measures.contrast(halves) == pytest.approx([45] * 3)
-    assert picture_measures.contrast(halves[:, :, ::-1] + 50) == pytest.approx([45] * 3)
-    assert picture_measures.picture_figures(halves / 2, halves)["contrast"] == pytest.approx(0.5)
-
-
-def test_grey_pictures_have_no_colour_edges_and_red_ones_half():
-    for colour, edges in (((1, 1, 1), 0), ((1, 0, 0), 9 / 2), ((0, 1, 0), 9)):
-        assert picture_measures.colour_edges(ramp(3.0) * colour) == pytest.approx([edges] * 4)
-
-
-def test_flicker_of_even_and_of_alternating_light():
-    for slope, light, wanted in ((0, 5.0 * np.arange(6), 0), (1, np.array([0, 2, 0, 2, 0, 2]), 4)):
-        assert picture_measures.flicker(ramp(slope, 6) + light[:, None, None, None]) == pytest.approx([wanted] * 4)
-
-
 def test_a_step_at_the_outline_is_a_seam():
     region = rectangle()
     made = ramp(2.0) + 20.0 * region[None, ..., None]
@@ -95,17 +62,6 @@ def test_a_step_at_the_outline_is_a_seam():
     assert slopes.outside == pytest.approx(smooth.outside)
     ratio = float((slopes.at / smooth.at).mean())
     assert picture_measures.outline_figures(made, ramp(2.0), region)["seam_ratio"] == pytest.approx(ratio)
-
-
-def test_a_step_of_a_vertical_edge_has_half_its_height_on_two_pixels():
-    region = np.zeros((HEIGHT, WIDTH), bool)
-    region[:, WIDTH // 2 :] = True
-    slopes = picture_measures.outline_slopes(
-        np.where(region[None, ..., None], 130.0, 100.0) * np.ones((2, 1, 1, 3)), region
-    )
-    assert slopes.at == pytest.approx([15, 15])
-    assert slopes.inside == pytest.approx([0, 0], abs=1e-9)
-    assert np.isnan(slopes.seam)
 
 
 def test_beside_an_outline_a_redder_patch_has_an_offset_and_one_that_reddens_a_drift():
@@ -124,31 +80,3 @@ def test_beside_an_outline_a_redder_patch_has_an_offset_and_one_that_reddens_a_d
     ):
         found = picture_measures.colour_change(made, true, inside, outside)
         assert (found.offset, found.drift) == pytest.approx((offset, drift), abs=1e-4)
-
-
-def test_equal_pictures_have_the_best_figures():
-    true = blobs(7)
-    figures = picture_measures.picture_figures(true, true)
-    assert figures.pop("psnr_db") == pytest.approx(100)
-    assert list(figures) == ["ssim", "sharpness", "contrast", "colour_edges", "flicker"]
-    assert list(figures.values()) == pytest.approx([1] * 5)
-
-
-def test_what_cannot_be_measured_is_refused():
-    for wrong, message in (
-        (lambda p: picture_measures.psnr_db(p, p[:, 1:]), "required"),
-        (lambda p: picture_measures.structural_similarity(p[..., :2], p[..., :2]), "three colours"),
-        (lambda p: picture_measures.sharpness(p[0]), "required"),
-        (lambda p: picture_measures.sharpness(p[:0]), "at least one"),
-        (lambda p: picture_measures.flicker(p[:2]), "at least 3"),
-        (lambda p: picture_measures.outline_figures(p, p[1:], rectangle()), "required"),
-        (lambda p: picture_measures.outline_slopes(p, np.ones((HEIGHT, WIDTH), bool)), "inside and outside"),
-        (lambda p: picture_measures.outline_slopes(p, rectangle()[1:]), "of shape"),
-        (lambda p: picture_measures.outline_slopes(p, rectangle(27)), "on either side"),
-        (
-            lambda p: picture_measures.colour_change(p, p, rectangle(), np.zeros((HEIGHT, WIDTH), bool)),
-            "at least one pixel",
-        ),
-    ):
-        with pytest.raises(InputError, match=message):
-            wrong(blobs(0))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from lipmotion import errors, types
+from lipmotion import errors
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, build_mouth
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.meshes.fitting import blendshape_motion, shape_weights
@@ -206,17 +206,6 @@ def test_named_points_are_checked():
             lip_placement.place_lips_by_points(mesh, build_surface(mesh), named)
 
 
-def test_of_a_dense_mesh_some_vertices_are_compared(monkeypatch):
-    mesh = head()
-    surface = build_surface(mesh)
-    whole = lip_placement.place_lips_by_shape(mesh, surface)
-    monkeypatch.setattr(lip_placement, "MAX_PAIRS", 1500)
-    thinned = lip_placement.place_lips_by_shape(mesh, surface)
-    assert (thinned.vertices != whole.vertices).any()
-    assert _offsets(mesh, thinned) < 2 * GRID
-    assert thinned.scale == pytest.approx(whole.scale, rel=0.2)
-
-
 def _shapes_of(mesh):
     return character_files.find_face_shapes(mesh, lip_placement.place_lips_by_shape(mesh, build_surface(mesh)))
 
@@ -275,19 +264,6 @@ def test_the_jaw_stays_open_behind_lips_that_are_pressed_in_p_as_captures_press_
     assert 0.35 < weights["mouthPressLeft"][95] < 0.66
 
 
-def test_known_weights_come_back():
-    shapes = _shapes_of(head())
-    known = np.zeros((60, len(shapes.names)))
-    wave = np.clip(np.sin(np.arange(60) / 9), 0, 1)
-    known[:, shapes.row("jawOpen")] = 0.4 * wave
-    known[:, shapes.row("mouthPucker")] = 0.5 * wave[::-1]
-    placed = np.einsum("ts,spc->tpc", known, shapes.moved)
-    found = shape_weights.solve_shape_weights(_of(placed, known @ shapes.gap), types.Timeline(()), shapes, _EXACT)
-    found = types.Motion(found.values[30:], 100.0, found.channels)  # before: the rest pose
-    assert np.abs(found["jawOpen"] - known[:, shapes.row("jawOpen")]).max() < 0.08
-    assert np.abs(found["mouthPucker"] - known[:, shapes.row("mouthPucker")]).max() < 0.12
-
-
 def test_visemes_are_used_where_there_is_no_jaw_shape():
     shapes = _shapes_of(renamed(VISEMES))
     assert shapes.style == "visemes"
@@ -296,20 +272,6 @@ def test_visemes_are_used_where_there_is_no_jaw_shape():
     assert found["viseme_aa"][:40].max() < 0.02
     assert found["viseme_U"][115] > found["viseme_U"][75]
     assert (found.values @ shapes.gap)[[55, 95]].max() < 1e-6
-
-
-_EXACT = CurveCosts(ridge=1e-7, smooth=0.0)
-
-
-def _of(displacements, gap):
-    """Motion whose points are displaced so."""
-    template = build_mouth()
-    places = template.places + displacements
-    places = np.concatenate([np.tile(template.places, (30, 1, 1)), places])
-    channels = [types.Channel(f"{axis}_{point}") for point in template.points for axis in "xyz"]
-    opening = np.concatenate([np.zeros(30), np.maximum(gap, 0)])[:, None]
-    values = np.concatenate([opening, opening, places.reshape(len(places), -1)], axis=1)
-    return types.Motion(values, 100.0, (types.Channel("opening"), types.Channel("lip_gap"), *channels))
 
 
 def test_each_frame_is_the_bounded_least_squares_solution():

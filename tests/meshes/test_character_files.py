@@ -6,8 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzz.floods import CHARACTER_FLOODS
-from fuzz.inputs import lay_out
 from lipmotion import errors, types
 from lipmotion_faces.characters import character_files, file_limits, gltf_writer
 from meshes.gltf import document, glb
@@ -98,30 +96,6 @@ def test_names_that_no_file_has_are_as_missing_ones(tmp_path):
         (tmp_path / "look.mtl").write_text(f"newmtl skin\nmap_Kd {name}\nmap_Kd\n", encoding="utf-8")
         with pytest.warns(UserWarning, match="not in the same folder"):
             assert character_files.read_obj(_obj(tmp_path, QUAD)).parts[0].material.texture is None
-
-
-REFUSED = {
-    "matrices without bytes": "12000000 joints", "3,000 nodes with one mesh": "2001 parts",
-    "factors that are multiplied": r"node 2 is beyond ±1e\+09", "lists of lists": "values in a document",
-    "too many vertices without bytes": "1000000000 vertices", "too many compressed zeros": "compressed bytes",
-    "compressed zeros": "compressed data is damaged",
-}  # fmt: skip
-READ = ("cycles outside of the scene", "9,000 binds")
-
-
-def laid_out(name: str, folder: Path) -> Path:
-    folder.mkdir()
-    lay_out(CHARACTER_FLOODS[name](), folder)
-    return next(folder.glob("head.[go]*"))
-
-
-@pytest.mark.long
-def test_expensive_characters_are_refused_with_what_is_too_much(tmp_path: Path) -> None:
-    for number, (name, message) in enumerate(REFUSED.items()):
-        with pytest.raises(errors.InputError, match=message):
-            character_files.read_character(laid_out(name, tmp_path / str(number)))
-    for name in READ:  # what is not in the scene costs nothing
-        assert len(character_files.read_character(laid_out(name, tmp_path / name)).triangles) == 2
 
 
 def test_a_budget_is_that_of_all_files_together(tmp_path: Path) -> None:

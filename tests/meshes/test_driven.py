@@ -11,7 +11,7 @@ from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import find_mouth
 from lipmotion.errors import InputError
-from lipmotion.meshes.fitting import blendshape_motion, driven, eyes_and_brows, shape_weights
+from lipmotion.meshes.fitting import blendshape_motion, eyes_and_brows, shape_weights
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, with_mouth
 from lipmotion.meshes.model import face_shapes, rig_tables, shape_names
 from lipmotion.meshes.model.mesh import ANGLES, HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE, Bone
@@ -20,7 +20,7 @@ from lipmotion.types.delivery import parse_moods
 from lipmotion.types.motion import RADIAN
 from lipmotion.units import PHONES
 from lipmotion_faces.base import stage_liveliness
-from lipmotion_faces.characters import binding, character_files, gltf_scene, lip_placement, surface
+from lipmotion_faces.characters import binding, character_files, gltf_scene
 from lipmotion_faces.characters.character_files import JAW_OPEN, load_character, with_jaw
 from lipmotion_faces.characters.gltf_document import find_bone_kind
 from lipmotion_faces.characters.gltf_scene import merge_bones
@@ -117,15 +117,6 @@ def test_whole_expressions_stand_for_moods_where_there_are_no_finer_shapes(tmp_p
     assert surprised[[55, 95]] == pytest.approx(0, abs=0.01)  # m, p
     plain, happy = (next(character.vertices(of, units(), TIME_S)) for of in (motion(), moved))
     assert np.abs(happy - plain).max() > 0.01
-
-
-def test_control_points_raise_the_corners_in_a_smile(files):
-    character = load_character(files / "head.obj", points=files / "points.csv")
-    placement = character.placement
-    corner = placement.vertices[placement.row(61)]
-    happy, plain = (with_moods(motion(), parse_moods(mood)) for mood in ("happy", ""))
-    happy, plain = (next(character.vertices(of, units(), TIME_S)) for of in (happy, plain))
-    assert happy[corner, 1] > plain[corner, 1] + 0.05 * placement.scale
 
 
 COLUMNS = "control,source,gain,offset\n"
@@ -324,18 +315,6 @@ def test_weights_that_are_given_are_taken_and_other_motion_stays_as_it_is() -> N
     assert found["jawOpen"].tolist() == [0.0, 0.6]
     assert found["mouthPucker"].tolist() == pytest.approx([0.4, 0.0])
     assert blendshape_motion.is_of_blendshapes(facegood)
-
-
-def test_a_mesh_shows_the_weights_that_are_given() -> None:
-    mesh = head()
-    placement = lip_placement.place_lips_by_shape(mesh, surface.build_surface(mesh))
-    character = driven.DrivenCharacter(mesh, placement, character_files.find_face_shapes(mesh, placement), None)
-    assert character.shapes is not None
-    moved = with_mouth(weights(jawOpen=[0.0, 0.25, 0.5], mouthClose=[0.0] * 3))
-    rest, half, whole = character.vertices(moved, Timeline(()), np.arange(3) / 100)
-    (jaw,) = (shape for shape in mesh.shapes if shape.name == "jawOpen")
-    assert (whole - rest)[jaw.rows] == pytest.approx(0.5 * jaw.displacements, abs=1e-9)
-    assert (half - rest)[jaw.rows] == pytest.approx(0.25 * jaw.displacements, abs=1e-9)
 
 
 TALK_S = np.arange(60) / 30

@@ -54,13 +54,6 @@ def test_the_height_of_the_picture_is_as_stated_and_nearer_things_are_larger():
         Camera(100, 100, distance=0.0)
 
 
-def test_normals_of_a_ball_point_outwards():
-    mesh = ball()
-    inner = np.abs(mesh.vertices[:, 1]) < 0.45
-    outward = mesh.vertices[inner] / np.linalg.norm(mesh.vertices[inner], axis=1, keepdims=True)
-    assert np.einsum("ij,ij->i", compute_normals(mesh.vertices, mesh.triangles)[inner], outward).min() > 0.99
-
-
 def test_a_mesh_is_seen_in_its_colour_at_its_place():
     picture = picture_of(ball(), Camera(100, 100, across=2.0)).astype(int)
     red, green, blue = picture[50, 50]
@@ -91,14 +84,6 @@ def test_drawing_the_moving_part_alone_gives_the_whole_picture():
     part = canvas.draw(both, light, triangles, onto=base, moving=slice(len(still), None))
     assert np.array_equal(part, canvas.draw(both, light, triangles))
     assert not np.array_equal(part, base)
-
-
-def test_marked_vertices_are_found_where_they_can_be_seen():
-    mesh, canvas = ball(), Canvas(Camera(100, 100, across=2.0))
-    seen = canvas.cover(mesh.vertices, mesh.vertices[:, 0] > 0, mesh.triangles) > 127
-    assert seen[50, 60]
-    assert not seen[50, 40]
-    assert seen.sum() == pytest.approx(0.5 * np.pi * 25**2, rel=0.1)
 
 
 def test_a_floor_under_a_roof_gets_less_light_than_the_floor_beside_it():

@@ -17,11 +17,6 @@ def states_of(units: Timeline[Unit], phone: str, states: int = 5, edge_s: float 
     return [label.state for label in labels if label.unit == phone]
 
 
-def test_beyond_the_ends_lies_silence():
-    found = list(frame_labels.with_neighbours(said((0, 0.1, "p"), (0.1, 0.2, "aa"))))
-    assert [(left, span.label.phone, right) for left, span, right in found] == [("sil", "p", "aa"), ("p", "aa", "sil")]
-
-
 @pytest.mark.parametrize(
     ("end_s", "given", "wanted"),
     [
@@ -73,6 +68,7 @@ def test_silence_rests_away_from_speech_only():
 
 def test_frames_belong_to_the_unit_that_has_begun_and_rest_outside_of_all():
     states = frame_labels.label_full_context(said((0.1, 0.2, "aa"), (0.3, 0.4, "t")), 60, LAYOUT)
+    assert [states[frame].context for frame in (15, 35)] == [("sil", "aa", "t"), ("aa", "t", "sil")]
     assert [frame for frame in range(60) if states[frame] != REST] == [*range(10, 20), *range(30, 40)]
     states = frame_labels.label_full_context(said((0.0, 0.105, "aa"), (0.105, 0.2, "t")), 20, LAYOUT)
     assert [state.unit for state in states] == ["aa"] * 11 + ["t"] * 9
@@ -87,14 +83,6 @@ def test_it_is_farther_than_the_margin_from_every_interval(edges: list[int], mar
     for start, end in speech:
         wanted &= (times < start - margin) | (times > end + margin)
     assert frame_labels.is_away_from_speech(times, speech, float(margin)).tolist() == wanted.tolist()
-
-
-def test_intervals_are_those_of_phones() -> None:
-    speech_s = frame_labels.list_speech_intervals(timeline(("t", "aa")))
-    assert speech_s == [(0.6, 0.7), (0.7, 0.8)]
-    away = frame_labels.is_away_from_speech(np.array([0.0, 0.2, 0.45, 0.65, 1.0, 1.2]), speech_s, 0.3)
-    assert away.tolist() == [True, True, False, False, False, True]
-    assert frame_labels.is_away_from_speech(np.arange(3.0), [], 1.0).all()
 
 
 def test_the_mouth_rests_in_digital_silence_of_some_length() -> None:

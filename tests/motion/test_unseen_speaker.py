@@ -151,15 +151,6 @@ def test_doubtful_closures_are_confirmed_by_the_sound() -> None:
     assert UnseenSpeaker(prior, units, 100, 0.2, 0.0).confirm_closures(ranges, heard) == ranges[:1]
 
 
-def test_jaw_and_lips_go_with_the_opening(welcome: Speech) -> None:
-    slopes = []
-    for voice in (1.0, 0.0):
-        motion = generated(replace(welcome, voice=voice, confidence=1.0)).motion
-        distances = -motion["y_152"], motion["y_13"] - motion["y_14"]
-        slopes.append([np.polyfit(motion["opening"], apart, 1)[0] for apart in distances])
-    np.testing.assert_allclose(slopes[1], slopes[0], rtol=0.15)
-
-
 def test_pins_are_in_delivered_units(welcome: Speech) -> None:
     pinned = generated(replace(welcome, voice=0.0), Pin(1.0, "opening", 0.31), Pin(1.4, "width", 0.52))
     assert pinned.motion["opening"][100] == pytest.approx(0.31, abs=1e-12)
@@ -186,10 +177,6 @@ def test_lips_close_within_the_phones_of_unknown_voices() -> None:
         span = timeline(("b",), duration_s)[1]
         (frames,) = find_closable_ranges(timeline(("b",), duration_s), 200, reach_s=-articulation.INSET_S)
         assert span.start_s - 1e-9 <= frames.start / 100 <= (frames.stop - 1) / 100 <= span.end_s + 1e-9
-
-
-def test_a_voice_is_known_as_well_with_its_phones_given(welcome: Speech) -> None:
-    assert analyse(load_model(), Request(WELCOME, units=welcome.units)).voice == pytest.approx(welcome.voice)
 
 
 @pytest.mark.long
@@ -222,9 +209,7 @@ def prior() -> articulation.ArticulationPrior:
     """The table in the range of the synthetic speaker."""
     some = examples()
     space, values = fit_reduced_motion(some, 3)
-    found = articulation.fit_articulation_prior(space, values, some)
-    assert found is not None
-    return found
+    return articulation.fit_articulation_prior(space, values, some)  # type: ignore[return-value]
 
 
 def test_the_table_is_in_the_speakers_own_range(prior: articulation.ArticulationPrior) -> None:
@@ -279,13 +264,6 @@ def test_contexts_are_counted_with_pauses_as_silence() -> None:
     first, *spoken, last = units
     first, last = (replace(span, label=replace(span.label, phone="sp")) for span in (first, last))
     assert articulation.count_contexts([units, Timeline((first, *spoken, last))])["sil", "t", "aa"] == 2
-
-
-def test_it_is_the_same_after_serialisation(prior: articulation.ArticulationPrior) -> None:
-    again = articulation.articulation_from_arrays(articulation.articulation_to_arrays(prior), len(prior.centre))
-    assert again.contexts == prior.contexts
-    np.testing.assert_allclose(again.matrix, prior.matrix)
-    assert articulation.articulation_from_arrays({}, 5) is None
 
 
 def test_motion_without_an_opening_has_no_table() -> None:

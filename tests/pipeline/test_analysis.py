@@ -231,22 +231,6 @@ def test_times_decide_where_words_alone_do_not(toy_model, toy_sentence):
     assert starts_s == pytest.approx(true_s, abs=0.06)
 
 
-def test_words_of_an_installed_recogniser_are_aligned(toy_model, toy_sentence, monkeypatch):
-    said = [group_words(toy_sentence), None]
-    place = "lipmotion.pipeline.analysis.speech_analysis.recognise_words"
-    monkeypatch.setattr(place, lambda _, kind: said.pop(0) if kind == "vosk" else None)
-    request = Request(toy_sentence.audio, recogniser="vosk")
-    found = analyse(toy_model, request)
-    words = tuple(span.label.word for span in found.units if span.label.word)
-    assert tuple(word for word, _ in groupby(words)) == toy_sentence.words
-    assert found.units_known
-    nothing = analyse(toy_model, request)  # no words: phones are recognised
-    assert not nothing.units_known
-    known = analyse(toy_model, replace(request, transcript=" ".join(toy_sentence.words)))
-    assert known.units == found.units
-    assert not said
-
-
 def test_a_transcript_beside_a_request_is_taken_if_there_is_no_other(toy_model, toy_sentence, tmp_path):
     assert as_request(Request("a.wav"), "papa").transcript == "papa"
     assert as_request("a.wav", "papa").transcript == "papa"

@@ -143,7 +143,7 @@ def test_channels_that_all_have_are_trained_on(two_people, tmp_path, caplog):
         model, report = train(corpus, recogniser=SMALL)
     assert "training on the 2 channels that all have (width, opening); left out: jaw, outer" in caplog.text
     assert len(report.used) == 9
-    assert model.speakers.names == ("anna", "ben", "captured")
+    assert [*model.speakers] == ["anna", "ben", "captured"]
     generated = animate(Request(toy_utterances(3)[0].audio, speaker="captured", recogniser="own"), model=model)
     assert generated.motion.names == ("width", "opening")
     weights = tuple(Channel(name, "weight") for name in ("opening", "jaw"))

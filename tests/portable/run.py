@@ -8,7 +8,6 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import NamedTuple
 
 from children import run_child
 from portable.settings import BEFORE_AVX, CORES, different_cores, environment, kernels, possible_cores
@@ -30,15 +29,6 @@ LEFT_OUT = ["-m", "not long and not video", "-k", "not memory"]
 """Tests that take longer and compute nothing that the others do not."""
 
 
-class Outcome(NamedTuple):
-    """The outcome of the tests under one setting."""
-
-    name: str
-    passed: bool
-    seconds: float
-    last_line: str
-
-
 def settings() -> dict[str, dict[str, str]]:
     """Return the variables of every setting by its name: each kind of kernels, in turn with one thread and with two.
 
@@ -55,15 +45,17 @@ def settings() -> dict[str, dict[str, str]]:
     return found | {"no AVX, in NumPy neither": BEFORE_AVX}
 
 
-def tested(name: str, changes: dict[str, str], tests: Sequence[str]) -> Outcome:
-    """Return the outcome of the tests in a process with changed environment variables."""
+def tested(name: str, changes: dict[str, str], tests: Sequence[str]) -> bool:
+    """Run the tests in a process with changed environment variables, and print how they ended; return if all passed."""
     began = time.monotonic()
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *LEFT_OUT, *tests]
     ran = run_child(command, variables=environment(changes), folder=TESTS.parent, limit_s=LONGEST_S)
     if ran.returncode:
         print(f"--- {name}\n{ran.stdout[-20_000:]}{ran.stderr[-5000:]}", flush=True)
-    lines = [line for line in ran.stdout.splitlines() if line.strip()]
-    return Outcome(name, ran.returncode == 0, time.monotonic() - began, lines[-1] if lines else "")
+    last_line = ran.stdout.rstrip().rpartition("\n")[2]
+    verdict = "FAILED" if ran.returncode else "passed"
+    print(f"{verdict}  {name:<28} {time.monotonic() - began:5.0f} s  {last_line}", flush=True)
+    return not ran.returncode
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -80,11 +72,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if sys.platform == "linux" and options.tests == parser.get_default("tests"):
             jobs.append(pool.submit(tested, "as on Windows", LIKE_WINDOWS, WRITING))
         outcomes = [job.result() for job in jobs]
-    for outcome in outcomes:
-        verdict = "passed" if outcome.passed else "FAILED"
-        print(f"{verdict}  {outcome.name:<28} {outcome.seconds:5.0f} s  {outcome.last_line}")
-    print(f"{sum(o.passed for o in outcomes)} passed, {sum(not o.passed for o in outcomes)} failed")
-    return 0 if all(outcome.passed for outcome in outcomes) else 1
+    print(f"{sum(outcomes)} passed, {len(outcomes) - sum(outcomes)} failed")
+    return 0 if all(outcomes) else 1
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 They are found in this Python, or in the one that LIPMOTION_BPY_PYTHON (Blender as the package ``bpy``) and
 LIPMOTION_PXR_PYTHON (``usd-core``) name; packages of npm in the folder LIPMOTION_NODE_MODULES: ``gltf-validator``,
 ``mmd-parser`` (with which three.js reads MikuMikuDance's files), ``@pixiv/three-vrm-animation`` beside ``three``,
-``@esotericsoftware/spine-core`` of version 4.2, ``@met4citizen/talkinghead`` and ``@pixiv/three-vrm`` beside ``three``.
+``@esotericsoftware/spine-core`` of version 4.2, ``@met4citizen/talkinghead`` beside ``three``.
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ import wave
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -126,3 +127,19 @@ def case(group: str, name: str, code: int, *messages: str) -> Callable[[Make], M
         return make
 
     return keep
+
+
+def _fill(row: dict[str, Any], bench: Bench) -> list[object]:
+    """Write the files of a row; return its command line, with the paths of good inputs in place of their capitals."""
+    known = {"SPEECH": bench.speech, "MODEL": bench.model, "COUPLED": bench.coupled, "PICTURED": bench.pictured}
+    known |= {"CORPUS": bench.corpus, "FACE": bench.face, "FOLDER": bench.folder}
+    for name, text in row.get("files", {}).items():
+        bench.file(name, text)
+    parted = (arg.partition("/") for arg in row["args"])
+    return [known[first] / rest if first in known else first + slash + rest for first, slash, rest in parted]
+
+
+ROWS = json.loads(Path(__file__).with_name("cases.json").read_text(encoding="utf-8"))
+"""The cases of which command line and files are texts."""
+for _row in ROWS:
+    CASES.append(Case(_row["group"], _row["name"], _row["code"], tuple(_row["messages"]), partial(_fill, _row)))

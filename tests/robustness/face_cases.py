@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from robustness.case import Bench, case, npy
-from speech.sounds import tone, write_pictures, write_sound
+from speech.sounds import tone, write_sound
 
 GROUP = "faces"
 
@@ -24,17 +24,8 @@ def _face(
     )
 
 
-case(GROUP, "no such face", 3, "no.face: no such file")(
-    lambda bench: bench.animate(None, "--face", bench.folder / "no.face", output="a.mp4")
-)
-case(GROUP, "an empty face", 3, "the file is empty; give a face")(
-    lambda bench: bench.animate(None, "--face", bench.file("a.face", b""), output="a.mp4")
-)
 case(GROUP, "a model named .face", 6, "not a face; give a file that `lipmotion face build` wrote")(
     lambda bench: ["face", "info", shutil.copy(bench.model, bench.folder / "a.face")]
-)
-case(GROUP, "cut off", 6, "not a face", "give a file that `lipmotion face build` wrote")(
-    lambda bench: ["face", "info", bench.file("a.face", bench.face.read_bytes()[:-1000])]
 )
 
 
@@ -42,41 +33,6 @@ _face("a newer face", 6, ("face version 9, this lipmotion reads version 1; upgra
 _face("without its mouths", 6, ("mouths is missing", "build"), {"appearance/mouths.npy": None})
 _face("a background of zeros", 6, ("damaged",), {"background/data.npy": npy(np.zeros(5000, np.uint8))})
 _face("pickled objects", 6, ("damaged",), {"appearance/light.npy": npy(np.array([{}, {}, {}], object))})
-
-
-@case(GROUP, "a background that only starts", 6, "the stored", "damaged")
-def _(bench: Bench) -> list[object]:
-    data = bench.array("background/data", bench.face)
-    cut = npy(data[: len(data) // 2])
-    return bench.animate(None, "--face", _copy(bench, {"background/data.npy": cut}), output="a.mp4")
-
-
-case(GROUP, "an overlay on a sound", 3, "has no pictures, and an overlay shows them; give a video as speech")(
-    lambda bench: bench.animate(None, "--face", bench.face, "--overlay", "inset", output="a.mp4")
-)
-
-
-@case(GROUP, "an overlay and a background", 3, "give a video as speech, and no background")
-def _(bench: Bench) -> list[object]:
-    video = write_pictures(bench.folder / "b.mp4")
-    return bench.animate(None, "--face", bench.face, "--overlay", "mouth", "--background", video, output="a.mp4")
-
-
-for _name, _more in {
-    "an overlay": ("--overlay", "inset"),
-    "another jaw": ("--jaw", "energy"),
-    "a visible mark": ("--mark", "visible"),
-}.items():
-
-    @case(GROUP, f"{_name} with a drawn face", 3, f"{_name} is for filmed faces; give one: --face FILE.face")
-    def _(bench: Bench, more: tuple[str, ...] = _more) -> list[object]:
-        return bench.animate(None, *more, output="a.mp4")
-
-
-@case(GROUP, "an output in the place of the background", 7, "is the background itself")
-def _(bench: Bench) -> list[object]:
-    video = write_pictures(bench.folder / "b.mp4")
-    return bench.animate(None, "--face", bench.face, "--background", video, output=video)
 
 
 @case(GROUP, "an output in the place of the face", 7, "is the face itself; give another name")
@@ -91,14 +47,3 @@ def _(bench: Bench) -> list[object]:
         (bench.folder / name).mkdir()
         write_sound(bench.folder / name / "a.mkv", tone(16_000), 16_000, "flac", video=True)
     return ["face", "build", bench.folder, "-o", "a.face"]
-
-
-case(GROUP, "a corpus without its recordings", 3, "not of faces; name the folder of its videos as well: --recordings")(
-    lambda bench: ["face", "build", bench.corpus, "-o", "a.face"]
-)
-
-
-@case(GROUP, "a corpus with other recordings", 3, "holds none of the videos of", "give the folder that they are in")
-def _(bench: Bench) -> list[object]:
-    write_pictures(bench.folder / "b.mp4")
-    return ["face", "build", bench.corpus, "--recordings", bench.folder, "-o", "a.face"]

@@ -1,4 +1,3 @@
-import zipfile
 from collections.abc import Callable
 from typing import Any
 
@@ -13,24 +12,9 @@ NO_MODEL = ("not a lipmotion model", "give a file that `lipmotion train` wrote")
 DAMAGED = ("damaged", "train or download")
 
 
-def _file(name: str, content: bytes, *messages: str) -> None:
-    case(GROUP, name, 6, *messages)(lambda bench: bench.animate(None, "--model", bench.file("m.lipmotion", content)))
-
-
-_file("an empty zip", b"PK\5\6" + bytes(18), *NO_MODEL)
 case(GROUP, "cut off", 6, *NO_MODEL)(
     lambda bench: bench.animate(None, "--model", bench.file("m.lipmotion", bench.model.read_bytes()[:-99]))
 )
-
-
-@case(GROUP, "flipped bytes in a member", 6, *DAMAGED)
-def _(bench: Bench) -> list[object]:
-    content = bytearray(bench.model.read_bytes())
-    with zipfile.ZipFile(bench.model) as file:
-        member = file.getinfo("phones/means.npy")
-    place = member.header_offset + 100
-    content[place : place + 8] = bytes(byte ^ 255 for byte in content[place : place + 8])
-    return bench.animate(None, "--model", bench.file("m.lipmotion", bytes(content)))
 
 
 def _header(name: str, *messages: str, **header: object) -> None:
@@ -63,9 +47,6 @@ _changed("a header with a key twice", "header.json", b'{"format": "lipmotion.mod
          "the key 'format' occurs twice")  # fmt: skip
 _changed("without an array of the engine", "engine/variances.npy", None, *DAMAGED)
 _changed("a trillion numbers declared", "phones/means.npy", declared("(1000000000000,)"), *DAMAGED, "in 0 bytes")
-case(GROUP, "a hundred megabytes of zeros", 6, *NO_MODEL, "would grow to", "at most")(
-    lambda bench: bench.animate(None, "--model", bench.changed_model({"phones/means.npy": bytes(2**27)}))
-)
 _changed("pickled objects", "phones/means.npy", npy(np.array([{}], object)), *DAMAGED)
 _changed("a path to elsewhere", "../../elsewhere.npy", npy(np.zeros(3)), *DAMAGED)
 _changed("an array that nothing declares", "engine/more.npy", npy(np.zeros(3)), *DAMAGED, "undeclared 'more'")
@@ -88,5 +69,3 @@ _changed_array("coupled: one state less", "engine/chain_0/advance", lambda a: a[
 _changed_array("coupled: rest times 1000", "engine/rest", lambda a: a * 1000, *DAMAGED, "rest pose of", of="coupled")
 LIPS = ("the eigenlips are damaged", "train the model again")
 _changed_array("eigenlips: a colour less", "eigenlips/basis", lambda a: a[:2], *LIPS, "basis of shape", of="pictured")
-case(GROUP, "a device", 3, "no such model; train one")(lambda bench: bench.animate(None, "--model", "/dev/zero"))
-case(GROUP, "info of a damaged one", 6, *NO_MODEL)(lambda bench: ["info", bench.file("m.lipmotion", "hello")])

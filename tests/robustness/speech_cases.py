@@ -1,10 +1,7 @@
-import os
 import struct
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
 
 from robustness.case import Bench, case
 from speech.sounds import tone, write_constant_flac, write_pictures, write_sound, write_stamped
@@ -38,9 +35,6 @@ def _cut(suffix: str, codec: str, share: float) -> None:
 for _suffix, (_codec, _cuts) in CONTAINERS.items():
     for _share in _cuts:
         _cut(_suffix, _codec, _share)
-case(GROUP, "an empty file", 3, "the file is empty", "give a recording")(
-    lambda bench: bench.animate(bench.file("a.wav", b""))
-)
 case(GROUP, "a header only", 3, "holds 0 ms of sound", "required at least 100 ms")(
     lambda bench: bench.animate(bench.sound(np.zeros(0, np.int16)))
 )
@@ -97,47 +91,14 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(path.rename(bench.folder / "a.wav"))
 
 
-case(GROUP, "a web page", 3, "is a web page, required a recording", "fetch the file itself")(
-    lambda bench: bench.animate(bench.file("a.wav", b"<!DOCTYPE html><html><body>404 Not Found</body></html>\n" * 20))
-)
 case(GROUP, "random bytes", 3, *NO_RECORDING)(
     lambda bench: bench.animate(bench.file("a.wav", np.random.default_rng(1).bytes(5000)))
 )
 
 
-@case(GROUP, "a picture", 3, "is a picture, required a recording")
-def _(bench: Bench) -> list[object]:
-    Image.new("RGB", (32, 32)).save(bench.folder / "a.png")
-    return bench.animate(bench.folder / "a.png")
-
-
 case(GROUP, "a video without sound", 3, "has no sound track")(
     lambda bench: bench.animate(write_pictures(bench.folder / "a.mp4"))
 )
-case(GROUP, "a folder", 3, "is a folder; give one recording")(lambda bench: bench.animate(bench.folder))
-
-
-@case(GROUP, "a link to itself", 3, "a.wav")
-def _(bench: Bench) -> list[object]:
-    (bench.folder / "a.wav").symlink_to(bench.folder / "a.wav")
-    return bench.animate(bench.folder / "a.wav")
-
-
-@case(GROUP, "a pipe that nobody writes to", 3, "is a pipe or a device, required a file")
-def _(bench: Bench) -> list[object]:
-    os.mkfifo(bench.folder / "a.wav")
-    return bench.animate(bench.folder / "a.wav")
-
-
-case(GROUP, "/dev/zero", 3, "is a pipe or a device, required a file")(lambda bench: bench.animate(Path("/dev/zero")))
-case(GROUP, "a name that is too long", 3, "required a path")(lambda bench: bench.animate("x" * 300 + ".wav"))
-
-
-@case(GROUP, "a name that is no UTF-8", 0)
-def _(bench: Bench) -> list[object]:
-    path = bench.folder / os.fsdecode(b"a\xff\xfe.wav")
-    path.write_bytes(bench.speech.read_bytes())
-    return bench.animate(path)
 
 
 case(GROUP, "time stamps that alternate", 3, "beside 8.0 s of sound, at most 760 s are bridged; export the recording")(
@@ -158,6 +119,3 @@ for _name, _content in {
     def _(bench: Bench, content: str = _content) -> list[object]:
         write_sound(bench.folder / "a.mpg", tone(48_000), 48_000, "mp2", video=True).rename(bench.folder / "a.sub")
         return bench.animate(bench.file("a.idx", content).rename(bench.folder / "a.m3u8"))
-
-
-case(GROUP, "a name like an address", 3, "no such file")(lambda bench: bench.animate("concat:a.wav|b.wav"))

@@ -10,16 +10,7 @@ def _text(name: str, text: str, code: int, messages: tuple[str, ...] = (), *more
     case(GROUP, name, code, *messages)(lambda bench: ["speak", text, "--model", bench.model, "-o", "a.json", *more])
 
 
-_text("an empty text to speak", "", 3, NO_WORD)
 _text("lone surrogates to speak", "\udcff\udcfe", 3, NO_WORD)
-_text("control characters among words to speak", "papa\x07\x1b[31m \x9d mama\0", 0)
-_text("a number of thirty digits to speak", "9" * 30, 0)
-_text(
-    "tags and phones in brackets",
-    "<speak>papa</speak> [[m'A:m@]]",
-    0,
-    ("not known, and not spoken: <speak>, </speak>",),
-)
 _text("a million characters without a blank", "a" * 1_000_000, 3, ("has 1000000 characters, required at most 50000",))
 _text("one word of 10,000 letters to speak", "ab" * 5000, 3, ("a word of 10000 characters", "required at most 200"))
 
@@ -32,6 +23,3 @@ def _file(name: str, content: bytes, code: int, *messages: str) -> None:
 
 _file("a text file in Latin-1", "pâpa".encode("latin-1"), 3, "not a readable UTF-8 text", "save it as UTF-8 text")
 _file("a text file of a million bytes", b"papa " * 200_000, 3, "1000000 bytes, required at most 200000: is it a text?")
-case(GROUP, "a text file that is not there", 3, "no such text file")(
-    lambda bench: ["speak", "--text", "text.txt", "--model", bench.model, "-o", "a.json"]
-)

@@ -5,7 +5,6 @@ from typing import Any
 
 import av
 import numpy as np
-from PIL import Image
 
 from robustness.case import Bench, case
 from speech.sounds import tone
@@ -49,29 +48,7 @@ _pictures(
 )
 
 
-@case(GROUP, "a moving GIF, named .mp4", 4, NONE, "is a picture, required a recording")
-def _(bench: Bench) -> list[object]:
-    grey = [Image.new("L", (64, 64), level) for level in range(0, 250, 50)]
-    grey[0].save(bench.folder / "a.gif", save_all=True, append_images=grey[1:], duration=40)
-    (bench.folder / "a.gif").rename(bench.folder / "a.mp4")
-    return ["corpus", "prepare", bench.folder, "-o", "corpus"]
-
-
 @case(GROUP, "pictures minutes apart", 4, NONE, "0.01 pictures a second, required 1 to 1000; export the video again")
 def _(bench: Bench) -> list[object]:
     _video(bench, (64, 64), [GREY] * 25, every=2500)
     return ["corpus", "prepare", bench.folder, "-o", "corpus"]
-
-
-@case(GROUP, "background of grey pictures", 3, "no face in 25 of 25 frames; required: a face in at least 80%")
-def _(bench: Bench) -> list[object]:
-    _video(bench, (64, 64), [GREY] * 25)
-    video = bench.folder / "a.mkv"
-    return bench.animate(None, "--face", bench.face, "--background", video, output="a.mp4")
-
-
-@case(GROUP, "background that is cut off", 3, "a.mkv: ")
-def _(bench: Bench) -> list[object]:
-    _video(bench, (64, 64), [GREY] * 25)
-    video = bench.file("a.mkv", (bench.folder / "a.mkv").read_bytes()[:400])
-    return bench.animate(None, "--face", bench.face, "--background", video, output="a.mp4")

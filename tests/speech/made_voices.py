@@ -83,11 +83,6 @@ def clap(chance: np.random.Generator) -> np.ndarray:
     return 0.7 * chance.normal(size=count) * np.exp(-np.arange(count) / (0.003 * RATE_HZ))
 
 
-def beep(hertz: float = 1000.0, seconds: float = 0.25) -> np.ndarray:
-    """Return a tone, as recorders and slates make it."""
-    return 0.3 * np.sin(2 * np.pi * hertz * np.arange(int(seconds * RATE_HZ)) / RATE_HZ)
-
-
 def room(chance: np.random.Generator) -> np.ndarray:
     """Return the response of a room: what arrives straight, and as much energy again in echoes."""
     count = int(ROOM_S * RATE_HZ)

@@ -1,5 +1,4 @@
 import os
-import re
 import shutil
 import struct
 import sys
@@ -16,7 +15,6 @@ from children import run_child
 from lipmotion import errors, types
 from lipmotion.errors import InputError
 from lipmotion.speech.sound.audio_files import _TrackDecoder, read_audio
-from speech.made_voices import pulses, vowels
 from speech.sounds import (
     LEVEL,
     ONSET_S,
@@ -64,13 +62,12 @@ GUID = bytes.fromhex("000000001000800000aa00389b71")
 WAVE64 = bytes.fromhex("f3acd3118cd100c04f8edb8a")
 
 
-def samples(valid: int, container: int, high_first: bool = False) -> bytes:
+def samples(valid: int, container: int) -> bytes:
     """Samples of so many bits, at the left of containers of so many, with zeros behind them."""
     whole = np.round(TONE * 2.0 ** (valid - 1)).astype(np.int64) << (container - valid)
     if container == 8:
         return (whole + 128).astype(np.uint8).tobytes()
-    bytes_of_each = whole.astype("<i8").view(np.uint8).reshape(-1, 8)[:, : container // 8]
-    return bytes_of_each[:, :: -1 if high_first else 1].tobytes()
+    return whole.astype("<i8").view(np.uint8).reshape(-1, 8)[:, : container // 8].tobytes()
 
 
 def form(bits: int = 16, *, coding: int = PCM, block: int | None = None, per_second: int | None = None) -> bytes:
@@ -96,14 +93,6 @@ def wave64(*chunks: tuple[bytes, bytes]) -> bytes:
     for name, content in chunks:
         body += name + WAVE64 + struct.pack("<Q", 24 + len(content)) + content + bytes(-len(content) % 8)
     return b"riff" + bytes.fromhex("2e91cf11a5d628db04c10000") + struct.pack("<Q", 24 + len(body)) + body
-
-
-def aifc(kind: bytes, bits: int, content: bytes) -> bytes:
-    rate = bytes.fromhex("400cfa00000000000000")
-    common = struct.pack(">HIH", 1, len(TONE), bits) + rate + kind + bytes(2)
-    parts = (b"COMM", common), (b"SSND", bytes(8) + content)
-    body = b"AIFC" + b"".join(name + struct.pack(">I", len(part)) + part for name, part in parts)
-    return b"FORM" + struct.pack(">I", len(body)) + body
 
 
 def wide(length: int) -> bytes:
@@ -139,9 +128,6 @@ FORMS = {
         chunk(b"fmt ", form()), chunk(b"data", S16[2000:])),
     "Wave64": wave64((b"fmt ", form()), (b"data", S16)),
     "Wave64, 24 in 32": wave64((b"fmt ", long_form(24, 32)), (b"data", S24_IN_32)),
-    "AIFC sowt": aifc(b"sowt", 16, S16),
-    "AIFC fl32": aifc(b"fl32", 32, TONE.astype(">f4").tobytes()),
-    "AIFC of 20 bits": aifc(b"NONE", 20, samples(20, 24, high_first=True)),
 }  # fmt: skip
 
 
@@ -271,11 +257,6 @@ def test_coded(tmp_path: Path, original: Samples, kinds: list[tuple[str, str, in
         assert alike > (0.95 if delay else 0.99)  # a delay of a third of a sample is left in it
 
 
-def test_opus_made_from_16_khz_keeps_its_time(tmp_path: Path, original: Samples) -> None:
-    audio = read_audio(write_sound(tmp_path / "a.webm", babble(16_000), 16_000, "libopus"))
-    assert abs(late_by(audio.samples, original)[0]) <= MS
-
-
 def test_more_channels_than_have_a_name(tmp_path: Path, original: Samples) -> None:
     path = write_wave(tmp_path / "a.wav", np.round(np.tile(original[:, None], 12) * 32767).astype(np.int16))
     assert late_by(read_audio(path).samples, original)[1] > 0.999
@@ -309,18 +290,6 @@ def test_channels_that_cancel(tmp_path: Path, original: Samples, caplog: pytest.
         assert np.allclose(audio.samples, wanted, atol=1e-6)
         said = f"a.wav: its {len(weights)} channels cancel one another in their mean; channel {(loudest or 0) + 1}"
         assert (said in caplog.text) == (loudest is not None)
-
-
-def test_the_centre_is_taken_where_it_alone_speaks(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    time_s = np.arange(64_000) / 16_000
-    voice = 0.3 * vowels(pulses(4, 140 + 20 * np.sin(2 * np.pi * time_s)))
-    music = 0.1 * (np.sin(2 * np.pi * 220 * time_s) + np.sin(2 * np.pi * 330 * time_s))
-    for left, centre, is_taken in ((music, voice, True), (voice, music, False), (voice, voice, False)):
-        caplog.clear()
-        channels = np.array([left, left, centre, 0 * left, 0.3 * left, 0.3 * left], np.float32)
-        audio = read_audio(write_sound(tmp_path / "a.wav", channels, 16_000, "pcm_f32le"))
-        assert np.allclose(audio.samples, centre if is_taken else channels.mean(axis=0), atol=1e-6)
-        assert ("of its 6 channels, channel 3 alone holds speech" in caplog.text) == is_taken
 
 
 NAMES = ["-o.wav", "a b.wav", 'it\'s "it".wav', "new\nline.wav", "😀 音 é.wav", "12:30.wav", "http:x.wav", "%03d?*.wav"]
@@ -427,16 +396,11 @@ def test_time_stamps_that_jump_far_do_not_fill_the_memory(tmp_path: Path) -> Non
 PEAK = """
 import sys
 from pathlib import Path
-from lipmotion.errors import InputError
 from lipmotion.speech.sound.audio_files import read_audio
-try:
-    read_audio(Path(sys.argv[1]))
-except InputError as error:
-    print(error)
+read_audio(Path(sys.argv[1]))
 peak = next(line for line in open("/proc/self/status") if line.startswith("VmHWM"))
 print(int(peak.split()[1]) // 1024)  # getrusage counts what the process was before it became this one
 """
-SPARED_MB = 500
 
 STAMPS_S = {
     # many holes that are each allowed
@@ -445,20 +409,11 @@ STAMPS_S = {
 }
 
 
-def peak(path: Path) -> tuple[str, int]:
-    """Return what a process of its own says when it reads a recording, and how many MB it has taken."""
-    done = run_child([sys.executable, "-c", PEAK, path], check=True)
-    *said, taken_mb = done.stdout.splitlines()
-    return " ".join(said), int(taken_mb)
-
-
-@pytest.mark.long
-@pytest.mark.skipif(sys.platform != "linux", reason="memory is counted as Linux does")
 @pytest.mark.parametrize("name", STAMPS_S)
 def test_holes_are_bounded_all_together(tmp_path: Path, name: str) -> None:
-    said, taken_mb = peak(write_stamped(tmp_path / "a.mkv", STAMPS_S[name]))
-    assert re.search(r"a\.mkv: the time stamps of its sound leave holes of \d+ s beside \d+\.0 s of sound", said)
-    assert taken_mb < SPARED_MB
+    said = r"a\.mkv: the time stamps of its sound leave holes of \d+ s beside \d+\.0 s of sound"
+    with pytest.raises(InputError, match=said):
+        read_audio(write_stamped(tmp_path / "a.mkv", STAMPS_S[name]))
 
 
 def test_speech_with_long_pauses_is_taken_as_it_is(tmp_path: Path) -> None:
@@ -472,11 +427,10 @@ def test_speech_with_long_pauses_is_taken_as_it_is(tmp_path: Path) -> None:
         assert np.abs(audio.samples[first + 640 : first + 6000]).max() == 0
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="memory is counted as Linux does")
 def test_sound_out_of_nothing_is_refused(tmp_path: Path) -> None:
-    said, taken_mb = peak(write_constant_flac(tmp_path / "a.flac", 80_000))
-    assert re.search(r"a\.flac: \d+ bytes of sound last \d+ s, required at most \d+ s \(20 bytes a second\)", said)
-    assert taken_mb < SPARED_MB
+    said = r"a\.flac: \d+ bytes of sound last \d+ s, required at most \d+ s \(20 bytes a second\)"
+    with pytest.raises(InputError, match=said):
+        read_audio(write_constant_flac(tmp_path / "a.flac", 80_000))
 
 
 def test_sound_after_digital_silence_and_after_a_long_sound_is_in_its_place(tmp_path: Path) -> None:
@@ -499,9 +453,8 @@ def test_minutes_of_digital_silence_are_no_crime_but_each_rate_is_checked(tmp_pa
 def test_memory_is_that_of_the_result(tmp_path: Path) -> None:
     sounds = [np.tile(babble(16_000, 20), (1, count)) for count in (1, 60, 60)]
     sounds[2][:, 16_000:] = 0
-    (_, some), (_, much), (_, silent) = (
-        peak(write_sound(tmp_path / f"{n}.wav", sound, 16_000, "pcm_f32le")) for n, sound in enumerate(sounds)
-    )
+    paths = [write_sound(tmp_path / f"{n}.wav", sound, 16_000, "pcm_f32le") for n, sound in enumerate(sounds)]
+    some, much, silent = (int(run_child([sys.executable, "-c", PEAK, path], check=True).stdout) for path in paths)
     sound_mb = sounds[1].nbytes >> 20
     assert 0.9 * sound_mb < much - some < 1.3 * sound_mb
     assert silent - some < 0.3 * sound_mb

@@ -1,5 +1,4 @@
 import itertools
-import runpy
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
@@ -71,17 +70,6 @@ def test_frame_n_is_centred_at_n_times_10_ms() -> None:
         assert loud.tolist() == [n for n in (frame - 1, frame, frame + 1) if 0 <= n <= 100]
 
 
-def test_columns_are_normalised_over_the_recording_whatever_its_loudness() -> None:
-    samples = noise(RATE_HZ)
-    values = features(samples)
-    assert values.mean(axis=0) == pytest.approx(0, abs=1e-4)
-    assert values.std(axis=0) == pytest.approx(1, abs=1e-4)
-    for gain in (1e-3, 30.0):
-        np.testing.assert_allclose(
-            features((gain * samples).astype(np.float32)), values, rtol=0, atol=2e-3, equal_nan=False
-        )
-
-
 def test_blocks_join_without_a_seam() -> None:
     samples, around = noise(160 * (module.BLOCK + 500)), slice(module.BLOCK - 100, module.BLOCK + 100)
     alone = features(samples[160 * (around.start - 20) : 160 * (around.stop + 20)])[20:-21]
@@ -136,23 +124,6 @@ def test_it_says_what_is_wrong(measure: Callable[[types.Audio], object]) -> None
 
 def drawn_features(seed: int, frames: int = 200) -> types.Features:
     return types.Features(np.random.default_rng(seed).normal(size=(frames, 39)).astype(np.float32), frames / 100)
-
-
-def around(values: np.ndarray, frame: int) -> np.ndarray:
-    """Return what the map sees of a frame, slowly."""
-    places = [min(max(frame + step, 0), len(values) - 1) for step in sound_offset.FRAME_OFFSETS]
-    return np.concatenate([values[place, : sound_offset.STATIC_FEATURES] for place in places])
-
-
-def test_the_fit_finds_the_map_behind_the_data() -> None:
-    weights = np.random.default_rng(9).normal(size=sound_offset.STATIC_FEATURES * len(sound_offset.FRAME_OFFSETS))
-    examples = []
-    for seed in range(6):
-        given = drawn_features(seed)
-        examples.append((given, np.array([around(given.values, n) @ weights for n in range(200)])))
-    script = Path(__file__).parents[2] / "scripts" / "lip_speed.py"
-    found = runpy.run_path(str(script))["fit_opening_speed"](examples)
-    assert np.corrcoef(found, weights)[0, 1] > 0.995
 
 
 def test_the_map_that_ships_is_linear_and_local() -> None:

@@ -4,7 +4,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.signal import resample_poly
 
 from lipmotion import errors, types
 from lipmotion.speech.features.mfcc import spectrum
@@ -37,10 +36,7 @@ def test_the_ratio_is_as_asked() -> None:
             assert ratio_db(clean.samples, added(clean, dirty)) == pytest.approx(snr_db, abs=0.02)
 
 
-def test_neither_the_level_of_the_noise_given_nor_pauses_matter() -> None:
-    clean, hiss = talker(0), np.random.default_rng(1).standard_normal(len(talker(0).samples), np.float32)
-    same, other = (acoustic_conditions.add_noise(clean, np.float32(gain) * hiss, 10) for gain in (1, 20))
-    np.testing.assert_allclose(other.samples, same.samples, atol=1e-6)
+def test_pauses_do_not_matter() -> None:
     paused = (talker(0, pause_s=pause_s) for pause_s in (0.2, 0.7))
     short, long = (added(clean, acoustic_conditions.mix_noise(clean, "white", 10)).std() for clean in paused)
     assert long == pytest.approx(short, rel=0.06)
@@ -72,7 +68,6 @@ SILENT = types.Audio(np.zeros(16_000, np.float32), RATE_HZ)
 
 def test_it_says_what_is_wrong() -> None:
     one, two = talker(0), talker(1)
-    tone = types.Audio(np.sin(np.arange(16_000) * 0.3).astype(np.float32), RATE_HZ)
     for kind, snr_db, audio, talkers, message in (
         ("pink", 10, one, [], "'pink'"),
         ("white", float("nan"), one, [], "nan dB"),
@@ -87,9 +82,6 @@ def test_it_says_what_is_wrong() -> None:
     ):
         with pytest.raises(errors.InputError, match=message):
             acoustic_conditions.mix_noise(audio, kind, snr_db, talkers)
-    for noise, message in ((np.ones(3), "shape"), (np.zeros(16_000), "mean power"), (np.full(16_000, np.nan), "nan")):
-        with pytest.raises(errors.InputError, match=message):
-            acoustic_conditions.add_noise(tone, noise, 0)
 
 
 @pytest.fixture(scope="module")
@@ -169,15 +161,3 @@ def test_a_shifted_piece_says_so() -> None:
 def test_a_short_first_piece_makes_no_click() -> None:
     joined = resampling.overlap_pieces([np.ones(8000, np.float32)] * 2, [(0.1, 0.101), (0.2, 0.4)], RATE_HZ)
     np.testing.assert_allclose(joined.samples, 1, atol=1e-6)
-
-
-@pytest.mark.long
-def test_fewer_samples_are_what_scipy_computes_and_a_sound_at_the_same_rate_stays():
-    for factor, length in ((2, 1), (3, 5), (6, 100), (3, 2401), (3, 4 * resampling.DECIMATED_BLOCK)):
-        sound = np.random.default_rng(length).normal(0, 0.1, length).astype(np.float32)
-        found, expected = resampling.decimate(sound, factor), resample_poly(sound, 1, factor)
-        assert found.dtype == np.float32
-        assert found.shape == expected.shape
-        assert found == pytest.approx(expected, abs=1e-6)
-        assert np.array_equal(resampling.decimate(sound, 1), sound)
-    assert not len(resampling.decimate(sound[:0], 3))

@@ -140,7 +140,7 @@ def test_a_phone_without_data_takes_the_models_of_a_similar_one(hmm: Any, senten
 def test_too_many_words_for_the_sound_and_an_unknown_kind_are_refused(hmm: Any, sentences: list[ToySentence]) -> None:
     with pytest.raises(errors.AlignmentError, match=r"50 words take at least \d+ frames of 10 ms, found \d+"):
         align(hmm, sentences[0].audio, ["baby"] * 50, Lexicon())
-    with pytest.raises(errors.InputError, match="'best'; required one of: auto, words, fast, own, general"):
+    with pytest.raises(errors.InputError, match="'best'; required one of: auto, fast, own, general"):
         recogniser.Recogniser(hmm, "best")
 
 
@@ -241,15 +241,6 @@ def test_labels_are_those_of_the_words_that_are_believed() -> None:
     assert frames == Stretch(122, 160)
     assert [label.phone for label in labels] == ["b", "ow", "t"]
     assert not list(label_words(ALIGNED, Stretch(100, 180), np.array([False, False]), 0))
-
-
-def test_fits_are_means_over_the_frames_of_each_word() -> None:
-    values = np.zeros((80, 2), np.float32)
-    values[:, 1] = 1.0
-    values[22:60, 1] = 3.0
-    fits, fit = ALIGNED.fits(values, np.ones(80, np.intp))
-    assert fits == pytest.approx([-1.0, -3.0])
-    assert fit == pytest.approx(-(42 + 38 * 3) / 80)
 
 
 def test_what_was_recognised() -> None:

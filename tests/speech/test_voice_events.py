@@ -4,7 +4,7 @@ from scipy.signal import find_peaks
 
 from lipmotion.speech.sound.voice_events import find_risen_peaks, find_voice_events, silence_units
 from lipmotion.types import Audio, Timeline, Unit
-from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
+from lipmotion.types.audio import BREATH, LAUGHTER
 from speech.made_voices import RATE_HZ, laugh, noise, pulses, recording, said, vowels
 
 
@@ -34,18 +34,6 @@ def test_laughter_is_heard_by_its_calls_and_phones_recognised_in_it_become_silen
         assert not found(audio, said(4.7, (0.5, 2.0), (2.6, 4.1), confidence=confidence))
 
 
-def test_a_phrase_without_a_voice_is_whispered_and_one_with_a_voice_is_not():
-    audio = recording(PHRASE, (2.6, vowels(noise(1.5))))
-    (event,) = find_voice_events(audio, said(4.6, (0.5, 2.0), (2.6, 4.1)))
-    assert (event.kind, event.strength) == (WHISPER, 1)
-    assert (event.start_s, event.end_s) == (2.6, 4.1)
-
-
-def test_where_noise_may_hide_the_voice_nothing_is_whispered():
-    audio = recording((0.0, 0.5 * noise(4.6)), (0.5, 0.3 * vowels(noise(1.5))))
-    assert WHISPER not in {kind for kind, *_ in found(audio, said(4.6, (0.5, 2.0)))}
-
-
 @pytest.mark.parametrize(
     ("hertz", "is_breath"), [((700, 4500), True), ((4500, 7500), False), ((60, 500), False)], ids=("h", "s", "rumble")
 )
@@ -56,17 +44,6 @@ def test_noise_in_a_pause_is_a_breath_if_it_has_the_spectrum_of_one(hertz: tuple
     assert [kind for kind, *_ in events] == [BREATH] * is_breath
     for _, start_s, end_s in events:
         assert 2.45 < start_s < 2.7 < end_s < 2.95
-
-
-def test_one_phrase_is_shouted_if_it_is_higher_brighter_and_louder():
-    plain, bright = pulses(1.0, 120), vowels(pulses(1.0, 210), 0.95)
-    spans = [(0.5 + 1.5 * number, 1.5 + 1.5 * number) for number in range(6)]
-    for last, kinds in ((2.5 * bright, [SHOUT]), (bright, [])):
-        sounds = [vowels(plain)] * 5 + [last]
-        audio = recording(*((start_s, sound) for (start_s, _), sound in zip(spans, sounds, strict=True)))
-        events = found(audio, said(10.0, *spans))
-        assert [kind for kind, *_ in events] == kinds
-        assert all(start_s == spans[-1][0] for _, start_s, _ in events)
 
 
 @pytest.mark.parametrize("level", [0.0, 0.01])

@@ -84,19 +84,6 @@ def test_it_learns_what_depends_on_a_neighbour() -> None:
     assert np.corrcoef(network(unseen.inputs.astype(np.float32))[:, 0], unseen.targets[:, 0])[0, 1] > 0.97
 
 
-def test_steps_that_do_not_count_are_not_learned() -> None:
-    x, y, valid = shifted()
-    broken = y.copy()
-    broken[10:20] = 1e3
-    valid = valid.copy()
-    valid[10:20] = False
-    network = networks.make_network(3, 5, 2, (1,), seed=1)
-    weights = np.full(2, 0.5, np.float32)
-    good, _ = network_training._differentiate(network, [TrainingSequence(x, y, valid)], weights, 0.0, 0)
-    bad, _ = network_training._differentiate(network, [TrainingSequence(x, broken, valid)], weights, 0.0, 0)
-    assert bad == pytest.approx(good)
-
-
 def neighbours(length: int = 30, seed: int = 0) -> TrainingSequence:
     """A sequence whose targets are the inputs a step before and a step after."""
     x = np.random.default_rng(seed).standard_normal((length, 2)).astype(np.float32)
@@ -116,20 +103,6 @@ def test_gradients_of_cells_are_those_of_differences() -> None:
     network = networks.make_recurrent_network(2, 4, 2, 2, seed=1)
     gradients, differences = slopes(network, network.parameters, [neighbours(9), neighbours(6, 1)], 5e-3)
     assert differences == pytest.approx(gradients, abs=1e-3)
-
-
-def test_dropped_units_have_no_gradient() -> None:
-    network, weights = networks.make_recurrent_network(2, 4, 2, 2, seed=1), np.ones(2, np.float32)
-    _, gradients = network_training._differentiate(network, [neighbours(9)], weights, 1 - 1e-6, 0)
-    assert not any(gradient.any() for gradient in gradients[:-1])
-    assert gradients[-1].any()
-
-
-def test_what_follows_the_end_of_a_shorter_sequence_counts_nothing() -> None:
-    network, x = networks.make_recurrent_network(2, 4, 2, 2, seed=0), neighbours(9).inputs.astype(np.float32)
-    inside = np.array([[True] * 9, [True] * 6 + [False] * 3])
-    together, _ = network.forward(np.stack([x, x]), inside, None)
-    np.testing.assert_allclose(together[1, :6], network.hidden(x[:6]), atol=1e-6)
 
 
 def train() -> tuple[list[float], networks.RecurrentNetwork]:

@@ -42,14 +42,6 @@ def test_a_large_table_is_searched_for_its_first_components(count, dimensions, k
     assert np.array_equal(fit_pca(values, 5).basis, pca.basis)
 
 
-def test_few_rows_span_few_components():
-    rows = np.repeat(spectrum(1, 4, 30), 2, axis=0)
-    pca = fit_pca(rows, 10)
-    assert pca.basis.shape == (3, 30)  # four different points: three directions
-    assert pca.restore(pca.project(rows)) == pytest.approx(rows)
-    assert fit_pca(np.ones((4, 30)), 3).basis.shape == (0, 30)
-
-
 def test_places_are_spread_evenly():
     assert choose_evenly(4, 8).tolist() == [1, 3, 5, 7]
     assert choose_evenly(9, 3).tolist() == [0, 1, 2]

@@ -58,13 +58,6 @@ def test_odd_sizes():
         assert psnr_db(pictures, frames) > 40
 
 
-def test_a_smaller_factor_is_better_and_groups_are_of_any_length():
-    sizes = [len(coded_video.encode_video(film(), 25.0, crf=crf).data) for crf in (10, 20, 30)]
-    assert sizes == sorted(sizes, reverse=True)
-    for group in (1, 5, 100):
-        assert len(list(coded_video.encode_video(film(), 25.0, group=group).decode(range(20, -1, -1)))) == 21
-
-
 def test_an_archive_holds_it(stored, tmp_path: Path):
     path = tmp_path / "a.face"
     write_archive(path, {}, coded_video.stored_video_to_arrays(stored))

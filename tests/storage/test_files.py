@@ -305,11 +305,6 @@ def test_a_folder_that_is_written_holds_nothing_that_is_read(place: Path) -> Non
     check_apart([place / "folder"], [Source(place / "folder" / "deep", "recording")])
 
 
-def test_what_has_nothing_to_do_with_each_other(place: Path) -> None:
-    sources = [Source(place / name, "text") for name in ("words.txt", "folder", "none", "x" * 5000, "a\0b")]
-    check_apart([place / "new.json", place / "folder2", place / ("y" * 5000)], sources, folders=[place / "new"])
-
-
 def packed(*names: str, kind: str = "") -> bytes:
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w") as file:

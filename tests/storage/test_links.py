@@ -18,7 +18,6 @@ from lipmotion_studio.folder import open_folder
 from lipmotion_studio.study.manifest import MANIFEST
 from lipmotion_studio.study.store import ANSWERS, StudyStore
 from lipmotion_studio.training import VOICE, TrainingOrder, TrainingRecording, VoiceOptions, run_training
-from lipmotion_studio.votes import Side, Vote
 from testing.toy import toy_utterances
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links as POSIX has them")
@@ -44,11 +43,6 @@ def drop(folder: Path) -> None:
     with open_folder(None, folder) as project:
         (folder / "came").write_bytes(b"sound")
         project.drop("line.wav", folder / "came", "")
-
-
-def vote(folder: Path) -> None:
-    with open_folder(None, folder) as project:
-        project.add_vote(Vote("line", (Side("a", "0" * 64, "0" * 64), Side("b", "1" * 64, "0" * 64)), 0))
 
 
 def pronounce(folder: Path) -> None:
@@ -93,7 +87,6 @@ def train(folder: Path) -> None:
     ("verb", "name"),
     [
         *((drop, name) for name in (LOCK, "project.json", "sounds", "sounds/line.wav")),
-        *((vote, name) for name in ("votes.json", "lexicon.txt")),
         *((pronounce, name) for name in ("lexicon.txt",)),
         *((train_voice, f"training/{name}") for name in ("", "recordings", "corpus", f"corpus/{LOCK}")),
         *((train_voice, name) for name in ("voices", "recordings")),

@@ -1,26 +1,20 @@
 """``lipmotion studio`` as a process: its address, requests to it, random edits that a page could make."""
 
-import http.client
-import json
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from random import Random
-from threading import Event, Thread
+from threading import Event, Timer
 from typing import Any, NamedTuple
 
 from children import LIMIT_S, LIPMOTION, Child, child
-from lipmotion.pipeline.edits import Step, parse_step
+from lipmotion.pipeline.edits import parse_step
 from lipmotion_studio.application import TOKEN_HEADER
-from study.served import NO_REPLY
+from study.served import NO_REPLY, Connection
 
 PATIENCE_S = 600.0
 PHONES = "p b m f aa iy uw ow s t".split()
-GIVEN = ("motion", "motion?of=delivered", "motion?of=deviation", "motion?of=confidence", "weights?face=head")
-EXPORTED = (".json", ".csv", ".livelink.csv", ".glb", ".TextGrid", ".cues.json")
-"""What a line gives, and is exported as, where its bytes are compared."""
-MAX_AT_ONCE = 20
 WORDS = ("bob", "we may", "so", "put a map")
 
 
@@ -34,18 +28,10 @@ class Served(NamedTuple):
         self.process.kill()
         self.process.wait()
 
-    def ask(self, path: str, content: Any = None, **headers: str) -> tuple[int, Any]:
-        """Return status and content of a reply: of JSON, the object. Raises an error of ``NO_REPLY``: none came."""
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
-        try:
-            body = None if content is None else json.dumps(content)
-            sent = {TOKEN_HEADER: self.token, "content-type": "application/json"} | headers
-            connection.request("GET" if body is None else "POST", path, body, sent)
-            reply = connection.getresponse()
-            found = reply.read()
-            return reply.status, json.loads(found) if reply.getheader("content-type") == "application/json" else found
-        finally:
-            connection.close()
+    def ask(self, path: str, content: Any = None) -> tuple[int, Any]:
+        """Return status and content of a reply, over a new connection, as ``Connection.ask``."""
+        with closing(Connection(self.port, {TOKEN_HEADER: self.token}, PATIENCE_S)) as connection:
+            return connection.ask(path, content)
 
     def ready(self, number: int = 1) -> dict[str, Any]:
         ends_s = time.monotonic() + PATIENCE_S
@@ -67,13 +53,8 @@ def served(source: Path, errors: Path, *options: Path | str, limit_s: float = LI
         yield Served(process, int(port), token)
 
 
-def random_edit(chance: Random, state: dict[str, Any]) -> str:
-    """Return an edit of any kind that a page could make of a line in this state; it may be refused."""
-    return chance.choice(edits_of_all_kinds(chance, state))
-
-
 def edits_of_all_kinds(chance: Random, state: dict[str, Any]) -> list[str]:
-    """Return an edit of each kind (``lipmotion.pipeline.edits.STEPS``)."""
+    """Return edits that a page could make of a line in this state, of each kind; they may be refused."""
     phones = state["phones"]
     number, word = chance.randrange(1, len(phones) - 1), chance.randrange(max(len(state["words"]), 1)) + 1
     phone, said = phones[number], chance.choice(PHONES)
@@ -112,28 +93,12 @@ def edits_of_all_kinds(chance: Random, state: dict[str, Any]) -> list[str]:
     ]
 
 
-class Editor:
-    """Makes random edits through a server, one after another, and keeps which were acknowledged."""
-
-    def __init__(self, seed: int) -> None:
-        self._chance = Random(seed)
-        self.steps: list[str] = []
-        self.sent: list[str] = []
-        """The edits of the last request that was sent, all of them; it may have been answered or not."""
-
-    def edit(self, server: Served) -> int:
-        """Make one edit, or take one back; return the status of the reply. Raises an error of ``NO_REPLY``."""
-        state = server.ask("/api/lines/1")[1]
-        if self._chance.random() < 0.2 and state["undo"]:
-            self.sent = state["steps"][:-1]
-            status, reply = server.ask("/api/lines/1/undo", {"revision": state["revision"]})
-        else:
-            step = random_edit(self._chance, state)
-            self.sent = [*state["steps"], str(parse_step(step))]  # as it is written
-            status, reply = server.ask("/api/lines/1/edits", {"revision": state["revision"], "steps": [step]})
-        if status == 200:
-            self.steps = reply["steps"]
-        return status
+def choose_change(chance: Random, state: dict[str, Any]) -> tuple[str, dict[str, Any], list[str]]:
+    """Return a change of a line in this state: its address and content, and the edits that there are then."""
+    if chance.random() < 0.2 and state["undo"]:
+        return "undo", {}, state["steps"][:-1]
+    step = chance.choice(edits_of_all_kinds(chance, state))
+    return "edits", {"steps": [step]}, [*state["steps"], str(parse_step(step))]  # as it is written
 
 
 def lost_edits(
@@ -150,86 +115,28 @@ def lost_edits(
     each_s : how long it is edited, at most, between two kills
     report : is called with what was found so far, after each kill
     """
-    editor, chance = Editor(seed), Random(seed)
-    found = {"kills": 0, "acknowledged": 0, "lost": 0}
+    chance, found = Random(seed), {"kills": 0, "acknowledged": 0, "lost": 0}
+    steps: list[str] = []  # that were acknowledged
+    sent: list[str] = []  # those of the last request, which may have been answered or not
     while found["kills"] < kills:
         with served(project, errors, *options) as server:
-            state = server.ready()
-            if found["kills"] and state["steps"] not in (editor.steps, editor.sent):
-                found["lost"] += 1
-            ends_s = time.monotonic() + chance.uniform(0.1, each_s)
-            editor.steps = state["steps"]
-            killed = _killed_at(server, ends_s)
+            state, killed = server.ready(), Event()
+            found["lost"] += found["kills"] > 0 and state["steps"] not in (steps, sent)
+            steps = state["steps"]
+
+            def kill(server: Served = server, killed: Event = killed) -> None:
+                killed.set()
+                server.process.kill()
+
+            Timer(chance.uniform(0.1, each_s), kill).start()
             with suppress(*NO_REPLY):
                 while not killed.is_set():
-                    found["acknowledged"] += editor.edit(server) == 200
+                    state = server.ask("/api/lines/1")[1]
+                    what, content, sent = choose_change(chance, state)
+                    status, reply = server.ask(f"/api/lines/1/{what}", {"revision": state["revision"], **content})
+                    if status == 200:
+                        steps, found["acknowledged"] = reply["steps"], found["acknowledged"] + 1
             server.kill()
         found["kills"] += 1
         report(found)
-    return found
-
-
-def _killed_at(server: Served, ends_s: float) -> Event:
-    """Kill a server at a time, whatever it does then; return the event that says that it has happened."""
-    killed = Event()
-
-    def kill() -> None:
-        time.sleep(max(ends_s - time.monotonic(), 0))
-        killed.set()
-        server.process.kill()
-
-    Thread(target=kill, daemon=True).start()
-    return killed
-
-
-def undone_edits(
-    project: Path, errors: Path, count: int, *options: Path | str, seed: int = 9, limit_s: float = LIMIT_S
-) -> dict[str, Any]:
-    """Make random edits through a server, end it, take all back through another one, and make all again.
-
-    They are taken back, and made again, some at a time: 1 to ``MAX_AT_ONCE``.
-    Raises AssertionError: what the server then gives and exports is not to the byte what it was.
-    """
-    chance, edits, refused = Random(seed), 0, 0
-    kinds: set[type[Step]] = set()
-
-    def stepped(server: Served, state: dict[str, Any], what: str, **more: Any) -> dict[str, Any] | None:
-        status, reply = server.ask(f"/api/lines/1/{what}", {"revision": state["revision"], **more})
-        assert status in (200, 422), (status, reply)
-        return dict(reply) if status == 200 else None
-
-    with served(project, errors, *options, limit_s=limit_s) as server:
-        state = server.ready()
-        first = _bytes_of(server)
-        while edits < count:
-            step = random_edit(chance, state)
-            after = stepped(server, state, "edits", steps=[step])
-            if after is None:
-                refused += 1
-            else:
-                edits, state = edits + 1, after
-                kinds.add(type(parse_step(step)))
-        last = _bytes_of(server)
-        server.kill()
-    with served(project, errors, *options, limit_s=limit_s) as server:
-        for what, left, wanted in (("undo", "redo", first), ("redo", "undo", last)):
-            state = server.ready()
-            while state[what]:
-                some = chance.randint(1, min(MAX_AT_ONCE, state[what]))
-                state = stepped(server, state, what, count=some) or {}
-            assert (state[what], state[left]) == (0, count)
-            now = _bytes_of(server)
-            assert [name for name in wanted if now[name] != wanted[name]] == []
-    assert first["motion?of=delivered"] != last["motion?of=delivered"]
-    return {"edits": edits, "refused": refused, "kinds": len(kinds), "compared": sorted(first)}
-
-
-def _bytes_of(server: Served) -> dict[str, bytes]:
-    """Return what a server gives of its line, and the files that it exports, by name; and the file of its edits."""
-    found = {part: server.ask(f"/api/lines/1/{part}")[1] for part in GIVEN}
-    status, reply = server.ask("/api/lines/1/export", {"files": EXPORTED})
-    assert status == 200, reply
-    folder = Path(server.ask("/api/project")[1]["folder"])
-    for name in (*reply["exported"][0]["files"], reply["exported"][0]["edits"]):
-        found[name] = (folder / name).read_bytes()
     return found

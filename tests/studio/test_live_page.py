@@ -1,4 +1,4 @@
-"""Live frames in a real browser: the page of the window, TalkingHead's own module, and three-vrm."""
+"""Live frames in a real browser: the page of the window, and TalkingHead's own module."""
 
 import csv
 from contextlib import contextmanager
@@ -15,18 +15,14 @@ import programs
 from children import LIPMOTION, PIPE, child, wait_until
 from lipmotion import Stream
 from lipmotion.live.consumers import LiveSound, open_consumer
-from lipmotion.live.face import LiveCharacter
-from lipmotion_faces.characters.gltf_document import read_gltf_document, write_container
-from meshes.heads import renamed, write_glb
 from pipeline.made import read_welcome
-from study.browser import check_screens
-from study.firefox import BOTH
+from study.browser import NEEDED, browser, check_screens
 
 pytest.importorskip("websockets", reason="the extra 'live' is not installed")
 
 from lipmotion_studio.live.talking_head import TalkingHead
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, NEEDED]
 SCREENS = ((1200, 800, "light"), (900, 700, "dark"), (320, 560, "light"))
 WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--autoplay-policy=no-user-gesture-required")
 LIMIT_S = 240.0
@@ -34,10 +30,6 @@ SPOKEN_S = 3
 CONNECTED = "return Boolean(globalThis.live?.state.isConnected)"
 CLOCK = (programs.FOLDER / "live_clock.js").read_text("utf-8")
 SHOWN = CLOCK + "return weightsAt(arguments[0]);"
-EXPRESSIONS = {
-    "jawOpen": "aa", "mouthStretchLeft": "ih", "mouthPucker": "ou", "mouthSmileLeft": "ee", "mouthFunnel": "oh"
-}  # fmt: skip
-"""Shapes of the head, and the expressions of VRM that they stand for."""
 
 
 def address_in(text):
@@ -55,12 +47,11 @@ def is_connected(window):
         return False
 
 
-@pytest.mark.parametrize("opens", BOTH)
-def test_the_head_speaks_in_step_with_its_sound(opens, tmp_path):
+def test_the_head_speaks_in_step_with_its_sound(tmp_path):
     command = [*LIPMOTION, "live", "-i", "-", "--rate", 16000, "--to", "window:0", "--to", tmp_path / "a.csv"]
     sound = (read_welcome().samples[: 16000 * SPOKEN_S] * 32767).astype("<i2").tobytes()
     (tmp_path / "home").mkdir()
-    with opens(tmp_path / "home", *WEBGL) as window:
+    with browser(tmp_path / "home", *WEBGL) as window:
         with child(command, stdin=PIPE, stderr=PIPE) as process:
             assert isinstance(process.stderr, TextIOWrapper)
             assert isinstance(process.stdin, TextIOWrapper)
@@ -94,7 +85,7 @@ def test_the_head_speaks_in_step_with_its_sound(opens, tmp_path):
 
 
 @contextmanager
-def open_page(opens, folder, package, capsys):
+def open_page(folder, package, capsys):
     """Give a window with a package's page, which is told the server that was opened; a folder's files lie beside it."""
     place = address_in(capsys.readouterr().err).removeprefix("ws://").rstrip("/")
     modules, name = programs.node_package(package), package.rpartition("/")[2] + ".html"
@@ -104,7 +95,7 @@ def open_page(opens, folder, package, capsys):
     for each in (programs.FOLDER / name, *beside):
         (folder / each.name).symlink_to(each)
     served = partial(SimpleHTTPRequestHandler, directory=str(folder))
-    with ThreadingHTTPServer(("127.0.0.1", 0), served) as server, opens(folder, *WEBGL) as window:
+    with ThreadingHTTPServer(("127.0.0.1", 0), served) as server, browser(folder, *WEBGL) as window:
         Thread(target=server.serve_forever, daemon=True).start()
         window.open(f"http://127.0.0.1:{server.server_port}/{name}?{place}")
         yield window
@@ -113,13 +104,12 @@ def open_page(opens, folder, package, capsys):
     assert problems == []
 
 
-@pytest.mark.parametrize("opens", BOTH[:1])
-def test_talking_head_takes_sound_and_blendshapes(opens, tmp_path, capsys):
+def test_talking_head_takes_sound_and_blendshapes(tmp_path, capsys):
     audio = read_welcome()
     stream, about, frames = Stream(audio.rate_hz), LiveSound(audio.rate_hz), []
     with (
         open_consumer("talkinghead:0", print, about) as head,
-        open_page(opens, tmp_path, "@met4citizen/talkinghead", capsys) as window,
+        open_page(tmp_path, "@met4citizen/talkinghead", capsys) as window,
     ):
         assert isinstance(head, TalkingHead)
         wait_until(lambda: window.run("return globalThis.called?.includes('streamStart')"), LIMIT_S)
@@ -137,34 +127,3 @@ def test_talking_head_takes_sound_and_blendshapes(opens, tmp_path, capsys):
     assert len(queued) > 100
     assert [time for time, _ in queued] == pytest.approx([20.0 * number for number in range(len(queued))], abs=0.2)
     assert [jaw for _, jaw in queued] == pytest.approx([frame["jawOpen"] for frame in frames[first:]], abs=1e-3)
-
-
-def write_vrm(path):
-    """Write the head as a character of VRM 1.0, whose shapes are known by its expressions alone."""
-    write_glb(path, renamed({shape: f"of {name}" for shape, name in EXPRESSIONS.items()}))
-    document = read_gltf_document(path)
-    place = next(place for place, node in enumerate(document.json["nodes"]) if "mesh" in node)
-    shapes = document.json["meshes"][document.json["nodes"][place]["mesh"]]["extras"]["targetNames"]
-    bind = {name: {"node": place, "index": shapes.index(f"of {name}"), "weight": 1} for name in EXPRESSIONS.values()}
-    expressions = {"preset": {name: {"morphTargetBinds": [bind[name]]} for name in bind}}
-    meta = {"name": "head", "authors": ["lipmotion"], "licenseUrl": "https://vrm.dev/licenses/1.0/"}
-    document.json["extensions"] = {"VRMC_vrm": {"specVersion": "1.0", "meta": meta, "expressions": expressions}}
-    document.json["extensionsUsed"] = ["VRMC_vrm"]
-    write_container(path, document.json, bytes(document.buffers[0]))
-
-
-@pytest.mark.parametrize("opens", BOTH[:1])
-def test_three_vrm_takes_the_curves_of_a_character(opens, tmp_path, capsys):
-    write_vrm(tmp_path / "head.vrm")
-    audio, character = read_welcome(), LiveCharacter(tmp_path / "head.vrm")
-    first, *frames = map(character, Stream(audio.rate_hz).push(audio.samples[: 2 * audio.rate_hz]))
-    with open_consumer("websocket:0", print) as take, open_page(opens, tmp_path, "@pixiv/three-vrm", capsys) as window:
-        wait_until(lambda: (take(first), window.run("return globalThis.shown?.['0.00']"))[1], LIMIT_S)
-        for frame in frames:
-            take(frame)
-        wait_until(lambda: window.run("return shown[arguments[0]]", f"{frames[-1].time_s:.2f}"), LIMIT_S)
-        shown = window.run("return shown")
-    for name in EXPRESSIONS.values():
-        told = [frame.weights[name] for frame in frames]
-        assert max(told) > 0.02, name
-        assert [shown[f"{frame.time_s:.2f}"][f"of {name}"] for frame in frames] == pytest.approx(told, abs=1e-3)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from children import wait_until
-from study.browser import BROWSER, DRIVER, MISSING, browser, check_screens
+from study.browser import NEEDED, check_screens
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
 
@@ -14,7 +14,7 @@ from lipmotion_studio.folder import open_folder
 from studio.test_page import LIMIT_S, SCREENS, WELCOME, shown
 from studio.toy_recordings import SENTENCES, write_recordings
 
-pytestmark = [pytest.mark.long, pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING)]
+pytestmark = [pytest.mark.long, NEEDED]
 
 
 def test_a_voice_is_trained_and_used_from_the_page(tmp_path):
@@ -22,7 +22,7 @@ def test_a_voice_is_trained_and_used_from_the_page(tmp_path):
     recordings = os.path.relpath(write_recordings(tmp_path / "recordings"), project)
     with open_folder(WELCOME, project) as folder:
         folder.change(lambda now: replace(now, recordings=recordings))
-    with shown(browser, tmp_path, project) as page:
+    with shown(tmp_path, project) as page:
         window = page.window
         window.click("#own")
         wait_until(lambda: window.text("#own-form"), LIMIT_S)

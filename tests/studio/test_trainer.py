@@ -1,4 +1,3 @@
-import json
 import os
 import signal
 from collections.abc import Iterator
@@ -105,16 +104,12 @@ def test_what_is_stopped_or_killed_goes_on(studio):
     wait_until(lambda: job(studio)["share"] > 0.6)
     studio.studio.trainer.close()  # as where the studio ends meanwhile
     found = Trainer(studio.folder)  # as where it is opened again
-    document = found.describe()
-    assert document is not None
-    assert (document["state"], document["name"]) == ("interrupted", "me")
+    assert (found.describe()["state"], found.describe()["name"]) == ("interrupted", "me")
     kept = Corpus.open(studio.folder.path / TRAINING / "corpus").names()
     assert set(kept) == {f"toy{number:02d}" for number in range(SENTENCES)}
     found.retry()
     wait_until(lambda: not found.is_working and found._thread is None)
-    document = found.describe()
-    assert document is not None
-    assert (document["state"], document["report"]["file"]) == ("done", "voices/me.lipmotion")
+    assert (found.describe()["state"], found.describe()["report"]["file"]) == ("done", "voices/me.lipmotion")
     assert not list((studio.folder.path / "voices").glob("*.unfinished"))
 
 
@@ -138,7 +133,6 @@ def test_what_cannot_be_made_is_refused(studio):
         reply = studio.ask("/api/training", content)
         assert (reply.status, said in reply.content["error"]) == (422, True), reply.content
     assert studio.ask("/api/training").content["job"] is None
-    assert studio.ask("/api/training/restore", {}).status == 422
     studio.folder.change(lambda project: replace(project, recordings=""))
     reply = studio.ask("/api/training", {"kind": "face", "name": "a"})
     assert (reply.status, "--recordings" in reply.content["error"]) == (422, True)
@@ -180,7 +174,7 @@ def test_some_recordings_are_kept_back(toy_corpus):
     assert split_names(toy_corpus, without_list[:9], held_out=True) == (without_list[:9], [])
 
 
-def test_the_time_left_counts_down_and_reports_are_kept(tmp_path, monkeypatch):
+def test_the_time_left_counts_down(tmp_path, monkeypatch):
     folder, now_s, (pipe, tells) = ProjectFolder(tmp_path), [0.0], Pipe(duplex=False)
     folder.change(lambda project: replace(project, recordings="."))
     process = SimpleNamespace(join=lambda: None, kill=tells.close)
@@ -207,49 +201,26 @@ def test_the_time_left_counts_down_and_reports_are_kept(tmp_path, monkeypatch):
     assert told(171.0, report={"minutes": 3.5}) == ("done", 1.0, None)
     tells.close()
     wait_until(lambda: trainer._thread is None)
-    assert trainer.list_earlier() == []
-    pipe, tells = Pipe(duplex=False)
-    trainer.begin("face", "me", [], VoiceOptions())
     for opened in (trainer, Trainer(folder)):  # as it is, and as where the studio is opened again
-        (voice,) = opened.list_earlier()
-        assert (voice["kind"], voice["file"], voice["report"]["minutes"]) == ("voice", "voices/me.lipmotion", 3.5)
-    tells.close()
-    wait_until(lambda: trainer._thread is None)
-    assert [(job["state"], job["kind"]) for job in (trainer.describe() or {}, *trainer.list_earlier())] == [
-        ("failed", "face"),
-        ("done", "voice"),
-    ]
+        document = opened.describe()
+        assert (document["kind"], document["file"], document["report"]["minutes"]) == (
+            "voice",
+            "voices/me.lipmotion",
+            3.5,
+        )
 
 
 HEAD = '{"format": "lipmotion.training", "version": '
 
 
 @pytest.mark.parametrize("damage", ["", "[]", "{}", f"{HEAD}2}}", f"{HEAD}1}}"])
-def test_a_damaged_state_is_an_error_with_a_way_back(tmp_path, damage):
+def test_a_damaged_state_is_set_aside(tmp_path, damage, caplog):
     file = tmp_path / TRAINING / "state.json"
-    wanted = {"kind": "voice", "name": "me", "lines": [], "options": {}}
-    told = {"state": "failed", "error": "no memory"}
-    good = json.dumps({"format": "lipmotion.training", "version": 1, "wanted": wanted, "told": told})
     file.parent.mkdir()
-    file.write_text(good, encoding="utf-8")
-    folder = ProjectFolder(tmp_path)
-    assert Trainer(folder).damage == ""  # and keeps a copy
     file.write_text(damage, encoding="utf-8")
-    trainer = Trainer(folder)
-    assert (trainer.describe(), str(file) in trainer.damage, trainer.is_restorable) == (None, True, True)
-    for act in (trainer.retry, lambda: trainer.begin("voice", "a", [], VoiceOptions())):
-        with pytest.raises(errors.InputError, match="damaged"):
-            act()
-    assert file.read_text(encoding="utf-8") == damage
-    trainer.restore()
-    document = trainer.describe() or {}
-    assert (document["name"], document["error"], trainer.damage) == ("me", "no memory", "")
-    assert [each.read_text(encoding="utf-8") for each in file.parent.glob("*.damaged-*")] == [damage]
-    with pytest.raises(errors.InputError, match="not damaged"):
-        trainer.restore()
-    (file.parent / "state.copy.json").unlink()
-    file.write_text(damage, encoding="utf-8")
-    trainer = Trainer(folder)
-    assert (trainer.is_restorable, "remove" in trainer.damage) == (False, True)
-    with pytest.raises(errors.InputError, match="damaged"):
-        trainer.restore()
+    trainer = Trainer(ProjectFolder(tmp_path))
+    (kept,) = file.parent.iterdir()
+    assert (trainer.describe(), kept.read_text(encoding="utf-8")) == ({}, damage)
+    assert kept.name in caplog.text
+    with pytest.raises(errors.InputError, match="begin with a voice"):
+        trainer.retry()

@@ -1,7 +1,6 @@
 """Lines are what their sounds are, changes name what they saw, damaged edits are an error: two clients of a studio."""
 
 import json
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,7 +13,6 @@ from testing.toy import ToySentence
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
-from lipmotion_studio.folder import ProjectFolder
 from studio.open_studio import OpenStudio, open_studio
 from studio.two_clients import walk
 
@@ -24,22 +22,6 @@ def studio(toy_speech: Path, toy_sentence: ToySentence, toy_model: Model, tmp_pa
     with open_studio(toy_speech, " ".join(toy_sentence.words), toy_model, tmp_path) as opened:
         opened.ready()
         yield opened
-
-
-@pytest.mark.long
-def test_what_is_dropped_under_the_name_of_a_line_that_was_removed_is_a_new_line(studio):
-    sound = (studio.folder.path.parent / "line.wav").read_bytes()
-    first = studio.ask("/api/lines?name=take.wav", sound, x_lipmotion_transcript="mama").content
-    studio.ready(first["id"])
-    assert studio.change("edits", first["id"], steps=["phone 2 is p"]).status == 200
-    path = studio.folder.locate_sound(studio.folder.find_recording(first["id"]))
-    assert studio.change("remove", first["id"]).status == 200
-    other = sound[:-2] + b"\0\1"
-    second = studio.ask("/api/lines?name=take.wav", other, x_lipmotion_transcript="bob").content
-    state = studio.ready(second["id"])
-    assert (second["name"], state["transcript"], state["steps"]) == ("take-2", "bob", [])
-    assert path.read_bytes() == sound
-    assert studio.folder.locate_sound(studio.folder.find_recording(second["id"])).read_bytes() == other
 
 
 def test_a_line_that_was_removed_has_its_edits_when_its_sound_is_added_again(studio):
@@ -76,10 +58,11 @@ def test_every_change_names_the_revision_that_it_saw(studio):
     assert (late.status, len(studio.folder.load_lexicon().user["tear"])) == (409, 1)
 
 
-def test_damaged_edits_are_an_error_with_a_way_back(studio):
+@pytest.mark.parametrize("damaged", [lambda content: content[:-40], lambda _: b"", lambda _: b"\xff\x00{" * 40])
+def test_damaged_edits_are_an_error_with_a_way_back(studio, damaged):
     assert studio.edit("phone 3 is p").status == 200
     seen, file = studio.row(), studio.folder.locate_edits(studio.folder.find_recording(1))
-    damage = file.read_bytes()[:-40]
+    damage = damaged(file.read_bytes())
     file.write_bytes(damage)
     row = studio.row()
     assert (row["status"], str(file) in row["error"]) == ("failed", True)
@@ -107,24 +90,56 @@ def test_edits_that_others_make_of_an_open_line_are_seen(studio):
     assert studio.ready()["steps"] == ["phone 3 is p"]
 
 
-def test_a_project_of_an_earlier_version_adopts_its_sounds(toy_speech, toy_sentence, toy_model, tmp_path, caplog):
-    """It had no digests: what lies there at the first opening is taken, with a warning; another one is refused then."""
+@pytest.mark.parametrize(
+    "damaged", [Path.unlink, lambda file: file.write_text(file.read_text("utf-8").replace('"start_s"', '"stort_s"'))]
+)
+def test_a_line_whose_file_is_lost_or_has_no_phones_is_restored(studio, damaged):
+    assert studio.edit("phone 3 is p").status == 200
+    damaged(studio.folder.locate_edits(studio.folder.find_recording(1)))
+    studio.studio.workspace.forget(1)
+    assert (studio.ready()["status"], studio.ready()["restorable"]) == ("failed", True)
+    assert studio.change("restore").status == 200
+    assert studio.ready()["steps"] == ["phone 3 is p"]
+
+
+@pytest.mark.parametrize("is_moved", [True, False])
+def test_a_line_whose_sound_is_another_one_waits_for_its_own(studio, tmp_path, is_moved):
+    sound = studio.folder.locate_sound(studio.folder.find_recording(1))
+    own = sound.rename(tmp_path / "own")
+    if not is_moved:
+        sound.write_bytes(own.read_bytes()[:-2] + b"\0\1")
+    assert studio.ask("/api/lines/1/sound.wav").status == 422
+    (failed,) = studio.ask("/api/lines/1/export", {"files": [".csv"]}).content["failed"]
+    assert sound.name in failed["error"]
+    studio.studio.workspace.forget(1)
+    assert (studio.ready()["status"], sound.name in studio.ready()["error"]) == ("failed", True)
+    assert studio.edit("phone 3 is p").status == 422
+    own.replace(sound)
+    studio.ask("/api/understand", {"lines": [1]})
+    assert studio.ready()["status"] == "ready"
+
+
+def test_of_changes_at_the_same_time_one_is_made(studio):
+    members = {"revision": studio.ready()["revision"], "steps": ["phone 3 is p"], "text": "bob", "mark": "redo"}
+    requests = [(f"/api/lines/1/{way}", members) for way in ("edits", "transcript", "mark", "remove")] * 2
+    statuses = [reply.status for reply in studio.ask_together(*requests)]
+    assert statuses.count(200) == 1
+    assert set(statuses) <= {200, 404, 409, 503}
+
+
+def test_edits_whose_digest_was_taken_out_get_that_of_their_sound(toy_speech, toy_sentence, toy_model, tmp_path):
     words = " ".join(toy_sentence.words)
     with open_studio(toy_speech, words, toy_model, tmp_path) as studio:
         studio.ready()
         assert studio.edit("phone 3 is p").status == 200
-        file, project = studio.folder.locate_edits(studio.folder.find_recording(1)), studio.folder.path / "project.json"
-    for path, name in ((file, "recording_sha256"), (project, "sha256")):
-        document = json.loads(path.read_text(encoding="utf-8"))
-        for each in (document, *document.get("lines", ())):
-            each.pop(name, None)
-        path.write_text(json.dumps(document), encoding="utf-8")
-    shutil.rmtree(studio.folder.path / "copies")
+        file = studio.folder.locate_edits(studio.folder.find_recording(1))
+    document = json.loads(file.read_text(encoding="utf-8"))
+    del document["recording_sha256"]
+    file.write_text(json.dumps(document), encoding="utf-8")
     with open_studio(toy_speech, words, toy_model, tmp_path) as studio:
-        assert (studio.ready()["steps"], "is taken to be" in caplog.text) == (["phone 3 is p"], True)
-    digest = sha256_of(toy_speech)
-    assert (read_edits(file).sha256, ProjectFolder(project.parent).find_recording(1).sha256) == (digest, digest)
-    assert (project.parent / "copies" / file.name).read_bytes() == file.read_bytes()
+        assert studio.ready()["steps"] == ["phone 3 is p"]
+    assert read_edits(file).sha256 == sha256_of(toy_speech)
+    assert (studio.folder.path / "copies" / file.name).read_bytes() == file.read_bytes()
 
 
 def test_nothing_that_was_acknowledged_is_lost(toy_model, toy_sentence, tmp_path):

@@ -7,8 +7,7 @@ is; what is refused changes nothing; sounds and edits of lines that were removed
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -33,13 +32,6 @@ EDITS = ("phone 2 is p", "pin opening 0.1 at 0.2", "set intensity 1.1", "remove 
 MAX_RECORDINGS = 4
 TWO_WORDS_S = 0.4, 1.24
 """Where the first two words of the sentence are said."""
-DAMAGES: dict[str, Callable[[Path], Any]] = {
-    "cut": lambda file: file.write_bytes(file.read_bytes()[: file.stat().st_size // 2]),
-    "empty": lambda file: file.write_bytes(b""),
-    "noise": lambda file: file.write_bytes(b"\xff\x00{" * 40),
-    "lost": lambda file: file.unlink(),
-    "phones": lambda file: file.write_text(file.read_text(encoding="utf-8").replace('"start_s"', '"stort_s"')),
-}
 
 
 @dataclass
@@ -55,13 +47,11 @@ class Shadow:
     steps: list[str] = field(default_factory=list)
     undone: list[str] = field(default_factory=list)
     versions: dict[str, list[str]] = field(default_factory=dict)
-    damage: str = ""
 
     @property
     def content(self) -> str:
-        """All that a client may have seen of it: damaged phones are found when they are needed."""
-        damage = "" if self.damage.startswith("phones") else self.damage
-        return repr((self.words, self.mark, self.steps, self.undone, self.versions, damage))
+        """All that a client may have seen of it."""
+        return repr((self.words, self.mark, self.steps, self.undone, self.versions))
 
 
 def sounds_of(sentence: ToySentence, folder: Path) -> list[Path]:
@@ -110,15 +100,11 @@ class TwoClients(RuleBasedStateMachine):
     def ready(self, line: Shadow) -> dict[str, Any]:
         state = self.studio.ready(line.number)
         assert (state["name"], state["mark"], state["transcript"] or line.words) == (line.name, line.mark, line.words)
-        if line.damage:
-            assert state["status"] == "failed", state
-            assert "copies" in state["error"]
-        else:
-            assert state["status"] == "ready", state
-            assert (state["steps"], state["redo"]) == (line.steps, len(line.undone))
-            assert {each["name"]: each["digest"] for each in state["versions"]} == {
-                name: digest_edits(steps) for name, steps in line.versions.items()
-            }
+        assert state["status"] == "ready", state
+        assert (state["steps"], state["redo"]) == (line.steps, len(line.undone))
+        assert {each["name"]: each["digest"] for each in state["versions"]} == {
+            name: digest_edits(steps) for name, steps in line.versions.items()
+        }
         return state
 
     def line(self, pick: int) -> Shadow:
@@ -141,7 +127,7 @@ class TwoClients(RuleBasedStateMachine):
             self.ready(line)
             reply = self.ask(*request)
         is_late = self.seen[client, line.number][1] != line.content
-        assert (reply.status == 409) == is_late or (line.damage and reply.status == 422), (what, content, reply.body)
+        assert (reply.status == 409) == is_late, (what, content, reply.body)
         if reply.status != 200:
             assert reply.content["error"]
             type(self).late += reply.status == 409
@@ -241,108 +227,7 @@ class TwoClients(RuleBasedStateMachine):
     def taken_out(self, client: int, pick: int) -> None:
         line = self.line(pick)
         if len(self.lines) > 1 and self.change(client, line, "remove"):
-            self.gone(line)
-
-    def gone(self, line: Shadow) -> None:
-        del self.lines[line.number]
-        self.removed.append(line)
-
-    @rule(
-        pick=st.integers(0, 9),
-        ways=st.permutations(("edits", "transcript", "remove", "mark")),
-        number=st.integers(2, 4),
-    )
-    def together(self, pick: int, ways: list[str], number: int) -> None:
-        """Several changes of one line at the same time, all of who has seen it as it is: one of them is made."""
-        line = self.line(pick)
-        if line.damage or len(self.lines) < 2:
-            return
-        self.look(0, line)
-        contents: dict[str, dict[str, Any]] = {
-            "edits": {"steps": [EDITS[0]]},
-            "transcript": {"text": self.words[1]},
-            "mark": {"mark": "redo"},
-        }
-        requests = [self.request(0, line, way, **contents.get(way, {})) for way in ways[:number]]
-        replies = self.studio.ask_together(*requests, ("/api/project", None), *requests)
-        listed = replies.pop(number)
-        assert listed.status == 200
-        assert len(listed.content["lines"]) in (len(self.lines), len(self.lines) - 1)
-        assert {reply.status for reply in replies} <= {200, 404, 409, 422, 503}, [reply.body for reply in replies]
-        made = [
-            (way, reply.content) for way, reply in zip(ways[:number] * 2, replies, strict=True) if reply.status == 200
-        ]
-        if line.mark == "redo":  # it was that already: nothing has changed, and another change may be made, too
-            made = [each for each in made if each[0] != "mark"] or made[:1]
-        assert len(made) == 1, [(reply.status, reply.body[:200]) for reply in replies]
-        ((way, reply),) = made
-        type(self).acknowledged += 1
-        if way == "remove":
-            self.gone(line)
-        elif way == "mark":
-            line.mark = "redo"
-        elif way == "transcript" and not line.steps:
-            line.words, line.undone = self.words[1], []
-        else:
-            assert reply["steps"][:-1] == line.steps
-            line.steps, line.undone = reply["steps"], []
-
-    @rule(pick=st.integers(0, 9), damage=st.sampled_from(sorted(DAMAGES)), stays=st.booleans())
-    def damaged(self, pick: int, damage: str, stays: bool) -> None:
-        line = self.line(pick)
-        if line.damage:
-            return
-        file = self.studio.folder.locate_edits(self.studio.folder.find_recording(line.number))
-        self.ready(line)
-        DAMAGES[damage](file)
-        line.damage = f"{damage} {file.read_bytes()[:100]!r}" if file.exists() else damage
-        assert self.change(1, line, "edits", steps=[EDITS[0]]) == {}
-        if not stays:
-            self.restored(0, pick)
-
-    @rule(client=st.integers(0, 1), pick=st.integers(0, 9))
-    def restored(self, client: int, pick: int) -> None:
-        line = next((each for each in self.lines.values() if each.damage), self.line(pick))
-        if not line.damage:
-            self.look(client, line)
-            assert self.change(client, line, "restore") == {}
-            return
-        self.look(client, line)
-        if self.change(client, line, "restore"):
-            line.damage = ""
-            self.ready(line)
-
-    @rule(pick=st.integers(0, 9), is_moved=st.booleans(), restarts=st.booleans())
-    def another_sound(self, pick: int, is_moved: bool, restarts: bool) -> None:
-        """In the place of a line's sound lies another one of the same length, or none, for a while."""
-        line = self.line(pick)
-        if line.damage:
-            return
-        self.ready(line)
-        with self.away(line, is_moved):
-            if restarts:
-                self.restarted()
-                state = self.studio.ready(line.number)
-                assert (state["status"], line.sound.name in state["error"]) == ("failed", True)
-                assert (
-                    self.ask(f"/api/lines/{line.number}/edits", {"revision": state["revision"], "steps": []}).status
-                    == 422
-                )
-            assert self.ask(f"/api/lines/{line.number}/sound.wav").status == 422
-            (failed,) = self.ask(f"/api/lines/{line.number}/export", {"files": [".csv"]}).content["failed"]
-            assert line.sound.name in failed["error"]
-        self.ask("/api/understand", {"lines": [line.number]})
-        self.ready(line)
-        assert self.ask(f"/api/lines/{line.number}/sound.wav").status == 200
-
-    @contextmanager
-    def away(self, line: Shadow, is_moved: bool) -> Iterator[None]:
-        place = line.sound.rename(line.sound.with_suffix(".old"))
-        if not is_moved:
-            other = next(each for each in self.sounds if sha256_of(each) != line.sha256)
-            shutil.copy(other, line.sound)
-        yield
-        place.replace(line.sound)
+            self.removed.append(self.lines.pop(line.number))
 
     @rule()
     def restarted(self) -> None:
@@ -353,10 +238,6 @@ class TwoClients(RuleBasedStateMachine):
     def exported(self, pick: int) -> None:
         line = self.line(pick)
         reply = self.ask(f"/api/lines/{line.number}/export", {"files": [".csv"]}).content
-        if line.damage:
-            (failed,) = reply["failed"]
-            assert "copies" in failed["error"]
-            return
         (done,) = reply["exported"]
         file = json.loads((self.studio.folder.path / done["edits"]).read_text(encoding="utf-8"))
         assert (file["steps"], file["recording_sha256"]) == (line.steps, line.sha256)
@@ -369,7 +250,7 @@ class TwoClients(RuleBasedStateMachine):
             (line.number, line.name, line.mark) for line in self.lines.values()
         ]
         for row, line in zip(rows, self.lines.values(), strict=True):
-            if not line.damage and row["status"] == "ready":
+            if row["status"] == "ready":
                 assert (row["edits"], row["edits_digest"]) == (len(line.steps), digest_edits(line.steps))
         for line in [*self.lines.values(), *self.removed]:
             assert sha256_of(line.sound) == line.sha256

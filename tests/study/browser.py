@@ -12,6 +12,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from children import NOWHERE, PIPE, child, environment, wait_until
 
 ELEMENT = "element-6066-11e4-a52e-4f735466cecf"
@@ -19,6 +21,8 @@ PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
 BROWSER = next(filter(None, map(shutil.which, PROGRAMS)), None)
 DRIVER = shutil.which("chromedriver")
 MISSING = "no Chromium with its driver: apt install chromium chromium-driver"
+NEEDED = pytest.mark.skipif(not (BROWSER and DRIVER), reason=MISSING)
+"""For tests of pages."""
 SPACE, ENTER, LEFT, RIGHT = " ", "\ue007", "\ue012", "\ue014"
 ESCAPE, TAB, SHIFT, CONTROL, UP, DELETE = "\ue00c", "\ue004", "\ue008", "\ue009", "\ue013", "\ue017"
 """Keys, as WebDriver names them."""

@@ -14,13 +14,10 @@ PATHS = (
     "/videos/" + "a" * 5000, "/api/state?token=1", "/videos/%c0%ae%c0%ae/study.json", "/application.py",
 )  # fmt: skip
 BODIES = (
-    b"", b"{", b"null", b"[]", b"[" * 5000, b'{"agrees": true', b'{"agrees": false}', b'"' * 100, b"\xff\xfe\x00",
-    b'{"trial": 1e999}', b'{"trial": NaN}', b'{"trial": 0, "trial": 1}', b"1" * 4400, b'{"a": ' * 3000, b"x" * 20_000,
+    b"", b"{", b"null", b"[]", b"[" * 5000, b'{"agrees": true', b"\xff\xfe\x00", b"1" * 4400, b"x" * 20_000,
+    b'{"trial": 1e999}', b'{"trial": NaN}', b'{"trial": 0, "trial": 1}',
     json.dumps({"trial": 0, "values": ["'; DROP TABLE answers; --"], "plays": [1, 1], "seconds": 2}).encode(),
-    json.dumps({"trial": 0, "values": ["first"] * 900, "plays": [1, 1], "seconds": 2}).encode(),
-    json.dumps({"trial": 0, "values": [{"$gt": ""}], "plays": [[[]]], "seconds": [2]}).encode(),
-    json.dumps({"trial": 10**300, "values": ["\ud800"], "plays": [1, 1], "seconds": 10**300}).encode(),
-    json.dumps({"trial": 30, "values": ["first"], "plays": [1, 1], "seconds": 2}).encode(),
+    json.dumps({"trial": 10**300, "values": ["\ud800"], "plays": [[[]]], "seconds": 10**300}).encode(),
 )  # fmt: skip
 METHODS = ("GET", "POST", "PUT", "DELETE", "HEAD", "OPTIONS", "PATCH", "TRACE", "LOCK")
 APIS = ("/api/study", "/api/raters", "/api/state", "/api/answers", "/", "/videos/{video}")

@@ -22,11 +22,10 @@ PATIENCE_S = 60.0
 
 @dataclass(frozen=True)
 class Server:
-    """A server: its process, its port, and a file of all that it printed on standard error."""
+    """A server: its process, and its port."""
 
     process: Child
     port: int
-    errors: Path
 
     def kill(self) -> None:
         """End it as ``kill -9`` does."""
@@ -36,32 +35,30 @@ class Server:
 
 @contextmanager
 def served(folder: Path, errors: Path, port: int = 0) -> Iterator[Server]:
-    """Give a server of a study; ``port`` 0: any that is free."""
+    """Give a server of a study, whose standard error is added to a file; ``port`` 0: any that is free."""
     command = [*LIPMOTION, "study", "serve", folder, "--port", port]
     with errors.open("a", encoding="utf-8") as file, child(command, stderr=file) as process:
         line = process.stdout.readline() if process.stdout else ""
-        yield Server(process, int(line.split("http://127.0.0.1:")[1].split("/")[0]), errors)
+        yield Server(process, int(line.split("http://127.0.0.1:")[1].split("/")[0]))
 
 
 class Connection:
-    """Requests to a server, one after another, over one connection as long as it lasts."""
+    """Requests to a server, one after another, over one connection as long as it lasts; ``headers`` of all of them."""
 
-    def __init__(self, port: int, token: str = "") -> None:
-        self.port, self.token = port, token
-        self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=30)
+    def __init__(self, port: int, headers: dict[str, str], patience_s: float = 30) -> None:
+        self.headers = {"content-type": "application/json", **headers}
+        self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=patience_s)
 
     def ask(self, path: str, content: Any = None) -> tuple[int, Any]:
-        """Return status and content of a reply. Raises an error of ``NO_REPLY``: none came."""
-        headers = {"authorization": f"Bearer {self.token}"} if self.token else {}
+        """Return status and content of a reply: of JSON, the object. Raises an error of ``NO_REPLY``: none came."""
         body = None if content is None else json.dumps(content)
-        if body is not None:
-            headers["content-type"] = "application/json"
         try:
-            self._connection.request("GET" if body is None else "POST", path, body, headers)
+            self._connection.request("GET" if body is None else "POST", path, body, self.headers)
             reply = self._connection.getresponse()
-            return reply.status, json.loads(reply.read())
+            found = reply.read()
+            return reply.status, json.loads(found) if reply.getheader("content-type") == "application/json" else found
         except BaseException:
-            self._connection.close()
+            self.close()
             raise
 
     def ask_until_answered(self, path: str, content: Any = None) -> Any:
@@ -114,16 +111,15 @@ class ScriptedRater(threading.Thread):
     def __init__(self, study: Study, port: int, number: int, pause_s: float = 0.0) -> None:
         super().__init__(name=f"scripted rater {number}", daemon=True)
         self.acknowledged: dict[int, str] = {}
-        self.token = ""
         self.failure: BaseException | None = None
         self._study, self._port, self._number, self._pause_s = study, port, number, pause_s
 
     def run(self) -> None:
         """Take part from the first trial to the last."""
-        connection = Connection(self._port)
+        connection = Connection(self._port, {})
         try:
             now = connection.ask_until_answered("/api/raters", {"agrees": True})
-            self.token = connection.token = now["token"]
+            connection.headers["authorization"] = f"Bearer {now['token']}"
             while now["trial"] < now["trials"]:
                 time.sleep(self._pause_s)
                 value = ("first", "second")[(self._number + now["trial"]) % 2]

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion_studio.study.analysis.crossed import RANKS, SCALES, RatingTable
+from lipmotion_studio.study.analysis.crossed import SCALE, RatingTable
 from lipmotion_studio.study.analysis.paired import PairTable
-from lipmotion_studio.study.answers import FIRST, MOS, PAIRED, RANKING, SECOND, Answer
+from lipmotion_studio.study.answers import FIRST, MOS, PAIRED, SECOND, Answer
 
 Array = NDArray[np.float64]
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(61)
@@ -35,29 +35,23 @@ class Effects:
         return float(np.sqrt(np.square(parts).sum()))
 
 
-def ratings(
-    draw: np.random.Generator,
-    means: Array,
-    sizes: tuple[int, int],
-    effects: Effects,
-    scale: tuple[float, float] = SCALES[MOS],
-) -> RatingTable:
+def ratings(draw: np.random.Generator, means: Array, sizes: tuple[int, int], effects: Effects) -> RatingTable:
     """Return judgements in whole numbers within the scale; ``means``: before rounding [shape=(C,)]."""
     raters, sentences = sizes
     values = means[:, None, None] + effects.rest * draw.normal(size=(len(means), raters, sentences))
     values += effects.rater * draw.normal(size=(1, raters, 1)) + effects.sentence * draw.normal(size=(1, 1, sentences))
     values += effects.rater_each * draw.normal(size=(len(means), raters, 1))
     values += effects.sentence_each * draw.normal(size=(len(means), 1, sentences))
-    values = np.clip(np.round(values), *scale)
-    return RatingTable(_names("c", len(means)), values, np.ones(values.shape, np.intp), scale)
+    values = np.clip(np.round(values), *SCALE)
+    return RatingTable(_names("c", len(means)), values, np.ones(values.shape, np.intp))
 
 
-def expected_rating(mean: float, effects: Effects, scale: tuple[float, float] = SCALES[MOS]) -> float:
+def expected_rating(mean: float, effects: Effects) -> float:
     """Return the mean of all judgements that ``ratings`` could give: of a rounded normal variable within the scale."""
     from scipy.special import ndtr
 
-    limits = np.arange(scale[0], scale[1]) + 0.5
-    return float(scale[0] + ndtr((mean - limits) / effects.whole).sum())
+    limits = np.arange(*SCALE) + 0.5
+    return float(SCALE[0] + ndtr((mean - limits) / effects.whole).sum())
 
 
 def comparisons(
@@ -83,7 +77,7 @@ def expected_preference(odds: Array, effects: Effects) -> Array:
     return shifted @ (WEIGHTS / WEIGHTS.sum())
 
 
-def paired_answers(table: PairTable, seconds: float = 9.0) -> list[Answer]:
+def paired_answers(table: PairTable) -> list[Answer]:
     """Return a table of comparisons as answers."""
     rows = zip(table.rater.tolist(), table.sentence.tolist(), table.shown.tolist(), table.is_first, strict=True)
     return [
@@ -92,30 +86,26 @@ def paired_answers(table: PairTable, seconds: float = 9.0) -> list[Answer]:
             (table.conditions[first], table.conditions[second]),
             bool(is_first),
             trial=trial,
-            seconds=seconds,
         )
         for trial, (rater, sentence, (first, second), is_first) in enumerate(rows)
     ]
 
 
-def pair_answer(
-    who: tuple[str, str], shown: tuple[str, str], is_first: bool, *, trial: int = 0, seconds: float = 9.0
-) -> Answer:
+def pair_answer(who: tuple[str, str], shown: tuple[str, str], is_first: bool, *, trial: int = 0) -> Answer:
     """Return one answer of a rater on a sentence."""
     value = FIRST if is_first else SECOND
-    return Answer(who[0], PAIRED, trial, who[1], "preference", *shown, value, seconds, 2, False, "")
+    return Answer(who[0], PAIRED, trial, who[1], "preference", *shown, value, 9.0, 2, False, "")
 
 
-def rating(who: tuple[str, str], condition: str, value: int, *, kind: str = MOS, seconds: float = 6.0) -> Answer:
+def rating(who: tuple[str, str], condition: str, value: int) -> Answer:
     """Return one judgement of a rater on a sentence."""
-    return Answer(who[0], kind, 0, who[1], "overall", condition, "", str(value), seconds, 1, False, "")
+    return Answer(who[0], MOS, 0, who[1], "overall", condition, "", str(value), 6.0, 1, False, "")
 
 
 def rated_answers(table: RatingTable) -> list[Answer]:
-    """Return a table of judgements as answers; the scale of 100 is a ranking."""
-    kind = RANKING if table.scale == RANKS else MOS
+    """Return a table of judgements as answers."""
     return [
-        rating((f"r{rater}", f"s{sentence}"), table.conditions[condition], int(value), kind=kind)
+        rating((f"r{rater}", f"s{sentence}"), table.conditions[condition], int(value))
         for (condition, rater, sentence), value in np.ndenumerate(table.values)
         if np.isfinite(value)
     ]

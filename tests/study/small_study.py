@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion_studio.study import manifest, settings
-from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
+from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED
 
 CONDITIONS = ("recording", "visemes", "phones")
 SENTENCES = ("one", "two", "three", "four", "five", "six")
-VALUES = {PAIRED: "first", MOS: "3", RANKING: "70"}
+VALUES = {PAIRED: "first", MOS: "3"}
 
 
 def sha256_of(path: Path) -> str:
@@ -23,7 +23,7 @@ def small_study(
     (folder / manifest.VIDEOS).mkdir(parents=True)
     videos = []
     for sentence in sentences:
-        for condition in (*CONDITIONS, *([ANCHOR] if sentence == sentences[0] or kind == RANKING else [])):
+        for condition in (*CONDITIONS, *([ANCHOR] if sentence == sentences[0] else [])):
             data = content + f"{sentence} by {condition}".encode()
             digest = sha256(data).hexdigest()
             videos.append(manifest.StudyVideo(f"{digest[:32]}.mp4", sentence, condition, 0.5, digest, {"made": "test"}))
@@ -60,9 +60,7 @@ def planned(folder: Path, kind: str, sentences: tuple[str, ...], videos: list[ma
 
 def scripted_answer(study: manifest.Study, place: dict[str, Any], value: str = "") -> dict[str, Any]:
     """Return what the page would send for a trial, in whose place a rater is."""
-    trial = next(each for each in study.trials)
-    count = len(place["videos"])
-    asked = {PAIRED: 1, MOS: len(manifest.list_questions(study, trial)), RANKING: count}[study.kind]
+    count, asked = len(place["videos"]), len(manifest.list_questions(study, study.trials[0]))
     return {
         "trial": place["trial"],
         "values": [value or VALUES[study.kind]] * asked,

@@ -13,8 +13,8 @@ import pytest
 from children import wait_until
 from lipmotion.errors import InputError
 from lipmotion_studio.study import store
-from lipmotion_studio.study.answers import KINDS, MOS, PAIRED, RANKING, read_answers
-from lipmotion_studio.study.application import ANSWER_BURST, JOIN_BURST, RateLimit, check_sheet, create_application
+from lipmotion_studio.study.answers import KINDS, MOS, PAIRED, read_answers
+from lipmotion_studio.study.application import ANSWER_BURST, RateLimit, check_sheet, create_application
 from lipmotion_studio.study.manifest import VIDEOS, Study, check_videos, order_trials
 from lipmotion_studio.study.store import AnswerSheet, StudyStore, collect_answers, export_answers, forget_rater
 from lipmotion_studio.verbs.study import run_serve
@@ -134,13 +134,6 @@ def test_too_many_requests_of_one_rater_do_not_stop_another(place):
     assert ask(place.application, "/api/state", token=second).status == 200
 
 
-def test_too_many_raters_at_once_have_to_wait(place):
-    more = 60  # a slow machine lets some more in
-    found = [ask(place.application, "/api/raters", {"agrees": True}).status for _ in range(JOIN_BURST + more)]
-    assert found[:20] == [201] * 20
-    assert 429 in found
-
-
 def test_videos_are_served_whole_and_in_parts_and_nothing_else_is(place):
     video = place.study.videos[0]
     data = (place.folder / "videos" / video.file).read_bytes()
@@ -202,18 +195,14 @@ def test_anything_else_is_refused(tmp_path, changed):
         check_sheet(study, trials, 7, changed)
 
 
-def test_every_scale_and_every_slider_has_a_value(tmp_path):
-    opinions, ranking = small_study(tmp_path / "m", MOS), small_study(tmp_path / "r", RANKING)
-    sent = {"trial": 0, "values": ["01", "2", "3", "4", "5"], "plays": [1], "seconds": 0.5}
-    sheet = check_sheet(opinions, order_trials(opinions, 1), 1, sent)
+def test_every_scale_has_a_value(tmp_path):
+    opinions = small_study(tmp_path / "study", MOS)
+    trials, sent = order_trials(opinions, 1), {"trial": 0, "plays": [1], "seconds": 0.5}
+    sheet = check_sheet(opinions, trials, 1, sent | {"values": ["01", "2", "3", "4", "5"]})
     assert sheet.values == ("1", "2", "3", "4", "5")
     for values in (["1"] * 4, ["0", "2", "3", "4", "5"], ["6", "2", "3", "4", "5"], ["٣", "2", "3", "4", "5"]):
         with pytest.raises(InputError):
-            check_sheet(opinions, order_trials(opinions, 1), 1, sent | {"values": values})
-    sent = {"trial": 0, "values": ["0", "50", "100", "7"], "plays": [1] * 4, "seconds": 2.0}
-    assert check_sheet(ranking, order_trials(ranking, 1), 1, sent).values == ("0", "50", "100", "7")
-    with pytest.raises(InputError):
-        check_sheet(ranking, order_trials(ranking, 1), 1, sent | {"values": ["0", "50", "101", "7"]})
+            check_sheet(opinions, trials, 1, sent | {"values": values})
 
 
 def test_a_burst_and_then_a_rate():
@@ -281,7 +270,7 @@ def test_hostile_requests_get_no_file_and_leave_no_traceback(tmp_path):
     for foreign in (folder / "foreign.mp4", folder / VIDEOS / "foreign.mp4", tmp_path / "foreign.mp4"):
         foreign.write_text(FOREIGN, encoding="utf-8")
     with served(folder, errors) as server:
-        connection = Connection(server.port)
+        connection = Connection(server.port, {})
         token = connection.ask_until_answered("/api/raters", {"agrees": True})["token"]
         video = study.videos[0].file
         secrets = FOREIGN.encode(), (folder / "study.json").read_bytes()[:200], b"SQLite format"
@@ -293,7 +282,7 @@ def test_hostile_requests_get_no_file_and_leave_no_traceback(tmp_path):
         assert {404, 405, 401, 400} <= statuses
         assert max(statuses) < 500
         connection.close()
-        later = Connection(server.port, token)
+        later = Connection(server.port, {"authorization": f"Bearer {token}"})
         wait_until(lambda: later.ask("/api/state")[0] == 200, 60)  # the limit on its requests has passed
         later.close()
         server.kill()

@@ -10,15 +10,14 @@ import pytest
 from children import wait_until
 from lipmotion.types import Audio
 from lipmotion_studio.study import manifest, store
-from lipmotion_studio.study.answers import MOS, PAIRED, RANKING, Answer
-from study.browser import ENTER, LEFT, RIGHT, SPACE, Browser, check_screens
-from study.firefox import BOTH, Opens
+from lipmotion_studio.study.answers import MOS, PAIRED, Answer
+from study.browser import ENTER, LEFT, NEEDED, RIGHT, SPACE, Browser, browser, check_screens
 from study.served import Server, served
 from study.small_study import CONDITIONS, planned, sha256_of
 from testing.toy import write_film
 
 pytest.importorskip("uvicorn", reason="the extra 'study' is not installed")
-pytestmark = [pytest.mark.long, pytest.mark.parametrize("opens", BOTH)]
+pytestmark = [pytest.mark.long, NEEDED]
 SCREENS = ((1200, 900, "light"), (1200, 900, "dark"), (320, 640, "light"), (320, 640, "dark"))
 LIMIT_S = 60.0
 
@@ -39,10 +38,10 @@ def shown_study(folder: Path, kind: str) -> manifest.Study:
 
 
 @contextmanager
-def at_work(opens: Opens, tmp_path: Path, kind: str) -> Iterator[tuple[Browser, Server, manifest.Study]]:
+def at_work(tmp_path: Path, kind: str) -> Iterator[tuple[Browser, Server, manifest.Study]]:
     study = shown_study(tmp_path / "study", kind)
     (tmp_path / "home").mkdir()
-    with served(tmp_path / "study", tmp_path / "errors.txt") as server, opens(tmp_path / "home") as window:
+    with served(tmp_path / "study", tmp_path / "errors.txt") as server, browser(tmp_path / "home") as window:
         window.open(f"http://127.0.0.1:{server.port}/")
         wait_for(window, "welcome")
         yield window, server, study
@@ -89,8 +88,8 @@ def answers(tmp_path: Path) -> list[Answer]:
     return [row for row in store.collect_answers(tmp_path / "study") if not row.practice]
 
 
-def test_pairs_by_keys(opens, tmp_path):
-    with at_work(opens, tmp_path, PAIRED) as (window, _, study):
+def test_pairs_by_keys(tmp_path):
+    with at_work(tmp_path, PAIRED) as (window, _, study):
         check_screens(window, "welcome", SCREENS)
         window.click("#agree")
         wait_for(window, "guide")
@@ -112,8 +111,8 @@ def test_pairs_by_keys(opens, tmp_path):
     assert all(row.plays == 2 and row.seconds >= 0.9 for row in rows)
 
 
-def test_opinions_by_keys(opens, tmp_path):
-    with at_work(opens, tmp_path, MOS) as (window, _, study):
+def test_opinions_by_keys(tmp_path):
+    with at_work(tmp_path, MOS) as (window, _, study):
         join(window)
         check_screens(window, "opinions", SCREENS)
         take_part(window, study, lambda: window.press("1", "2", "3", "4", "5"))
@@ -121,27 +120,10 @@ def test_opinions_by_keys(opens, tmp_path):
     assert values == {"smoothness": "1", "closure": "2", "protrusion": "3", "turning": "4", "overall": "5"}
 
 
-def test_a_ranking_by_sliders(opens, tmp_path):
-    moves = """for (const [n, input] of [...document.querySelectorAll('input[type=range]')].entries()) {
-        input.value = 20 * n; input.dispatchEvent(new Event('input', { bubbles: true })); }"""
-    with at_work(opens, tmp_path, RANKING) as (window, _, study):
-        join(window)
-        check_screens(window, "ranking", SCREENS)
-        window.press(SPACE)
-        wait_until(lambda: is_open(window), LIMIT_S)
-        window.run("document.querySelector('input[type=range]').focus()")
-        window.press(RIGHT, RIGHT)
-        assert window.text("output") == "52"
-        take_part(window, study, lambda: window.run(moves))
-    counted = [row for row in answers(tmp_path) if not row.expected]
-    assert sorted(row.value for row in counted) == ["0", "20", "40", "60"]
-    assert {row.condition for row in counted} == {*CONDITIONS, "anchor"}
-
-
-def test_an_answer_outlives_the_server_and_the_page(opens, tmp_path):
+def test_an_answer_outlives_the_server_and_the_page(tmp_path):
     """The server is killed before an answer comes; the page keeps it, sends it again, and also after a reload."""
     with ExitStack() as stack:
-        window, server, _ = stack.enter_context(at_work(opens, tmp_path, PAIRED))
+        window, server, _ = stack.enter_context(at_work(tmp_path, PAIRED))
         join(window)
         answer(window, lambda: window.press("1"))
         link = window.run("return location.href")

@@ -108,7 +108,7 @@ def test_no_answers_those_of_another_study_and_what_is_no_database_are_refused(f
 SIX = [
     Answer("r1", "paired", 0, 'say "b", now', "preference", "recording", "trajectory", "first", 12.5, 2, False, ""),
     Answer("r1", "mos", 1, "bin blue", "smoothness", "anchor", "", "1", 8.25, 1, True, "1"),
-    Answer("r2", "ranking", 0, "bin blue", "overall", "coupled", "", "100", 30.0, 3, False, ""),
+    Answer("r2", "mos", 0, "bin blue", "overall", "coupled", "", "5", 30.0, 3, False, ""),
 ]
 
 
@@ -128,7 +128,7 @@ def test_no_name_is_a_formula_in_the_table(tmp_path, name):
         ("rater,", "person,", "no column 'rater'; required rater"),
         (",first,", ",neither,", "line 2: the answer 'neither', required 'first' or 'second'"),
         (",12.5,2,0,", ",12.5,two,0,", "line 2: plays"),
-        ("ranking", "guess", "line 4: an answer of the kind 'guess', required one of paired, mos, ranking"),
+        ("r2,mos", "r2,guess", "line 4: an answer of the kind 'guess', required one of paired, mos"),
     ],
 )
 def test_wrong_tables_are_refused(tmp_path, old, new, message):

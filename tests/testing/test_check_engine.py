@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lipmotion.engines import Engine, Fit
-from lipmotion.errors import CorpusError, InputError, ModelFormatError
+from lipmotion.errors import InputError
 from lipmotion.formats import MotionFormat
 from lipmotion.formats.base import MOTION_FORMATS
 from lipmotion.motion import (
@@ -23,7 +23,7 @@ from lipmotion.types import Configuration, Generation, Rule, StateTrace, option
 from lipmotion_faces import Face, make_face
 from lipmotion_faces.testing import check_face
 from lipmotion_faces.tracking.track import track
-from testing.toy import LIPS_TOUCH, toy_motion, toy_sentences, write_toy_recordings
+from testing.toy import toy_motion, toy_sentences, write_toy_recordings
 
 MEANS = {"means": ArraySpec(np.float64, "N Q")}
 
@@ -83,11 +83,6 @@ def with_values(result: Generation, values: Any) -> Generation:
     return replace(result, motion=replace(result.motion, values=values))
 
 
-def make_noisy(result: Generation) -> Generation:
-    values = result.motion.values
-    return with_values(result, values + np.random.default_rng().normal(0, 1e-9, values.shape))
-
-
 def take_names(result: Generation) -> Generation:
     spans = tuple(replace(span, label=replace(span.label, unit="")) for span in result.units)
     return replace(result, units=replace(result.units, spans=spans))
@@ -96,7 +91,6 @@ def take_names(result: Generation) -> Generation:
 RESULTS: list[tuple[Callable[[Generation], Generation], str]] = [
     (lambda result: with_values(result, result.motion.values[::2]), "motion has a row for every frame"),
     (lambda result: with_values(result, np.zeros_like(result.motion.values)), "motion is learned"),
-    (make_noisy, "the same input gives the same bytes"),
     (lambda result: replace(result, trace=StateTrace(("",), result.trace.frames)), "every frame has a state"),
     (take_names, "units keep their times"),
 ]
@@ -115,8 +109,6 @@ def test_a_wrong_result_is_noticed(change, check):
 
     with pytest.raises(ContractError):
         ENGINE_CHECKS[check](TrainedEngine(Changed(Settings())))
-    with pytest.raises(ContractError):
-        check_engine(Changed(Settings()))
 
 
 def broken(**methods: Any) -> TrainedEngine:
@@ -162,20 +154,6 @@ def test_a_method_that_breaks_the_contract_is_noticed(methods, check, message):
         ENGINE_CHECKS[check](broken(**methods))
 
 
-@pytest.mark.parametrize("error", [InputError, CorpusError, ModelFormatError])
-def test_an_error_of_the_engine_names_the_check(error):
-    def generate(*_: Any) -> Any:
-        raise error("out of order")
-
-    with pytest.raises(ContractError, match=f"motion has a row for every frame: .*{error.__name__}: out of order"):
-        check_engine(broken(generate=generate).engine)
-
-
-def test_a_configuration_that_is_none_is_noticed():
-    with pytest.raises(ContractError, match="configuration can be stored"):
-        check_engine(MeanPoses(None))  # type: ignore[arg-type]
-
-
 class Bars(Face):
     """A small face that keeps the contract."""
 
@@ -205,12 +183,7 @@ def test_faces_that_break_it():
     for face, words in (
         (draw(lambda frames: frames[1:]), "frames, required"),
         (draw(lambda frames: [frame[:63] for frame in frames]), "H and W even"),
-        (draw(lambda frames: [frame.astype(float) for frame in frames]), "not uint8"),
         (draw(lambda frames: [frames[0]] * len(frames)), "does not move"),
-        (
-            draw(lambda frames: [np.random.default_rng().integers(0, 255, x.shape, np.uint8) for x in frames]),
-            "other pix",
-        ),
         (draw(lambda frames: frames, checked=False), "not finite: no error"),
     ):
         with pytest.raises(ContractError, match=words):
@@ -220,16 +193,6 @@ def test_faces_that_break_it():
 def test_formats_that_keep_the_contract():
     for name in MOTION_FORMATS.names:
         check_exporter(MOTION_FORMATS.load(name))
-
-
-def nothing(path: Path, *_: Any) -> None:
-    """Write an empty file."""
-    path.write_bytes(b"")
-
-
-def by_chance(path: Path, *_: Any) -> None:
-    """Write other bytes each time."""
-    path.write_bytes(np.random.default_rng().bytes(16))
 
 
 def test_formats_that_break_it():
@@ -244,8 +207,7 @@ def test_formats_that_break_it():
         return replace(motion, rate_hz=motion.rate_hz / 2), units
 
     for broken, words in (
-        (MotionFormat(nothing), "no file, or an empty one"),
-        (MotionFormat(by_chance), "other bytes"),
+        (MotionFormat(lambda *_: None), "no file, or an empty one"),
         (MotionFormat(npz.write, wrong), "values come back that differ"),
         (MotionFormat(npz.write, slower), "Hz come back"),
     ):
@@ -254,22 +216,6 @@ def test_formats_that_break_it():
 
 
 FPS = 25.0
-
-
-@pytest.mark.parametrize("rate_hz", [25.0, 30.0, 100.0])
-def test_the_mouth_is_shut_in_silence_and_touches_in_p_b_m(rate_hz):
-    for sentence in toy_sentences(12):
-        motion = toy_motion(sentence.units, rate_hz)
-        first, last = sentence.units.spans[0].end_s, sentence.units.spans[-1].start_s
-        quiet = (motion.time_s < first - 0.1) | (motion.time_s > last + 0.1)
-        assert quiet.sum() > 0.5 * rate_hz
-        assert (motion["opening"][quiet] == 0).all()
-        for span in sentence.units:
-            inside = (motion.time_s >= span.start_s) & (motion.time_s < span.end_s)
-            if span.label.phone in LIPS_TOUCH:
-                assert motion["opening"][inside].min() == 0
-            elif span.label.phone == "aa":
-                assert motion["opening"][inside].max() > 0.2
 
 
 @pytest.mark.long

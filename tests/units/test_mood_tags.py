@@ -1,3 +1,6 @@
+import json
+from pathlib import Path
+
 import pytest
 
 from lipmotion.types import Span, Timeline, Unit
@@ -15,41 +18,10 @@ def test_tags_hold_until_the_next_and_end_tags_are_neutral():
     assert tags == tuple(MoodTag(*each) for each in wanted)
 
 
-@pytest.mark.parametrize(
-    ("text", "words", "named"),
-    [
-        ("[plays the harp] hello <b>you</b>", "hello you", "[plays the harp], <b>, </b>"),
-        ("“What the {i}heck{/i}?{w=0.5} My {b}boat{/b} is gone.”", "what the heck my boat is gone", "{w=0.5}"),
-        ("<color=#f00>re</color>d un<b>believ</b>able <sprite index=1>", "red unbelievable", "<sprite index=1>"),
-        ("[wave]hey[/wave] you #line:0e12a", "hey you", "#line:0e12a"),
-        ("See [[Go north|North]] <<set $y to 2>> (set: $x to 1)", "see go north", "<<set $y to 2>>"),
-        ('<speak>hi<break time="1s"/>you</speak>', "hi you", '<break time="1s"/>'),
-        ("*coughs* hi (clears his throat) <|en|>you", "hi you", "*coughs*, (clears his throat), <|en|>"),
-        ("ANNA\uff1a hi\\nyou", "hi you", "ANNA\uff1a, \\n"),
-        ("*really* so", "really so", ""),
-        ("ANNA: Please speak.\nBEN: I will.", "please speak i will", "ANNA:, BEN:"),
-        ("ZOË: Hi", "hi", "ZOË:"),
-        ("Anna (V.O.): Hi", "hi", "Anna (V.O.):"),
-        ("[Anna]: Hi\n[ANNA] you", "hi you", "[Anna]:, [ANNA]"),
-        ("**ANNA:** Hi", "hi", "ANNA"),
-        ("Anna: Hi\nBen: Hello", "hi hello", "Anna:, Ben:"),
-        ("SPEAKER 1: a\nspeaker 2: b", "a b", "speaker 2:"),
-        ("- Hello.\n- Hi.", "hello hi", ""),
-        ("INT. HUT - DAY\n\nANNA\n(low)\nSpeak.\n\nBEN (O.S.)\nI do.", "speak i do", "INT. HUT - DAY, (low)"),
-        ("Note: this is said.", "note this is said", ""),
-        ("He said: go\nAt 5:30: run", "he said go at five thirty run", ""),
-        ("HELP\nme now", "help me now", ""),
-        ("0:00\nhi\nAnna Lee  1:07\nyou", "hi you", "0:00, Anna Lee  1:07"),
-        ("(00:04) hi\n00:00:09 - you", "hi you", "(00:04), 00:00:09 -"),
-        ("1. One hi\n2.You\n3) 20\na) the\nb) end", "one hi you twenty the end", "1., 2., 3), a), b)"),
-        ("2. you\n4. me", "two you four me", ""),
-        ("5:30 is early\n7:15 is late", "five thirty is early seven fifteen is late", ""),
-        ('e "Hello"', "hello", "e"),
-        ('e happy "Hello"\n"A voice."\nm "Hi \\"you\\""', "hello a voice hi you", "e happy, m"),
-        ('she said "hello"', "she said hello", ""),
-        ('Then he went "Hello" and left', "then he went hello and left", ""),
-    ],
-)
+MARKUP = json.loads(Path(__file__).with_name("said_texts.json").read_text("utf-8"))["markup"]
+
+
+@pytest.mark.parametrize(("text", "words", "named"), MARKUP)
 def test_markup_and_names_of_speakers_are_named_and_not_spoken(caplog, text, words, named):
     assert " ".join(split_words(parse_tagged_text(text).text)) == words
     assert named in caplog.text

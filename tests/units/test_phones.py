@@ -15,12 +15,6 @@ UNSAID_IN_GRID = ("er", "hh", "ng", "oy", "sh", "uh", "zh")
 """What a model of GRID's speaker s1 must borrow."""
 
 
-def test_the_first_relative_that_is_known_stands_in() -> None:
-    for phone in PHONES:
-        for position, relative in enumerate(SIMILAR_PHONES[phone]):
-            assert find_similar_phone(phone, set(PHONES) - {phone, *SIMILAR_PHONES[phone][:position]}) == relative
-
-
 def steps_to(phone: str) -> dict[str, int]:
     """Return over how many relatives every other phone is reached."""
     steps = {phone: 0}
@@ -44,26 +38,15 @@ def test_vowels_stand_in_for_vowels() -> None:
         assert (chosen in VOWELS) == (phone in VOWELS)
 
 
-TABLE_1 = """
-sip sil sp
-lr1 ao aa ah er oy aw hh
-lr2 uw uh ow em
-lr3 ae eh ey ay
-lr4 ih iy ax axr ix
-as  l el r y
-af  s z
-al  t d n en
-pa  sh zh ch jh
-bi  p b m
-de  th dh
-ld  f v
-ve  ng k g w
-"""
+TABLE_1 = (
+    "sip sil sp; lr1 ao aa ah er oy aw hh; lr2 uw uh ow em; lr3 ae eh ey ay; lr4 ih iy ax axr ix; as l el r y; af s z; "
+    "al t d n en; pa sh zh ch jh; bi p b m; de th dh; ld f v; ve ng k g w"
+)
 """Xie & Liu 2007, Table 1, copied from the paper line by line."""
 
 
 def test_the_visemes_are_those_of_the_paper() -> None:
-    printed = {line.split()[0]: tuple(line.split()[1:]) for line in TABLE_1.strip().splitlines()}
+    printed = {line.split()[0]: tuple(line.split()[1:]) for line in TABLE_1.split("; ")}
     assert printed == VISEMES
     assert len(VISEMES) == 13
 

@@ -24,41 +24,6 @@ ANY = st.one_of(st.integers(32, 126), st.integers(0, 0xD7FF), st.integers(0xE000
 """Any character. The tables by which Hypothesis chooses one by its kind take a second and 200 MB."""
 
 
-def test_texts() -> None:
-    for text, words in (
-        ("Hello, world!", "hello world"),
-        ("twenty-one well—known", "twenty one well known"),
-        ("DON'T don’t rock'n'roll O’Neil’s", "don't don't rock'n'roll o'neil's"),
-        ("“Hello there”", "hello there"),
-        ("one\ttwo\r\nthree\n\n", "one two three"),
-        ("a_b", "a b"),
-        ("cafe\u0301 CAFÉ", "café café"),  # composed or not, a letter is the same
-        ("\ufeffhello", "hello"),
-        ("日本 ελλάδα", "日本 ελλάδα"),
-        ("[laughs] (hm) *so*", "laughs hm so"),
-        ("bin blue at f 2 now", "bin blue at f two now"),
-        ("x2", "x two"),
-        ("1,234 and 12,34", "one thousand two hundred thirty four and twelve thirty four"),
-        ("٣", "three"),
-        ("the 3rd, 21ST and 12th", "the third twenty first and twelfth"),
-        ("30th 100th 1,000th", "thirtieth one hundredth one thousandth"),
-        ("3 rd 3rds x3rd", "three rd three rds x three rd"),
-        ("$1 £1.01 €0.50", "one dollar one pound and one penny fifty cents"),
-        ("$3 million, £2.5 billion", "three million dollars two point five billion pounds"),
-        ("$0 $0.00 $5.5", "zero dollars zero dollars five point five dollars"),
-        ("$ 7", "seven dollars"),
-        ("7% 8 % ٩٪ %", "seven percent eight percent nine"),
-        ("St. Mary's, Henry VIII's 1995's", "saint mary's henry the eighth's nineteen ninety five's"),
-        ("you &amp; me &#39;", "you and me"),
-    ):
-        assert " ".join(units.split_words(text)) == words
-
-
-def test_quotation_marks_are_not_spoken() -> None:
-    for text in ("say 'hello'.", "say ‘Hello’", "say hello'", "say 'hello", "say “hello”", "SAY «HELLO»"):
-        assert units.split_words(text) == ("say", "hello")
-
-
 def test_a_text_without_words_is_refused() -> None:
     for text in ("", "   \n", "...", "—", "'", "’’", "🙂", "_"):
         with pytest.raises(InputError, match="holds no word; give the words that are spoken"):
@@ -67,10 +32,7 @@ def test_a_text_without_words_is_refused() -> None:
 
 def test_numbers() -> None:
     for digits, words in (
-        ("0", "zero"), ("10", "ten"), ("19", "nineteen"), ("20", "twenty"), ("99", "ninety nine"),
-        ("100", "one hundred"), ("101", "one hundred one"), ("1000", "one thousand"), ("1001", "one thousand one"),
-        ("110000", "one hundred ten thousand"), ("2000000", "two million"), ("1000000001", "one billion one"),
-        ("1000000000000", "one" + " zero" * 12), ("00", "zero zero"),
+        ("0", "zero"), ("1000000001", "one billion one"), ("1000000000000", "one" + " zero" * 12), ("00", "zero zero"),
     ):  # fmt: skip
         assert " ".join(spell_number(digits)) == words
     assert units.split_words("7" * 10_000) == ("seven",) * 10_000  # numbers of any length are digits

@@ -1,6 +1,6 @@
 """A face mesh that answers as a test tells it to."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
 from typing import Any
 
@@ -28,20 +28,6 @@ class Opened(AbstractContextManager[Any]):
         pass
 
 
-class ScriptedMesh(Opened):
-    """Stands for the face mesh: one answer a frame, None for no face."""
-
-    last: NDArray[np.float64] | None = None
-
-    def __init__(self, answers: Iterator[NDArray[np.float64] | None], most: int) -> None:
-        self.answers, self.most = answers, most
-
-    def find_faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:  # noqa: ARG002
-        if self.most == 1:
-            ScriptedMesh.last = next(self.answers)
-        return [] if self.last is None else [self.last]
-
-
 class NoFinder(Opened):
     """Stands for the detector, which finds no more than the mesh."""
 
@@ -49,22 +35,44 @@ class NoFinder(Opened):
         return []
 
 
-class Scripted(LandmarkTracker):
-    """The faces that ``script`` was given."""
+class StandIn(LandmarkTracker):
+    """A tracker of what a test gives it: a mesh, opened for so many faces, and a detector."""
 
-    answers: Iterator[NDArray[np.float64] | None] = iter(())
+    mesh: Callable[..., Any]
+    finder: Callable[[], Any] = NoFinder
 
     def list_versions(self) -> dict[str, str]:
         return {"mediapipe": "scripted"}
 
-    def open_point_finder(self, most: int = 1) -> ScriptedMesh:
-        return ScriptedMesh(self.answers, most)
+    def open_point_finder(self, most: int = 1) -> Any:
+        return type(self).mesh(most)
 
-    def open_box_finder(self) -> NoFinder:
-        return NoFinder()
+    def open_box_finder(self) -> Any:
+        return type(self).finder()
+
+
+class ScriptedMesh(Opened):
+    """Stands for the face mesh: one answer a frame, None for no face."""
+
+    answers: Iterator[NDArray[np.float64] | None] = iter(())
+    last: NDArray[np.float64] | None = None
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+
+    def find_faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:  # noqa: ARG002
+        if self.most == 1:
+            ScriptedMesh.last = next(self.answers)
+        return [] if self.last is None else [self.last]
+
+
+class Scripted(StandIn):
+    """The faces that ``script`` was given."""
+
+    mesh = ScriptedMesh
 
 
 def script(monkeypatch: pytest.MonkeyPatch, answers: Iterable[NDArray[np.float64] | None]) -> None:
     """Let the faces of the next video be these, one answer a frame."""
-    Scripted.answers = iter(answers)
+    ScriptedMesh.answers = iter(answers)
     monkeypatch.setitem(TRACKERS.built_in, "mediapipe", f"{__name__}:Scripted")  # type: ignore[arg-type]

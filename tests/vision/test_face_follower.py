@@ -1,6 +1,4 @@
-import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
@@ -8,10 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion.errors import MissingDependencyError
 from lipmotion_faces.tracking import face_follower, mediapipe, trackers
 from lipmotion_faces.tracking import face_follower as follow
-from vision.scripted import Opened
+from vision.scripted import Opened, StandIn
 
 HEIGHT, WIDTH = 240, 320
 EYES = [trackers.TRACKED_POINTS.index(index) for index in trackers.EYE_CORNERS]
@@ -38,8 +35,7 @@ def points(face: Face) -> NDArray[np.float64]:
     return found
 
 
-SMALL_FACE_PX = 40
-"""A face with a smaller distance between the eyes is found by the detector alone."""
+SMALL_FACE_PX = 40  # a face with a smaller distance between the eyes is found by the detector alone
 
 
 class Mesh(Opened):
@@ -61,17 +57,10 @@ class Finder(Opened):
         return [trackers.FaceBox(x, y, 2 * unit, 0.9) for _, x, y, unit in Mesh.shown]
 
 
-class Shown(trackers.LandmarkTracker):
+class Shown(StandIn):
     """Finds the faces of the frame that is being shown."""
 
-    def list_versions(self) -> dict[str, str]:
-        return {}
-
-    def open_point_finder(self, most: int = 1) -> Mesh:
-        return Mesh(most)
-
-    def open_box_finder(self) -> Finder:
-        return Finder()
+    mesh, finder = Mesh, Finder
 
 
 class SmallMesh:
@@ -172,13 +161,6 @@ def test_a_small_face_that_is_lost_is_searched_where_it_was(show: Show) -> None:
     assert SmallMesh.open == 0
 
 
-def test_of_several_small_ones_the_largest_then_the_known_one(show: Show) -> None:
-    larger = ("b", 110.0, 60.0, 36.0)
-    assert set(show([([SMALL_ANNA, larger], 0)] * 4)[1]) == {110.0}
-    known, _ = show([([SMALL_ANNA], 0)] * 8)
-    assert set(show([([SMALL_ANNA, larger], 0)] * 4, known.list_thumbnails())[1]) == {220.0}
-
-
 def test_only_the_person_who_is_wanted_counts(show: Show) -> None:
     wanted = show([([ANNA], 0)] * 8)[0].list_thumbnails()
     follower, _ = show([([BELLA], 1)] * 20 + [([ANNA], 0)] * 5, wanted)
@@ -243,15 +225,6 @@ def test_positions_in_the_window_are_those_in_the_picture():
         np.testing.assert_allclose(window.to_picture(middle_of_bright(shown)), [484, 314, 0], atol=0.6)
     scaled = face_follower.FaceWindow(10, 20, 2 * face_follower.SIZE_PX).to_picture(np.array([[3.0, 4.0, 5.0]]))
     np.testing.assert_allclose(scaled, [[16.0, 28.0, 10.0]])  # depth is scaled, too
-
-
-def test_beyond_the_edges_it_is_black():
-    for x, y in ((4, 4), (1270, 4), (4, 710), (1270, 710)):
-        window = face_follower.FaceWindow.place(x, y, 300)
-        shown = window.cut(bright(720, 1280, x - 4, y - 4, 8))
-        np.testing.assert_allclose(window.to_picture(middle_of_bright(shown)), [x, y, 0], atol=3)
-        assert (shown == 0).mean() > 0.9
-    assert not face_follower.FaceWindow(2000, 0, 100).cut(np.full((72, 128, 3), 255, np.uint8)).any()
 
 
 class BrightMesh:
@@ -331,38 +304,3 @@ def test_a_large_picture_is_reduced_and_the_box_is_not(finder):
     boxes = finder.find_boxes(bright(2160, 3840, 900, 600, 300))
     assert finder._running.shapes == [(720, 1280)]
     assert (boxes[0].x, boxes[0].y, boxes[0].side) == pytest.approx((1050, 750, 300), abs=3)
-
-
-@pytest.mark.parametrize(("height", "width"), [(720, 1280), (1280, 720), (600, 600)])
-def test_parts_cover_the_picture(height, width):
-    covered = np.zeros((height, width), bool)
-    for left, top, side in mediapipe.list_parts(height, width):
-        assert 0 <= left <= width - side
-        assert 0 <= top <= height - side
-        covered[top : top + side, left : left + side] = True
-    assert covered.all()
-
-
-def test_missing_mediapipe_is_named_when_it_is_first_needed(monkeypatch):
-    monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
-    with mediapipe.FaceFinder() as finder, pytest.raises(MissingDependencyError):
-        finder.find_boxes(np.zeros((48, 64, 3), np.uint8))
-
-
-@pytest.mark.video
-@pytest.mark.recordings
-@pytest.mark.parametrize("scale", [1.0, 0.4])
-def test_a_face_in_a_large_picture(recordings: Path, scale: float):
-    """The outer eye corners of this face are 66 px apart: 26 at the smaller scale."""
-    pytest.importorskip("mediapipe")
-    cv2 = pytest.importorskip("cv2")
-    from vision.variants import frames_of
-
-    frame = cv2.resize(frames_of(recordings / "grid-s1" / "clips" / "bbaf2n.mkv")[0], None, fx=scale, fy=scale)
-    image = np.full((720, 1280, 3), 128, np.uint8)
-    image[100 : 100 + frame.shape[0], 700 : 700 + frame.shape[1]] = frame
-    with mediapipe.FaceFinder() as finder:
-        boxes = finder.find_boxes(image)
-    assert len(boxes) == 1
-    assert boxes[0].x == pytest.approx(700 + 157 * scale, abs=12)
-    assert boxes[0].y == pytest.approx(100 + 175 * scale, abs=20)

@@ -15,7 +15,6 @@ from lipmotion_faces.tracking.frames import (
     VideoFrame,
     VideoSpan,
     count_frames,
-    find_nearest,
     find_nominal_rate,
     open_video,
     resample_to_constant_rate,
@@ -194,12 +193,6 @@ def test_pictures_larger_than_stated_are_not_decoded(tmp_path):
         assert len(video.damage) == 5
 
 
-@pytest.mark.long
-def test_more_pixels_than_a_cinema_shows(write_video):
-    with pytest.raises(InputError, match="pictures of 4112 × 2304 pixels, required at most 9437184 in all; scale"):
-        all_frames(write_video(ticks=[0], size=(4112, 2304)))
-
-
 @pytest.mark.parametrize(("name", "subtitles"), [("a.mkv", "subrip"), ("a.mp4", "mov_text")])
 def test_subtitles_that_go_on_after_the_pictures(tmp_path, name, subtitles):
     with av.open(str(tmp_path / name), "w") as container:
@@ -247,18 +240,6 @@ def test_the_stated_rate_is_believed_when_it_fits():
     assert count_frames(np.array([0, 0.033, 0.067, 2.967]), 30.0) == 90
 
 
-def test_nearest_is_nearest():
-    times_s, wanted_s = np.sort(np.random.default_rng(1).random(30)), np.linspace(-0.2, 1.2, 99)
-    expected = np.abs(times_s[None] - wanted_s[:, None]).min(axis=1)
-    np.testing.assert_array_equal(np.abs(times_s[find_nearest(times_s, wanted_s)] - wanted_s), expected)
-    assert find_nearest(np.array([3.0]), wanted_s).tolist() == [0] * 99
-
-
-def test_frames_in_their_place_stay_as_they_are():
-    values = np.random.default_rng(2).normal(size=(50, 3))
-    np.testing.assert_array_equal(resample_to_constant_rate(np.round(np.arange(50) / 30, 3), values, 30.0, 50), values)
-
-
 def test_dropped_frames_are_found_again_by_their_time():
     times_s = np.arange(100) / 25
     curve = np.stack([np.sin(2 * np.pi * 1.5 * times_s), np.cos(2 * np.pi * times_s)], axis=1)
@@ -268,15 +249,6 @@ def test_dropped_frames_are_found_again_by_their_time():
     np.testing.assert_allclose(result, curve, atol=0.02)
 
 
-def test_jittered_frames_are_put_on_the_grid():
-    rng = np.random.default_rng(3)
-    times_s = np.sort(np.arange(100) / 25 + rng.uniform(-0.012, 0.012, 100))
-    curve = np.sin(2 * np.pi * 1.5 * times_s)[:, None]
-    inner = slice(2, 97)
-    result = resample_to_constant_rate(times_s, curve, 25.0, 100)[inner, 0]
-    np.testing.assert_allclose(result, np.sin(2 * np.pi * 1.5 * np.arange(100) / 25)[inner], atol=0.02)
-
-
 def test_long_gaps_are_straight_and_ends_constant():
     values = np.random.default_rng(4).normal(size=(60, 2))
     kept = np.r_[5:20, 40:55]
@@ -284,9 +256,3 @@ def test_long_gaps_are_straight_and_ends_constant():
     np.testing.assert_array_equal(result[:5], np.tile(values[5], (5, 1)))
     np.testing.assert_array_equal(result[55:], np.tile(values[54], (5, 1)))
     np.testing.assert_allclose(np.diff(result[19:41], n=2, axis=0), 0, atol=1e-12)
-
-
-def test_a_few_frames_suffice():
-    for count in (1, 2, 3):
-        result = resample_to_constant_rate(np.arange(count) / 5, np.ones((count, 2)), 25.0, 12)
-        np.testing.assert_allclose(result, 1)

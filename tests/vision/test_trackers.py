@@ -10,21 +10,14 @@ from children import run_child
 from lipmotion import errors, extensions, prepare
 from lipmotion_faces.tracking import mediapipe, packages, trackers
 from lipmotion_faces.tracking.track import track
-from vision.scripted import NoFinder, Opened
+from vision.scripted import Opened, StandIn
 
 
-class Brightest(trackers.LandmarkTracker, Opened):
+class BrightestFace(Opened):
     """Finds a face around the brightest place of a picture."""
 
-    def list_versions(self) -> dict[str, str]:
-        return {"brightest": "2"}
-
-    def open_point_finder(self, most: int = 1) -> "Brightest":
+    def __init__(self, most: int) -> None:
         assert most in (1, 4)
-        return self
-
-    def open_box_finder(self) -> NoFinder:
-        return NoFinder()
 
     def find_faces(self, image: np.ndarray) -> list[np.ndarray]:
         y, x = (int(place) for place in np.unravel_index(int(image[..., 0].argmax()), image.shape[:2]))
@@ -32,6 +25,10 @@ class Brightest(trackers.LandmarkTracker, Opened):
         for side, corner in zip((-20, 20), trackers.EYE_CORNERS, strict=True):
             points[trackers.TRACKED_POINTS.index(corner)] = x + side, y, 0
         return [points]
+
+
+class Brightest(StandIn):
+    mesh = BrightestFace
 
 
 @pytest.fixture

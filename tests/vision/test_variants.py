@@ -7,11 +7,10 @@ from numpy.typing import NDArray
 from lipmotion import errors, types
 from lipmotion_faces.tracking import mediapipe, trackers
 from lipmotion_faces.tracking.track import track
-from vision.variants import Image, covered, frames_of, in_a_room, write_frames, zoomed
+from vision.variants import Image, covered, frames_of, write_frames
 
 pytestmark = [pytest.mark.video, pytest.mark.recordings]
 
-COUNT = 75
 MIDDLE = range(30, 40)
 
 
@@ -61,28 +60,6 @@ def unseen(found: types.Track) -> list[int]:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("size", "scale", "least"),
-    [
-        ((1280, 720), 0.6, 0.95),  # 40 px
-        ((2560, 1440), 2.0, 0.97),
-    ],
-)
-def test_a_face_that_is_small_in_the_picture(
-    tmp_path: Path, frames: list[Image], usual: types.Track, size: tuple[int, int], scale: float, least: float
-) -> None:
-    width, height = size
-    shown = in_a_room(
-        frames, size, scale, lambda n: (0.6 * width + 15 * scale * np.sin(n / 9), 0.35 * height + 8 * np.sin(n / 7))
-    )
-    found = track(write_frames(tmp_path / "a.mp4", shown, options={"crf": "15", "preset": "veryfast"}))
-    assert unseen(found) == []
-    assert alike(found, usual) > least
-    assert found.crops is not None
-    assert found.crops[40].std() > 10
-
-
-@pytest.mark.long
 def test_something_before_the_mouth(
     tmp_path: Path, frames: list[Image], usual: types.Track, mouths: list[tuple[NDArray[np.float64], float]]
 ) -> None:
@@ -105,21 +82,6 @@ def test_somebody_else_between(
     assert unseen(found) == list(MIDDLE)
     assert alike(found, usual) > 0.99
     assert found.notes[:2] == ("cut at 1.20 s", "cut at 1.60 s")
-
-
-def test_half_of_it_somebody_else_is_refused(
-    tmp_path: Path, frames: list[Image], stranger: tuple[list[Image], types.Track]
-) -> None:
-    path = write_frames(tmp_path / "a.mp4", [*frames[:38], *stranger[0][38:75]])
-    with pytest.raises(errors.InputError, match=r"no face in 37 of 75 frames \(cut at 1\.52 s; another face"):
-        track(path, crops=False)
-
-
-def test_a_jump_cut_to_the_same_person_is_followed(tmp_path: Path, frames: list[Image], usual: types.Track) -> None:
-    found = track(write_frames(tmp_path / "a.mp4", [*frames[:38], *zoomed(frames[38:])]), crops=False)
-    assert unseen(found) == []
-    assert alike(found, usual) > 0.98
-    assert found.notes == ("cut at 1.52 s",)
 
 
 def test_damage_is_told(tmp_path: Path, frames: list[Image], usual: types.Track) -> None:

@@ -1,6 +1,6 @@
 """A real clip made into what people record: with other frame times, cuts, neighbours and damage."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -45,31 +45,6 @@ def write_frames(
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
     return path
-
-
-def in_a_room(
-    frames: Sequence[Image], size: tuple[int, int], scale: float, at: Callable[[int], tuple[float, float]]
-) -> list[Image]:
-    """Return the pictures, scaled, in larger ones of a width and height; in frame n their middle is ``at(n)``, px."""
-    import cv2
-
-    patches = np.random.default_rng(0).integers(60, 180, (6, 9, 3)).astype(np.uint8)
-    room = cv2.GaussianBlur(cv2.resize(patches, size, interpolation=cv2.INTER_NEAREST), (0, 0), 8)
-    shown = []
-    for n, frame in enumerate(frames):
-        x, y = at(n)
-        place = np.array(
-            [[scale, 0, x - scale * frame.shape[1] / 2], [0, scale, y - scale * frame.shape[0] / 2]], np.float64
-        )
-        mask = cv2.warpAffine(np.ones(frame.shape[:2], np.uint8), place, size)[..., None]
-        body = cv2.warpAffine(frame, place, size, flags=cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC)
-        shown.append(np.where(mask > 0, body, room))
-    return shown
-
-
-def zoomed(frames: Sequence[Image]) -> list[Image]:
-    """Return the middle of the pictures, twice as large."""
-    return [np.kron(frame[100:244, 70:250], np.ones((2, 2, 1), np.uint8)) for frame in frames]
 
 
 def covered(image: Image, mouth: NDArray[np.float64], reach: float) -> Image:

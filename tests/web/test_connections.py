@@ -108,22 +108,6 @@ def test_a_request_that_comes_drop_by_drop_is_closed(port):
             send_drops()
 
 
-def test_who_does_not_take_a_reply_is_closed(port):
-    with socket.socket() as client:
-        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        client.settimeout(PATIENCE_S)
-        client.connect(("127.0.0.1", port))
-        client.sendall(b"GET /large HTTP/1.1\r\nhost: x\r\n\r\n")
-        time.sleep(1)  # nothing is read, for some of the limits: what the kernel holds counts as taken
-        taken = 0
-        try:
-            while part := client.recv(1 << 20):
-                taken += len(part)
-        except ConnectionResetError:
-            pass
-        assert 0 < taken < LARGE
-
-
 def test_many_connections_without_a_request_leave_room(port):
     """The client that asks is served, over one connection and over new ones; the oldest without a request go."""
     with ExitStack() as stack, connected(port) as client:
@@ -156,7 +140,7 @@ class Clock:
             timer.call()
 
 
-@pytest.mark.parametrize(("bytes_s", "is_served"), [(100, False), (3000, False), (50_000, True), (5_000_000, True)])
+@pytest.mark.parametrize(("bytes_s", "is_served"), [(0, False), (3000, False), (50_000, True), (5_000_000, True)])
 def test_who_takes_a_reply_drop_by_drop_is_closed(bytes_s, is_served, monkeypatch):
     """A part of 64 KB is written whenever the one before is nearly taken, each sooner than what stands still may be."""
     monkeypatch.setattr(connections, "STALLED_S", 30.0)

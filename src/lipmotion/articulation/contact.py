@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.motion.closure import frames_within
 from lipmotion.motion.frame_labels import find_runs
 from lipmotion.types import Motion, Timeline, Unit
 from lipmotion.types.motion import interpolate_rows
@@ -86,8 +87,7 @@ def find_closures(motion: Motion, units: Timeline[Unit]) -> list[ClosedPhone]:
     gap, phones = read_gap(motion), dict[int, ClosedPhone]()
     for span, closing in zip(units, mark_closing_phones(units), strict=True):
         if closing:
-            first = max(int(np.ceil(span.start_s * motion.rate_hz - 1e-6)), 0)
-            stop = min(int(np.floor(span.end_s * motion.rate_hz + 1e-6)) + 1, len(gap))
+            first, stop = frames_within(span.start_s, span.end_s, motion.rate_hz, len(gap))
             if first >= stop:  # a phone between two frames: the nearer one
                 first = min(max(round((span.start_s + span.end_s) / 2 * motion.rate_hz), 0), len(gap) - 1)
                 stop = first + 1

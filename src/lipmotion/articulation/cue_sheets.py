@@ -9,9 +9,11 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cache
 from itertools import pairwise
 from statistics import median
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,8 @@ from numpy.typing import NDArray
 from lipmotion.articulation.liveliness import find_phrases
 from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.paths import find_segments
+from lipmotion.motion.closure import frames_within
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import CurveEdit, Generation, Hold, Motion, Span, Timeline, Unit
 from lipmotion.types.edits import Locked
 from lipmotion.types.values import parse_clock, parse_number
@@ -79,26 +83,12 @@ def frame_to_seconds(frame: int, fps: float) -> float:
     return (hundredths + (fps < 100 and int(fps * (hundredths / 100)) < frame)) / 100
 
 
-def count_cue_frames(duration_s: float, fps: float) -> int:
-    """Return the number of frames that begin before the end, which is cut to hundredths of a second."""
-    end_s = round_to_hundredths(duration_s)
+def count_cue_frames(end_s: float, fps: float) -> int:
+    """Return the number of frames that begin before the end, a whole number of hundredths of a second."""
     frames = int(np.ceil(end_s * fps))
     while frames and frame_to_seconds(frames - 1, fps) >= end_s:
         frames -= 1
     return frames
-
-
-def round_to_hundredths(duration_s: float) -> float:
-    """Return a duration cut to hundredths of a second."""
-    return int(duration_s * 100 + 1e-6) / 100
-
-
-def lay_out_cues(segments: Sequence[tuple[int, str]], duration_s: float, fps: float, drawn: str) -> CueSheet:
-    """Return the cue sheet of segments (first frame, shape); without segments, the mouth is at rest."""
-    starts = [frame_to_seconds(frame, fps) for frame, _ in segments] or [0.0]
-    shapes = [shape for _, shape in segments] or [choose_drawn_shape(REST, drawn)]
-    ends = [*starts[1:], round_to_hundredths(duration_s)]
-    return CueSheet(Timeline(tuple(map(Span, starts, ends, shapes))), fps, drawn)
 
 
 def list_frame_shapes(sheet: CueSheet) -> list[str]:
@@ -111,8 +101,7 @@ def list_frame_shapes(sheet: CueSheet) -> list[str]:
     return shapes
 
 
-@dataclass(frozen=True)
-class PhoneShapes:
+class PhoneShapes(NamedTuple):
     """The shapes that suit a share of a phone's duration: those that suit best, and those that are acceptable."""
 
     share: float
@@ -120,41 +109,23 @@ class PhoneShapes:
     allowed: str = ""
 
 
-_PHONE_SHAPES: tuple[tuple[str, tuple[PhoneShapes, ...]], ...] = (
-    ("sil sp", (PhoneShapes(1, "X", "A"),)),
-    ("p b m", (PhoneShapes(1, "A"),)),
-    ("em", (PhoneShapes(0.4, "BC", "E"), PhoneShapes(0.6, "A"))),
-    ("f v", (PhoneShapes(1, "G"),)),
-    ("l el", (PhoneShapes(1, "H", "BCE"),)),
-    ("w", (PhoneShapes(1, "F", "E"),)),
-    ("uw uh", (PhoneShapes(1, "F", "E"),)),
-    ("ow", (PhoneShapes(0.6, "E", "CF"), PhoneShapes(0.4, "F", "E"))),
-    ("ao", (PhoneShapes(1, "E", "CD"),)),
-    ("oy", (PhoneShapes(0.6, "E", "C"), PhoneShapes(0.4, "B", "C"))),
-    ("er axr", (PhoneShapes(1, "E", "BC"),)),
-    ("aa", (PhoneShapes(1, "D"),)),
-    ("ay", (PhoneShapes(0.6, "D", "C"), PhoneShapes(0.4, "B", "C"))),
-    ("aw", (PhoneShapes(0.6, "D", "C"), PhoneShapes(0.4, "E", "F"))),
-    ("ae eh ah", (PhoneShapes(1, "C", "D"),)),
-    ("ey", (PhoneShapes(0.6, "C", "BD"), PhoneShapes(0.4, "B", "C"))),
-    ("iy ih ix ax y", (PhoneShapes(1, "B", "C"),)),
-    ("r", (PhoneShapes(1, "BE", "F"),)),
-    ("sh zh ch jh", (PhoneShapes(1, "BF", "E"),)),
-    ("s z t d th dh", (PhoneShapes(1, "B", "CEF"),)),
-    ("n en k g ng", (PhoneShapes(1, "B", "CEF"),)),
-)
-PHONE_SHAPES: dict[str, tuple[PhoneShapes, ...]] = {
-    phone: looks for phones, looks in _PHONE_SHAPES for phone in phones.split()
-}
-ANY_OPEN: tuple[PhoneShapes, ...] = (PhoneShapes(1, "BCDEF"),)
-"""For hh and phones of another inventory: the motion alone decides, the lips stay open."""
-ANY_SHAPE: tuple[PhoneShapes, ...] = (PhoneShapes(1, "ABCDEF"),)
-"""For speech without known phones: the motion alone decides, also whether the lips are open."""
+@cache
+def read_phone_shapes() -> dict[str, list[PhoneShapes]]:
+    """Return the table ``phone_shapes.csv``: the shapes that suit each part of a phone, one after the other."""
+    shapes: dict[str, list[PhoneShapes]] = {}
+    for row in read_shipped_table("lipmotion.articulation", "phone_shapes.csv"):
+        for phone in row["phones"].split():
+            shapes.setdefault(phone, []).append(PhoneShapes(float(row["share"]), row["best"], row["allowed"]))
+    return shapes
 
 
-def list_phone_shapes(phone: str) -> tuple[PhoneShapes, ...]:
-    """Return the shapes that suit each part of a phone; an empty text stands for an unknown phone."""
-    return PHONE_SHAPES.get(phone, ANY_OPEN) if phone else ANY_SHAPE
+def list_phone_shapes(phone: str) -> list[PhoneShapes]:
+    """Return the shapes that suit each part of a phone.
+
+    For hh and phones of another inventory the motion alone decides, and the lips stay open; where no phone is known
+    (empty), it also decides whether they are open.
+    """
+    return read_phone_shapes().get(phone, [PhoneShapes(1, "BCDEF" if phone else "ABCDEF")])
 
 
 COST_RATE_HZ = 24.0
@@ -235,8 +206,7 @@ def _hold_costs(cost: Array, edits: Sequence[CurveEdit], fps: float) -> Array:
 
 def _find_least_open_s(span: Span[Unit], motion: Motion) -> float:
     """Return the time in a phone at which the mouth is least open; without an opening, the middle of the phone."""
-    first, last = np.ceil(span.start_s * motion.rate_hz - 1e-6), np.floor(span.end_s * motion.rate_hz + 1e-6)
-    first, stop = int(max(first, 0)), int(min(last + 1, len(motion.values)))
+    first, stop = frames_within(span.start_s, span.end_s, motion.rate_hz, len(motion.values))
     if "opening" not in motion.names or first >= stop:
         return max((span.start_s + span.end_s) / 2, 0.0)
     return float((first + int(motion["opening"][first:stop].argmin())) / motion.rate_hz + 1e-9)
@@ -308,25 +278,30 @@ def choose_cues(
     motion = generation.motion
     drawn = "".join(name for name, shape in SHAPES.items() if not shape.fallback or name in optional)
     duration_s = max(0.0, (len(motion.values) - 1) / motion.rate_hz, *(span.end_s for span in generation.units))
-    frames = count_cue_frames(duration_s, fps)
+    end_s = int(duration_s * 100 + 1e-6) / 100
+    frames = count_cue_frames(end_s, fps)
     cost = np.empty((0, len(drawn)))
     if frames:  # of the drawn shapes: the least cost of those that each one stands for
         costs = compute_frame_costs(generation, frames, fps, intensity)
         groups = [[choose_drawn_shape(other, drawn) == name for other in SHAPES] for name in drawn]
         cost = np.stack([costs[:, group].min(axis=1) for group in groups], axis=1)
     segments = find_segments(cost, hold_frames or choose_hold_frames(fps), CHANGE_COST)
-    sheet = lay_out_cues([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)
-    return replace(sheet, words=Timeline(tuple(span for span in group_words(generation.units) if span.label)))
+    rows = [(frame_to_seconds(frame, fps), drawn[label]) for frame, label in segments]
+    rows = rows or [(0.0, choose_drawn_shape(REST, drawn))]  # no frame: the mouth is at rest
+    ends = [*(start_s for start_s, _ in rows[1:]), end_s]
+    cues = tuple(Span(start_s, stop_s, shape) for (start_s, shape), stop_s in zip(rows, ends, strict=True))
+    words = tuple(span for span in group_words(generation.units) if span.label)
+    return CueSheet(Timeline(cues), fps, drawn, Timeline(words))
 
 
-_OCULUS = "sil:X PP:A FF:G TH:B DD:B kk:B CH:B SS:B nn:B RR:B aa:D E:C ih:B oh:E ou:F I:B O:E U:F"
-_FLEMING_DOBBS = "mbp:A nltdr:B fv:G th:B gk:B sh:F o:E ehsz:C aa:D iy:B rest:X"
-FLEMING_DOBBS = dict(pair.split(":") for pair in _FLEMING_DOBBS.split())
+FLEMING_DOBBS = {"mbp": "A", "fv": "G", "sh": "F", "o": "E", "ehsz": "C", "aa": "D", "rest": REST}
+FLEMING_DOBBS |= dict.fromkeys(("nltdr", "th", "gk", "iy"), "B")
 PHONES = {"rest": REST, "hh": "C"} | {
-    f"{phone}{stress}": parts[0].best[0] for phone, parts in PHONE_SHAPES.items() for stress in ("", 0, 1, 2)
+    f"{phone}{stress}": parts[0].best[0] for phone, parts in read_phone_shapes().items() for stress in ("", 0, 1, 2)
 }
 """Shapes by the names of other sets, for which Moho and Papagayo have switches."""
-OCULUS = {name.lower(): shape for name, _, shape in (pair.partition(":") for pair in _OCULUS.split())}
+OCULUS = {"sil": REST, "pp": "A", "ff": "G", "aa": "D", "e": "C", "oh": "E", "o": "E", "ou": "F", "u": "F"}
+OCULUS |= dict.fromkeys("th dd kk ch ss nn rr ih i".split(), "B")
 """Shapes by the names of Meta's 15 visemes (``viseme_PP``), old and new."""
 PREFIX = "viseme_"
 CHARTS = (BLAIR, LETTERS, FLEMING_DOBBS, OCULUS, PHONES)

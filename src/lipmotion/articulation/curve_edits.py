@@ -40,18 +40,18 @@ def apply_curve_edits(
     Raises InputError: a pin outside the motion, or a weight that is to be less than 0 or more than 1.
     """
     locked = [edit for edit in edits if isinstance(edit, Locked)]
-    edits = [edit for edit in edits if edit.channel in motion.names or isinstance(edit, Hold | Locked)]
+    others = [edit for edit in edits if not isinstance(edit, Locked)]
+    acting = [edit for edit in others if edit.channel in motion.names or isinstance(edit, Hold)]
     phonetic = np.isin(motion.names, list(held))
-    if not any(edit.channel or (phonetic.any() and isinstance(edit, Hold)) for edit in edits):
+    if not any(edit.channel or phonetic.any() for edit in acting):
         return motion
     time_s, values, rest = motion.time_s, motion.values.astype(np.float64), find_rest_frames(motion, units)
     pins = []
-    for edit in edits:
+    for edit in acting:
         if isinstance(edit, Hold):
             frame = min(round(edit.start_s * motion.rate_hz), len(values) - 1)
             share = weigh_span(time_s, edit.start_s, edit.end_s, LOCK_EDGE_S)[:, None] * phonetic
             values += share * (values[frame] - values)
-        if isinstance(edit, Hold | Locked):
             continue
         column = motion.column(edit.channel)
         is_weight = motion.channels[column].unit == WEIGHT
@@ -77,7 +77,7 @@ def apply_curve_edits(
         if edit.channel == OPENING:  # closed lips are closer than at rest
             values[:, column] = np.maximum(values[:, column], 0)
     bend_through_pins(values, pins, max(round(PIN_REACH_S * motion.rate_hz), 1))
-    edited = {edit.channel for edit in edits}
+    edited = {edit.channel for edit in acting}
     weights = [each.unit == WEIGHT and each.name in edited for each in motion.channels]
     values[:, weights] = np.clip(values[:, weights], 0, 1)
     for lock in locked:
@@ -145,18 +145,12 @@ def weigh_edits(time_s: Curve, edits: Sequence[CurveEdit]) -> Curve:
 
 
 class MotionStretch(NamedTuple):
-    """Motion of N frames that takes the place of other motion.
-
-    frames   : which these are, at 100 Hz
-    share    : how far it takes its place, 0 to 1 [shape=(N, 1)]
-    values   : of all P channels [shape=(N, P)]
-    variance : [shape=(N, P)]
-    """
+    """Motion of N frames at 100 Hz that takes the place of other motion."""
 
     frames: slice
-    share: Curve
-    values: NDArray[np.floating[Any]]
-    variance: NDArray[np.floating[Any]]
+    share: Curve  # how far it takes its place, 0 to 1 [shape=(N, 1)]
+    values: NDArray[np.floating[Any]]  # of all P channels [shape=(N, P)]
+    variance: NDArray[np.floating[Any]]  # [shape=(N, P)]
 
 
 def cut_locked_stretch(generation: Generation, start_s: float, end_s: float) -> MotionStretch:

@@ -14,16 +14,15 @@ O'Connell, "How do you look when feeling anxious? Facial displays of anxiety", P
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from functools import cache
-from importlib import resources
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import smooth_step
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import WEIGHT, Channel, Motion
 from lipmotion.types.delivery import MOODS, MoodKey
 
@@ -34,19 +33,12 @@ CHANGE_S: Final = (0.25, 0.2)  # a mood begins to change so long before its time
 
 
 @cache
-def list_mood_rows() -> list[dict[str, str]]:
-    """Return the rows of the table ``moods.csv``: mood, action unit, its intensity, and where it is from."""
-    text = resources.files("lipmotion.articulation").joinpath("moods.csv").read_text(encoding="ascii")
-    return list(csv.DictReader(text.splitlines()))
-
-
-@cache
 def read_mood_table() -> Mapping[str, Mapping[int, float]]:
-    """Return the intensity of the action units of each mood, 0 to 1."""
-    return {
-        mood: {int(r["action_unit"]): float(r["intensity"]) for r in list_mood_rows() if r["mood"] == mood}
-        for mood in MOODS
-    }
+    """Return the intensity of the action units of each mood, 0 to 1: the table ``moods.csv``."""
+    table: dict[str, dict[int, float]] = {mood: {} for mood in MOODS}
+    for row in read_shipped_table("lipmotion.articulation", "moods.csv"):
+        table[row["mood"]][int(row["action_unit"])] = float(row["intensity"])
+    return table
 
 
 def is_mood(channel: str) -> bool:

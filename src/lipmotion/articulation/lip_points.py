@@ -7,14 +7,13 @@ as in the names of the channels (``x_13``, ``y_13``, ``z_13``).
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import Motion
 
 UPPER_MIDDLE, LOWER_MIDDLE = 13, 14  # the middles of the inner lips; the channel ``opening`` is their distance
@@ -28,22 +27,17 @@ FACING = ((13, 14), (82, 87), (312, 317), (81, 178), (311, 402))
 
 @dataclass(frozen=True, eq=False)
 class MouthTemplate:
-    """Lip and jaw points at rest.
+    """Lip and jaw points at rest."""
 
-    points   : numbers of the 52 points, in the order of the rows
-    places   : [shape=(52, 3)], eye distances
-    upper, lower, corner, jaw, inner : which rows are what [shape=(52,), bool]; a corner is neither upper nor lower
-    mirrored : the row of the point on the other side [shape=(52,)]
-    """
-
-    points: tuple[int, ...]
-    places: NDArray[np.float64]
+    points: tuple[int, ...]  # numbers of the 52 points, in the order of the rows
+    places: NDArray[np.float64]  # [shape=(52, 3)], eye distances
+    # which rows are what [each shape=(52,)]; a corner is neither upper nor lower
     upper: NDArray[np.bool_]
     lower: NDArray[np.bool_]
     corner: NDArray[np.bool_]
     jaw: NDArray[np.bool_]
     inner: NDArray[np.bool_]
-    mirrored: NDArray[np.int64]
+    mirrored: NDArray[np.int64]  # the row of the point on the other side [shape=(52,)]
 
     def row(self, point: int) -> int:
         """Return the row of a point."""
@@ -75,8 +69,7 @@ class MouthTemplate:
 @cache
 def build_mouth() -> MouthTemplate:
     """Return the template of the table ``lip_points.csv``."""
-    text = resources.files("lipmotion.articulation").joinpath("lip_points.csv").read_text(encoding="ascii")
-    rows = list(csv.DictReader(text.splitlines()))
+    rows = read_shipped_table("lipmotion.articulation", "lip_points.csv")
     points = tuple(int(row["point"]) for row in rows)
     return MouthTemplate(
         points,

@@ -62,23 +62,15 @@ UPPER_FACE_UNITS = {"inner": 1, "outer": 2, "lowered": 4, "wide": 5, "squint": 7
 
 
 class UpperFace(NamedTuple):
-    """What a mood does to brows, lids, cheeks and nose in one frame, each 0 to 1.
+    """What a mood does to brows, lids, cheeks and nose in one frame, each 0 to 1."""
 
-    inner, outer : the inner and the outer ends of the brows are raised
-    lowered      : the brows are lowered and drawn together
-    wide         : the upper lids are raised
-    squint       : the lids are tightened: the lower ones raised, the upper ones lowered a little
-    cheek        : the cheeks are raised
-    sneer        : the nose is wrinkled
-    """
-
-    inner: float = 0.0
-    outer: float = 0.0
-    lowered: float = 0.0
-    wide: float = 0.0
-    squint: float = 0.0
-    cheek: float = 0.0
-    sneer: float = 0.0
+    inner: float = 0.0  # the inner ends of the brows are raised
+    outer: float = 0.0  # their outer ends are raised
+    lowered: float = 0.0  # the brows are lowered and drawn together
+    wide: float = 0.0  # the upper lids are raised
+    squint: float = 0.0  # the lids are tightened: the lower ones raised, the upper ones lowered a little
+    cheek: float = 0.0  # the cheeks are raised
+    sneer: float = 0.0  # the nose is wrinkled
 
 
 CALM = UpperFace()
@@ -86,24 +78,16 @@ CALM = UpperFace()
 
 @dataclass(frozen=True, eq=False)
 class Liveliness:
-    """Movements beside the mouth's, in F frames.
+    """Movements beside the mouth's, in F frames; all of them follow from ``given``, where that says it."""
 
-    lids  : how far the eyes are closed, 0 to 1 [shape=(F,)]
-    brows : how far the brows are raised, in eye distances [shape=(F,)]
-    gaze  : of the eyes against the head, to the character's left and upwards, in radians [shape=(F, 2)]
-    turn  : of the head to its left, upwards and to its left shoulder, in radians [shape=(F, 3)]
-    units : what a mood does to brows, lids, cheeks and nose: those action units of
-            ``UPPER_FACE_UNITS`` that it asks for, 0 to 1 [each shape=(F,)]; where blendshapes are given, also 12 and
-            15, the corners of the lips
-    given : weights that the motion itself has for blendshapes beside the mouth, by ARKit's names, 0 to 1
-            [each shape=(F,)]; all of the above follows from them, where they say it
-    """
-
-    lids: Curve
-    brows: Curve
-    gaze: Curve
-    turn: Curve
+    lids: Curve  # how far the eyes are closed, 0 to 1 [shape=(F,)]
+    brows: Curve  # how far the brows are raised, in eye distances [shape=(F,)]
+    gaze: Curve  # of the eyes against the head, to the character's left and upwards, in radians [shape=(F, 2)]
+    turn: Curve  # of the head to its left, upwards and to its left shoulder, in radians [shape=(F, 3)]
+    # what a mood does to brows, lids, cheeks and nose: its action units of ``UPPER_FACE_UNITS``, 0 to 1
+    # [each shape=(F,)]; where blendshapes are given, also 12 and 15, the corners of the lips
     units: Mapping[int, Curve] = field(default_factory=dict)
+    # weights that the motion itself has for blendshapes beside the mouth, by ARKit's names, 0 to 1 [each shape=(F,)]
     given: Mapping[str, Curve] = field(default_factory=dict)
 
     @property

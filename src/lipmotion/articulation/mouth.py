@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,33 +59,23 @@ DRAWN = ("opening", "width", "outer", "y_152", *GESTURES)  # the channels of mot
 
 @dataclass(frozen=True, eq=False)
 class SpokenMouth:
-    """The mouth in F frames; each curve has the shape (F,).
+    """The mouth in F frames; each curve has the shape (F,)."""
 
-    rate_hz    : frames per second; frame n is at ``n / rate_hz`` seconds
-    gap        : distance between the inner lips; 0 where they touch, else at least ``contact.MIN_GAP``
-    width      : distance of the lip corners, relative to the rest pose
-    fullness   : thickness of the lips, relative to the rest pose
-    jaw        : drop of the chin
-    tongue, tuck, protrusion, spread, press, teeth : the articulatory channels, 0 to 1 (docs/articulation.md)
-    pursed     : how far protruded lips leave only a small hole, as in w, 0 to 1
-    oval       : how far the opening is tall and narrow, as in aa, 0 to 1
-    smile, frown, stretched, upper_raise, chin_raise, tight : what a mood does to corners, lips and chin, 0 to 1, as
-                 far as the phones leave it free (``articulation.expression``)
-    """
-
-    rate_hz: float
-    gap: Curve
-    width: Curve
-    fullness: Curve
-    jaw: Curve
+    rate_hz: float  # frames per second; frame n is at ``n / rate_hz`` seconds
+    gap: Curve  # distance between the inner lips; 0 where they touch, else at least ``contact.MIN_GAP``
+    width: Curve  # distance of the lip corners, relative to the rest pose
+    fullness: Curve  # thickness of the lips, relative to the rest pose
+    jaw: Curve  # drop of the chin
+    # the articulatory channels, 0 to 1 (docs/articulation.md)
     tongue: Curve
     tuck: Curve
     protrusion: Curve
     spread: Curve
     press: Curve
     teeth: Curve
-    pursed: Curve
-    oval: Curve
+    pursed: Curve  # how far protruded lips leave only a small hole, as in w, 0 to 1
+    oval: Curve  # how far the opening is tall and narrow, as in aa, 0 to 1
+    # what a mood does to corners, lips and chin, 0 to 1, as far as phones leave it free (``articulation.expression``)
     smile: Curve
     frown: Curve
     stretched: Curve
@@ -144,47 +134,12 @@ class SpokenMouth:
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "rate_hz"}
 
 
-class MouthAtRest(NamedTuple):
-    """Sizes of a mouth at rest in eye distances, width as of the corners' motion; None: its motion says nothing."""
-
-    width: float | None
-    thickness: float | None
-    chin: float | None
-
-
-def measure_mouth_at_rest(motion: Motion, units: Timeline[Unit]) -> MouthAtRest:
-    """Return the sizes of the rest pose of a motion. Raises InputError: as ``find_mouth``."""
-    check_spoken(motion, motion.rate_hz)
-    rest, across, thickness = find_rest_frames(motion, units), _width(motion), _thickness(motion)
-    name = "width" if "width" in motion.names else "distance of the lip corners"
-    return MouthAtRest(
-        None if across is None else measure_at_rest(name, across, rest),
-        None if thickness is None else measure_at_rest("thickness of the lips (outer - opening)", thickness, rest),
-        float(np.median(motion["y_152"][rest].astype(np.float64))) if "y_152" in motion.names else None,
-    )
-
-
-def _width(motion: Motion) -> Curve | None:
-    """Return the distance of the lip corners, in any unit [shape=(T,)]; None: the motion does not say it."""
-    if "width" in motion.names:
-        return motion["width"].astype(np.float64)
-    if {*CORNERS} <= {*motion.names}:
-        return (motion[CORNERS[1]] - motion[CORNERS[0]]).astype(np.float64)
-    return None
-
-
-def _thickness(motion: Motion) -> Curve | None:
-    return (motion["outer"] - motion["opening"]).astype(np.float64) if "outer" in motion.names else None
-
-
 def frame_times(frames: int, rate_hz: float, fps: float) -> Curve:
     """Return the times of pictures, ``fps`` a second, of so many frames of motion, to the last one [shape=(N,)]."""
     return np.arange(int(np.floor((frames - 1) / rate_hz * fps + 1e-9)) + 1) / fps
 
 
-def find_mouth(
-    motion: Motion, units: Timeline[Unit], fps: float | None = None, at_rest: MouthAtRest | None = None
-) -> SpokenMouth:
+def find_mouth(motion: Motion, units: Timeline[Unit], fps: float | None = None) -> SpokenMouth:
     """Return the mouth of a motion and its phones in every frame.
 
     motion : needs ``opening``. ``width``, ``outer`` and the chin ``y_152`` are used where it has them, against the rest
@@ -192,13 +147,12 @@ def find_mouth(
              of rigs has, phones say of the gap only that p, b and m close the lips
     units  : phones in time; may be empty
     fps    : frames per second, to the end of the motion; None: those of the motion
-    at_rest : of the whole motion, where this is a part of it; None: this is the whole
     In every p, b and m the lips touch (``contact.close_lips``).
     Raises InputError: no channel ``opening``, no frames, values that are not finite, fps not positive, or lips without
     width or thickness at rest.
     """
     check_spoken(motion, motion.rate_hz if fps is None else fps)
-    rest, opening = at_rest or measure_mouth_at_rest(motion, units), motion["opening"].astype(np.float64)
+    rest, opening = find_rest_frames(motion, units), motion["opening"].astype(np.float64)
     weights = gesture_curves(units, motion.time_s, [name for name in SAID if name not in motion.names])
     weights |= {name: np.clip(motion[name].astype(np.float64), 0, 1) for name in {*SAID} & {*motion.names}}
     # w has half the press of p, with protruded lips: a hole that is almost closed
@@ -215,17 +169,19 @@ def find_mouth(
     gap = close_lips(gap, motion, units)
     expressed = _express(mood, weights)
     weights[OVAL] = weights[OVAL] * np.clip((gap - OVAL_GAPS[0]) / (OVAL_GAPS[1] - OVAL_GAPS[0]), 0, 1)
-    thickness, fullness = _thickness(motion), 1 - 0.4 * np.clip(opening, 0, 0.4)
-    if thickness is not None and rest.thickness is not None:
-        fullness = np.clip(thickness / rest.thickness, 0.75, 1.25)
+    width, fullness = _widen(motion, rest, weights | expressed), 1 - 0.4 * np.clip(opening, 0, 0.4)
+    if "outer" in motion.names:
+        thickness = (motion["outer"] - motion["opening"]).astype(np.float64)
+        at_rest = measure_at_rest("thickness of the lips (outer - opening)", thickness, rest)
+        fullness = np.clip(thickness / at_rest, 0.75, 1.25)
     jaw = usual = measure_jaw_drop(gap)
-    if rest.chin is not None:  # as tracked (point 152, y upwards), within limits that suit the gap
-        drop = rest.chin - motion["y_152"].astype(np.float64)
-        jaw = np.clip(drop, MIN_CHIN_DROP_SHARE * usual, 1.15 * usual + 0.01)
+    if "y_152" in motion.names:  # as tracked (point 152, y upwards), within limits that suit the gap
+        chin = motion["y_152"].astype(np.float64)
+        jaw = np.clip(np.median(chin[rest]) - chin, MIN_CHIN_DROP_SHARE * usual, 1.15 * usual + 0.01)
     mouth = SpokenMouth(
         motion.rate_hz,
         gap,
-        _widen(motion, rest, weights | expressed),
+        width,
         fullness * (1 - TIGHT_FULLNESS * expressed["tight"]),
         jaw * (1 - TUCKED_CHIN_SHARE * weights["lip_tuck"]),
         *(weights[name] for name in (*GESTURES, "pursed", OVAL)),
@@ -295,12 +251,14 @@ def _articulate(gap: Curve, weights: dict[str, Curve], time_s: Curve) -> Curve:
     return np.minimum(gap, np.minimum(after, before))
 
 
-def _widen(motion: Motion, rest: MouthAtRest, weights: dict[str, Curve]) -> Curve:
-    across = _width(motion)
-    if across is None or rest.width is None:
-        change = -0.25 * np.clip(motion["opening"].astype(np.float64), 0, 0.4)
-    else:
-        change = across / rest.width - 1
+def _widen(motion: Motion, rest: NDArray[np.bool_], weights: dict[str, Curve]) -> Curve:
+    change = -0.25 * np.clip(motion["opening"].astype(np.float64), 0, 0.4)
+    if "width" in motion.names:
+        across = motion["width"].astype(np.float64)
+        change = across / measure_at_rest("width", across, rest) - 1
+    elif {*CORNERS} <= {*motion.names}:
+        across = (motion[CORNERS[1]] - motion[CORNERS[0]]).astype(np.float64)
+        change = across / measure_at_rest("distance of the lip corners", across, rest) - 1
     width = 1 + WIDTH_REACH * np.tanh(change / WIDTH_REACH)
     for name, wider in (("smile", SMILE_WIDTH), ("stretched", STRETCH_WIDTH), ("dropped", DROPPED_WIDTH)):
         width = width + wider * weights[name]

@@ -14,7 +14,8 @@ targets are ours, set by eye, and those of diphthongs change within the phone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
+from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -22,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import EDITED
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 from lipmotion.units import LIP_CLOSING, mark_closing_phones
 
@@ -35,91 +37,27 @@ SAID = (*GESTURES, OVAL)
 TIP_UP, TIP_OUT = 0.6, 1.0
 """Values of ``tongue``: the tip is at the ridge behind the upper teeth; the tip is between the teeth."""
 PURSED_PRESS = 0.5
-"""Value of ``lip_press`` of w: with protruded lips, a hole that is almost closed. The round hole of uw has 0."""
+"""Value of ``lip_press`` where w begins: with protruded lips, a hole that is almost closed; that of uw has 0."""
 REACH = 4.0  # dominance is 0 further than so many widths from a phone
 
 
 class GestureTarget(NamedTuple):
-    """What a phone asks of a channel.
+    """What a phone asks of a channel."""
 
-    begin, end : target at the first and the last moment of the phone, 0 to 1
-    dominance  : weight beside other phones
-    width_s    : standard deviation of the Gaussian by which dominance falls off beside the phone, in seconds
-    """
-
-    begin: float
-    end: float
-    dominance: float = 1.0
-    width_s: float = 0.035
+    begin: float  # target at the first moment of the phone, 0 to 1
+    end: float  # at the last one
+    dominance: float  # weight beside other phones
+    width_s: float  # standard deviation of the Gaussian by which dominance falls off beside the phone
 
 
-Targets = Mapping[str, GestureTarget]
-
-
-def _steady(values: Mapping[str, float], dominance: float = 1.0, width_s: float = 0.035) -> dict[str, GestureTarget]:
-    """Return the same target from begin to end for phones: ``{"t d n": 0.6}``."""
-    pairs = [(phone, value) for phones, value in values.items() for phone in phones.split()]
-    return {phone: GestureTarget(value, value, dominance, width_s) for phone, value in pairs}
-
-
-_CLOSED = " ".join(LIP_CLOSING)
-_TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
-    "tongue": (
-        GestureTarget(0, 0, 0.5, 0.025),
-        _steady({"th dh": TIP_OUT}, 5.0, 0.02)
-        | _steady({"l el": TIP_UP, "t d n en": 0.45, "ch jh": 0.3, "k g ng": 0.2}, 4.0, 0.025)
-        | _steady({"s z": 0.3, "sh zh": 0.25, "r er axr": 0.2}, 0.8, 0.03),
-    ),
-    "lip_tuck": (
-        GestureTarget(0, 0, 1.0, 0.022),
-        _steady({"f v": 1.0}, 4.0, 0.022) | _steady({_CLOSED: 0.0}, 8.0, 0.022),
-    ),
-    "protrusion": (
-        GestureTarget(0, 0, 0.25, 0.03),
-        _steady({"uw w": 1.0}, 3.0, 0.045)
-        | _steady({"uh ao": 0.65}, 1.6, 0.05)
-        | {
-            "ow": GestureTarget(0.55, 1.0, 2.2, 0.05),
-            "oy": GestureTarget(0.6, 0.0, 1.6, 0.04),
-            "aw": GestureTarget(0.0, 0.6, 1.4, 0.04),
-        }
-        | _steady({"sh zh ch jh r": 0.6, "er axr": 0.45}, 6.0, 0.035)
-        | _steady({"iy ih ey ae eh ay aa ah": 0.0}, 3.0, 0.035)
-        | _steady({"th dh s z k g ng": 0.0}, 2.2, 0.03)
-        | _steady({"f v t d n en l el sil sp": 0.0}, 1.0, 0.03),
-    ),
-    "spread": (
-        GestureTarget(0, 0, 0.25, 0.03),
-        _steady({"iy": 1.0}, 2.0, 0.04)
-        | {
-            "ey": GestureTarget(0.5, 0.8, 1.4, 0.04),
-            "ay": GestureTarget(0.0, 0.6, 1.0, 0.035),
-            "oy": GestureTarget(0, 0.6, 1.0, 0.035),
-        }
-        | _steady({"ih y": 0.7, "s z": 0.6, "ix": 0.55, "ae eh": 0.45}, 1.0, 0.035)
-        | _steady({"uw w uh ow ao aa r er axr sh zh ch jh": 0.0}, 1.5, 0.04)
-        | _steady({"sil sp": 0.0}, 0.7, 0.03),
-    ),
-    "lip_press": (
-        GestureTarget(0, 0, 1.0, 0.02),
-        _steady({_CLOSED: 1.0}, 3.0, 0.02) | {"w": GestureTarget(PURSED_PRESS, 0.8 * PURSED_PRESS, 3.0, 0.02)},
-    ),
-    "oval": (
-        GestureTarget(0, 0, 0.4, 0.03),
-        _steady({"aa": 1.0, "ah": 0.7, "ao": 0.8}, 2.0, 0.04)
-        | {"ay": GestureTarget(0.8, 0.0, 1.4, 0.035), "aw": GestureTarget(1.0, 0.3, 1.4, 0.035)}
-        | _steady({"ae eh": 0.2, "t d n en l el k g ng s z sh zh ch jh r": 0.0}, 1.3, 0.03),
-    ),
-    "teeth": (
-        GestureTarget(0.5, 0.5, 0.5, 0.03),
-        _steady({"s z sh zh ch jh": 0.98}, 12.0, 0.026)
-        | _steady({"t d n en k g ng": 0.88}, 9.0, 0.025)
-        | _steady({"iy": 0.79, "ih ix ey y": 0.7, "sil sp": 0.0}, 1.5, 0.03)
-        | _steady({"f v th dh ah l el": 0.5, "ae eh": 0.58, "r er axr": 0.4}, 2.0, 0.025)
-        | _steady({"uw w": 0.0, "uh ao": 0.15, "aa": 0.4}, 2.0, 0.04)
-        | {"ow": GestureTarget(0.3, 0.0, 1.6, 0.04)},
-    ),
-}
+@cache
+def read_targets() -> dict[str, dict[str, GestureTarget]]:
+    """Return the table ``phone_targets.csv``: by channel, the target of each phone; "" stands for all others."""
+    targets: dict[str, dict[str, GestureTarget]] = {name: {} for name in SAID}
+    for row in read_shipped_table("lipmotion.articulation", "phone_targets.csv"):
+        target = GestureTarget(*(float(row[field]) for field in GestureTarget._fields))
+        targets[row["channel"]] |= dict.fromkeys(row["phones"].split() or [""], target)
+    return targets
 
 
 def gesture_curves(units: Timeline[Unit], time_s: Curve, names: Collection[str] = GESTURES) -> dict[str, Curve]:
@@ -135,8 +73,8 @@ def gesture_curves(units: Timeline[Unit], time_s: Curve, names: Collection[str] 
     start_s, end_s = np.array([(span.start_s, span.end_s) for span in units]).reshape(-1, 2).T
     curves = {}
     for name in names:
-        default, targets = _TARGETS[name]
-        chosen = [targets.get(phone, default) for phone in phones]
+        targets = read_targets()[name]
+        chosen = [targets.get(phone, targets[""]) for phone in phones]
         begin, end, strength, width_s = np.array(chosen).reshape(-1, 4).T
         edges_s = (start_s - REACH * width_s, end_s + REACH * width_s)
         first, stop = (np.searchsorted(time_s, edge_s) for edge_s in edges_s)
@@ -148,7 +86,7 @@ def gesture_curves(units: Timeline[Unit], time_s: Curve, names: Collection[str] 
         share = np.clip((time - start_s[of]) / np.maximum(end_s - start_s, 1e-9)[of], 0, 1)
         pull = np.bincount(frames, dominance * (begin[of] + share * (end - begin)[of]), len(time_s))
         total = 1e-6 + np.bincount(frames, dominance, len(time_s))
-        curves[name] = np.clip((1e-6 * default.begin + pull) / total, 0, 1)
+        curves[name] = np.clip((1e-6 * targets[""].begin + pull) / total, 0, 1)
     return curves
 
 
@@ -174,24 +112,19 @@ def crossfade_phones(units: Timeline[Unit], time_s: Curve, kind: Callable[[str],
     Neighbours are cross-faded by half a cosine around the border between them. The middle of a phone of 50 ms or
     more is wholly its own.
     """
-    names, starts, ends = [kind("")], [float("-inf")], [float("inf")]
+    names, starts, end_s = [kind("")], [-np.inf], np.inf  # every stretch lasts to the next one
     for span in units:
-        if span.duration_s <= 0:
-            continue
-        if span.start_s > starts[-1] and ends[-1] > span.start_s:
-            ends[-1] = span.start_s
-        if ends[-1] < span.start_s:
-            names.append(kind(""))
-            starts.append(ends[-1])
-            ends.append(span.start_s)
-        names.append(kind(span.label.phone))
-        starts.append(span.start_s)
-        ends.append(span.end_s)
+        if span.duration_s > 0:
+            if span.start_s > end_s:
+                names.append(kind(""))
+                starts.append(end_s)
+            names.append(kind(span.label.phone))
+            starts.append(span.start_s)
+            end_s = span.end_s
     if len(names) > 1:
         names.append(kind(""))
-        starts.append(ends[-1])
-        ends.append(float("inf"))
-    lengths = [end - start for start, end in zip(starts, ends, strict=True)]
+        starts.append(end_s)
+    lengths = np.diff([*starts, np.inf])
     halves = [max(min(FADE_S, left / 2, right / 2), MIN_FADE_S) for left, right in pairwise(lengths)]
     rising = [np.ones(len(time_s))]
     for border, half in zip(starts[1:], halves, strict=True):

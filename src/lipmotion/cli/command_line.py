@@ -25,6 +25,7 @@ from lipmotion.types.values import parse_number, parse_whole
 _VERBS = "animate batch live speak render edit explain cues train"
 _PLACES = {name: f"lipmotion.cli.verbs.{name}:add" for name in _VERBS.split()}
 _PLACES |= {name: f"lipmotion.cli.verbs.about:add_{name}" for name in "addon info cite doctor completion".split()}
+_PLACES["words"] = "lipmotion.cli.verbs.explain:add_words"
 _PLACES["adapt"] = "lipmotion.cli.verbs.train:add_adapt"
 VERBS: Registry[Callable[[Any], None]] = Registry("verb", "lipmotion.verbs", _PLACES)
 """What adds each verb to the parser; those of faces, studio and lab are entry points."""
@@ -109,13 +110,14 @@ def _put_recording_first(parser: argparse.ArgumentParser, words: Sequence[str]) 
     """Return the words of a command with its recording ahead of the outputs.
 
     An option that takes several words, as ``-o``, takes those that argparse finds behind it: of ``-o OUT RECORDING``
-    also the recording, if it stands nowhere else. Then the last word is the recording.
+    also the recording, if it stands nowhere else. Then the last word is the recording, and so are those before it that
+    exist and end alike, where a verb takes several.
     Raises WrongCommandLineError: an option that the verb has not.
     """
     verb, verbs = next((at for at, word in enumerate(words) if not word.startswith("-")), len(words)), _verbs(parser)
     if verb < len(words) and words[verb] in verbs:
         return [*words[: verb + 1], *_put_recording_first(verbs[words[verb]], words[verb + 1 :])]
-    known, free, last, at = parser._option_string_actions, 0, 0, 0
+    known, free, taken, at = parser._option_string_actions, 0, list[int](), 0
     words = [  # "-o OUT" may be one word, as for Rhubarb
         part for word in words for part in (word.split(maxsplit=1) if word.partition(" ")[0] in known else (word,))
     ]
@@ -125,15 +127,19 @@ def _put_recording_first(parser: argparse.ArgumentParser, words: Sequence[str]) 
             free += 1
         elif option.nargs == "+" and "=" not in words[at - 1]:
             behind = next((end for end in range(at, len(words)) if _is_option(words[end])), len(words))
-            last, at = behind - 1 if behind > at + 1 else last, behind
+            taken, at = list(range(at + 1, behind)), behind
         elif option.nargs is None and words[at - 1] in option.option_strings:
             at += 1
     wanted = next((action for action in parser._actions if not action.option_strings), None)
-    if free or wanted is None or not last or at < len(words) or "--job" in words:
+    if free or wanted is None or not taken or at < len(words) or "--job" in words:
         return words
-    if wanted.nargs == "?" and Path(words[last]).suffix and " " not in words[last]:
+    last = words[taken[-1]]
+    if wanted.nargs == "?" and Path(last).suffix and " " not in last:
         return words
-    return [words[last], *words[:last], *words[last + 1 :]]
+    end = Path(last).suffix
+    alike = [each for each in taken if Path(words[each]).suffix == end and Path(words[each]).exists()]
+    moved = sorted({taken[-1], *(alike if wanted.nargs == "+" else ())})
+    return [*(words[each] for each in moved), *(word for each, word in enumerate(words) if each not in moved)]
 
 
 def _is_option(word: str) -> bool:

@@ -31,8 +31,6 @@ EXTRAS = {
     "video": "face tracking: corpora, faces and measures from videos",
     "text": "espeak-ng: text to speech, and other languages than English",
     "plots": "pictures of 'experiment xieliu2007'",
-    "whisper": "words recognised by faster-whisper, with a model of yours",
-    "vosk": "words recognised by Vosk, with a model of yours",
     "cluster": "'batch --cluster'",
     "study": "the page of 'study serve'",
     "studio": "the page of 'studio'",
@@ -177,10 +175,9 @@ def _voices() -> str:
 def _phone_recogniser() -> str:
     from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser, load_phone_recogniser
 
-    name = find_installed_recogniser()
-    if name is None:
+    if find_installed_recogniser() is None:
         raise _AbsentError("none for this machine: voices that the model does not know are recognised less well")
-    return load_phone_recogniser(name).source
+    return load_phone_recogniser().source
 
 
 def _microphone() -> str:

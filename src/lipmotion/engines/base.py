@@ -137,7 +137,7 @@ class Engine(Animator[ModelT]):
         return ()
 
     def describe(self, model: ModelT) -> str:  # noqa: ARG002
-        """Return a text that describes the parts of a model: its decision trees, its chains; empty: there is none."""
+        """Return the decision trees of a model as readable text; empty: there are none."""
         return ""
 
 

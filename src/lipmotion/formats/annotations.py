@@ -161,10 +161,7 @@ def read_xml_tiers(text: str, where: str) -> list[LabelTier]:
 
 
 def _read_elan(root: Element, where: str) -> list[LabelTier]:
-    """Return the tiers of ELAN. Annotations without times divide another one: they are one label with its time.
-
-    Times are those of the recording, which may begin later than another one. Raises InputError: they are of frames.
-    """
+    """Return the tiers of ELAN. Annotations without times divide another one: they are one label with its time."""
     unit = next((each.get("TIME_UNITS") for each in root.iter("HEADER")), None) or "milliseconds"
     if unit != "milliseconds":
         raise InputError(f"{where}: its times are {shorten(unit)}, required milliseconds; save it again in ELAN")

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
 from lipmotion.meshes.model.shape_names import is_known
+from lipmotion.storage.archive import UNREADABLE
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json
 from lipmotion.storage.sources import check_kind, check_regular
@@ -31,10 +32,7 @@ LOG = logging.getLogger("lipmotion")
 Array = NDArray[np.float64]
 About = Mapping[str, str]
 LARGEST_MOTION_BYTES = 1 << 31  # most bytes of a motion file: four hours of a hundred channels
-
 LARGEST_UNITS_BYTES = 1 << 28  # most bytes of a file of units alone: phones of a day
-
-
 LARGEST_WEIGHT = 4.0  # largest weight of a blendshape that is read; captures and sculpted faces go a little over 1
 TOLERATED_WEIGHT = 0.1  # by how much weights may go beyond 0 to 1 without a warning
 
@@ -45,7 +43,10 @@ class MotionFormat:
 
     write   : writes a generation to a path; the mappings describe the origin of its speech and of its model
     read    : returns motion and units of a file, or raises InputError; None: the format cannot be read
-    check   : raises ExportError for motion that does not fit into such a file
+    needs   : names of channels of which the motion must have one; ``WEIGHT``: a weight; empty: any channels
+    max_bytes : of a file that is read
+    min_frames : so many frames it must have, at least one where it needs channels
+    check   : raises ExportError for motion that does not fit into such a file otherwise
     units   : returns the units of a file that holds units alone, and None of other files; None: there are no such files
     curves  : the set of curves that such a file holds, as of ``pipeline.outputs.curve_sets.curves_of`` (``arkit``, for
               instance): the pipeline computes them from the motion; empty: the channels of the motion
@@ -73,6 +74,9 @@ class MotionFormat:
     names_sound: bool = False
     mouth: bool = False
     keyed: bool = False
+    needs: tuple[str, ...] = ()
+    min_frames: int = 0
+    max_bytes: int = LARGEST_MOTION_BYTES
 
 
 MOTION_FORMATS: Registry[MotionFormat] = Registry(
@@ -130,10 +134,6 @@ def find_suffix(path: Path, known: Collection[str] | None = None) -> str:
 
     The longest known suffix counts: ``take.livelink.csv`` has ``.livelink.csv``, ``take.1.csv`` ``.csv``.
     known : suffixes; None: those of all motion formats
-
-    >>> from pathlib import Path
-    >>> find_suffix(Path("take.1.CSV")), find_suffix(Path("take.fbx"))
-    ('.csv', '')
     """
     suffixes, known = [suffix.lower() for suffix in path.suffixes], list_suffixes() if known is None else known
     endings = ("".join(suffixes[first:]) for first in range(len(suffixes)))
@@ -165,6 +165,12 @@ def check_motion(path: Path, motion: Motion) -> None:
     chosen = find_motion_format(path)
     if motion.values.size and not np.isfinite([motion.values.min(), motion.values.max()]).all():  # no mask of an hour
         raise ExportError(f"{path}: the motion has values that are not finite; interpolate them before writing")
+    known = {*motion.names, *(channel.unit for channel in motion.channels)}
+    lacking = bool(chosen.needs) and not known & {*chosen.needs}
+    if lacking or len(motion.values) < max(chosen.min_frames, bool(chosen.needs)):
+        what = f"{path}: the motion has {len(motion.values)} frames of {', '.join(motion.names[:4]) or 'no channel'}"
+        needed = f"{max(chosen.min_frames, 1)} or more of {' or '.join(chosen.needs) or 'any channel'}"
+        raise ExportError(f"{what}, required {needed}; write .json or .csv")
     chosen.check(motion)
 
 
@@ -187,15 +193,17 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     named = _name_by_content(path)
     other = find_suffix(named, [f".{name}" for name in MOTION_READERS.names])
     added = MOTION_READERS.load(other.removeprefix(".")) if other and not find_suffix(named) else None
-    read = _format_of(named).read if find_suffix(named) else added
+    read, max_bytes = added, LARGEST_MOTION_BYTES
+    if find_suffix(named):
+        read, max_bytes = _format_of(named).read, _format_of(named).max_bytes
     if read is None:
         known = ", ".join(list_read_suffixes())
         raise InputError(f"{path}: cannot read motion from {_suffix(path)}; use one of {known}")
     check_regular(path, "motion file")
     with _name_errors(path):
         size = path.stat().st_size
-        if size > LARGEST_MOTION_BYTES:
-            raise InputError(f"{size} bytes, required at most {LARGEST_MOTION_BYTES}: is it a motion file?")
+        if size > max_bytes:
+            raise InputError(f"{size} bytes, required at most {max_bytes}: is it a motion file? divide long takes")
         motion, units = read(path)
         if not (finite := np.isfinite(motion.values)).all():
             frame, column = np.argwhere(~finite)[0].tolist()
@@ -218,7 +226,7 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
 
 @contextmanager
 def _name_errors(path: Path) -> Iterator[None]:
-    """Put a file's name before the message of an error of reading it, once."""
+    """Put a file's name before the message of an error of reading it, once; errors of damage become InputError."""
     try:
         yield
     except OSError as error:
@@ -226,6 +234,8 @@ def _name_errors(path: Path) -> Iterator[None]:
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from error
+    except (*UNREADABLE, IndexError, OverflowError, RecursionError) as error:
+        raise InputError(f"{path}: damaged, or no such file ({str(error)[:300]}); export it again") from error
 
 
 def read_units(path: Path) -> Timeline[Unit]:

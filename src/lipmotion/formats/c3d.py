@@ -4,8 +4,7 @@
 A ``.c3d`` has labelled points, a place of each in every frame, and analog channels. Written points are in millimetres,
 with two markers more, ``EYE_L`` and ``EYE_R``, at the outer eye corners. Markers of others become channels ``x_NAME``,
 ``y_NAME``, ``z_NAME`` in the head's frame: eye distances, origin between the outer eye corners, x to the speaker's
-left, y up, z out of the face. Files of Intel's, DEC's and MIPS' processors are read, points as fractions or as
-scaled whole numbers; written are Intel's.
+left, y up, z out of the face. Points are read as fractions or as scaled whole numbers, of Intel's processors.
 
 A ``.bvh`` is in centimetres, y up, z out of the face: an eye distance is ``CENTIMETRES``. Every point is a joint
 ``LIP_13`` or ``JAW_152`` under the joint ``head``, with three channels of its place; offsets are the rest pose. It is
@@ -38,13 +37,10 @@ from lipmotion.types import EYE_DISTANCE, Channel, Generation, Motion, Timeline,
 Array = NDArray[np.float64]
 Values = list[str] | NDArray[np.floating[Any]] | NDArray[np.integer[Any]]
 """The values of a parameter: texts, or numbers in the order of the file."""
-
 BLOCK = 512
 MARK = 0x50
-INTEL_PROCESSOR, DEC_PROCESSOR, MIPS_PROCESSOR = 84, 85, 86
-"""The processor types: the lowest byte first; the same, but fractions of DEC's own kind; the highest byte first."""
+INTEL_PROCESSOR = 84  # the lowest byte first; others (DEC, MIPS) are no more
 MAX_FRAMES, OVERFLOW = 65_535, 65_536  # most frames that the header can number, and after how many it begins at 0 again
-LARGEST_FILE_BYTES = 1 << 28  # most bytes of a file that is read
 MAX_POINTS, MAX_ANALOG_CHANNELS = 2_000, 5_000
 LONGEST_LABEL_CHARACTERS = 64
 LOG = logging.getLogger("lipmotion")
@@ -57,14 +53,10 @@ _POINT = re.compile(r"[xyz]_(\d{1,3})$")
 _UNLABELLED = re.compile(r"\*|[uc]_?\d+$|unlabel|point\d+$", re.IGNORECASE)
 
 
-def _numbers(content: bytes, kind: str, count: int, at: int, processor: int) -> Array:
-    """Return numbers of a processor as doubles; ``kind``: that of NumPy. Raises ValueError: there are not so many."""
-    order = ">" if processor == MIPS_PROCESSOR else "<"
-    if kind == "f4" and processor == DEC_PROCESSOR:  # words the other way round, exponents larger by 2
-        words = np.frombuffer(content, "<u2", 2 * count, at).reshape(-1, 2)[:, ::-1]
-        return np.ascontiguousarray(words).view("<f4")[:, 0].astype(np.float64) / 4
+def _numbers(content: bytes, kind: str, count: int, at: int = 0) -> Array:
+    """Return numbers as doubles; ``kind``: that of NumPy. Raises ValueError: there are not so many."""
     with np.errstate(invalid="ignore"):  # damaged numbers become NaN, as of markers that were not seen
-        return np.frombuffer(content, order + kind, count, at).astype(np.float64)
+        return np.frombuffer(content, f"<{kind}", count, at).astype(np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,50 +85,42 @@ class C3dFile:
 def read_c3d(path: Path) -> C3dFile:
     """Return the points of a file, and its analog channels if they have one sample a frame.
 
-    Raises InputError: not a C3D file, cut short, too large, of a processor that is not known, or sizes that disagree.
+    Raises InputError: not a C3D file, cut short, or of another processor. ValueError, IndexError, OverflowError,
+    struct.error: sizes that disagree.
     """
-    size = path.stat().st_size
-    if size > LARGEST_FILE_BYTES:
-        raise InputError(f"{size} bytes, required at most {LARGEST_FILE_BYTES}: divide the capture into takes")
-    try:
-        content = path.read_bytes()
-        if len(content) < 2 * BLOCK or content[1] != MARK:
-            raise InputError("not a C3D file: its first bytes are not those of the format; export the capture again")
-        start = (content[0] - 1) * BLOCK
-        processor = content[start + 3]
-        if processor not in {INTEL_PROCESSOR, DEC_PROCESSOR, MIPS_PROCESSOR}:
-            raise InputError(f"its processor type is {processor}, required 84 (Intel), 85 or 86; export the capture so")
-        parameters = _read_parameters(content, start + 4, processor)
-        words: list[int] = _numbers(content, "u2", 10, 0, processor).astype(int).tolist()
-        _, points, analog, first, last, _, _, _, block, samples = words
-        rate_hz = _number(parameters, "POINT.RATE", _numbers(content, "f4", 1, 20, processor)[0])
-        scale = _number(parameters, "POINT.SCALE", _numbers(content, "f4", 1, 12, processor)[0])
-        if not (0 <= points <= MAX_POINTS and 0 <= analog <= MAX_ANALOG_CHANNELS and points + analog > 0):
-            raise InputError(f"{points} points and {analog} analog values a frame, required at least one of each")
-        if not 0 < rate_hz <= 1e5 or not np.isfinite(scale) or not scale:
-            raise InputError(f"the rate is {rate_hz:g} Hz and the scale {scale:g}, required positive numbers")
-        kind, width = "f4" if scale < 0 else "i2", points * 4 + analog
-        data = content[(block - 1) * BLOCK :] if block > 1 else b""
-        held, spare = len(data) // (width * int(kind[1])), BLOCK // (width * int(kind[1])) + 1
-        frames = _count_frames(parameters, last - first + 1, held, spare)
-        rows = _numbers(data, kind, frames * width, 0, processor).reshape(frames, width)
-        placed = rows[:, : points * 4].reshape(len(rows), points, 4)
-        places = placed[..., :3] * (1.0 if scale < 0 else scale)
-        unseen = (placed[..., 3] < 0) | ~np.isfinite(places).all(axis=2) | (places == 0).all(axis=2)
-        places[unseen] = np.nan
-        labels = [label for n in ("", "2", "3") for label in _texts(parameters, f"POINT.LABELS{n}")]
-        labels = [*labels, *(f"point{number}" for number in range(len(labels) + 1, points + 1))][:points]
-        curves = rows[:, points * 4 :] if samples == 1 else rows[:, :0]
-        count = curves.shape[1]
-        names = [*_texts(parameters, "ANALOG.LABELS"), *(f"analog{n}" for n in range(count))][:count]
-        units = [*_texts(parameters, "ANALOG.UNITS"), *[""] * count][:count]
-        unit, software = (next(iter(_texts(parameters, name)), "") for name in ("POINT.UNITS", "MANUFACTURER.SOFTWARE"))
-        exact_hz = exact_rate(float(f"{rate_hz:.7g}"), 5e-6)
-        return C3dFile(tuple(labels), places, exact_hz, unit or "mm", software, curves, tuple(names), tuple(units))
-    except InputError:
-        raise
-    except (struct.error, IndexError, ValueError, OverflowError) as error:
-        raise InputError(f"not a C3D file ({error}); export the capture again") from error
+    content = path.read_bytes()
+    if len(content) < 2 * BLOCK or content[1] != MARK:
+        raise InputError("not a C3D file: its first bytes are not those of the format; export the capture again")
+    start = (content[0] - 1) * BLOCK
+    if content[start + 3] != INTEL_PROCESSOR:
+        raise InputError(f"its processor type is {content[start + 3]}, required 84 (Intel); export the capture so")
+    parameters = _read_parameters(content, start + 4)
+    words: list[int] = _numbers(content, "u2", 10).astype(int).tolist()
+    _, points, analog, first, last, _, _, _, block, samples = words
+    rate_hz = _number(parameters, "POINT.RATE", _numbers(content, "f4", 1, 20)[0])
+    scale = _number(parameters, "POINT.SCALE", _numbers(content, "f4", 1, 12)[0])
+    if not (0 <= points <= MAX_POINTS and 0 <= analog <= MAX_ANALOG_CHANNELS and points + analog > 0):
+        raise InputError(f"{points} points and {analog} analog values a frame, required at least one of each")
+    if not 0 < rate_hz <= 1e5 or not np.isfinite(scale) or not scale:
+        raise InputError(f"the rate is {rate_hz:g} Hz and the scale {scale:g}, required positive numbers")
+    kind, width = "f4" if scale < 0 else "i2", points * 4 + analog
+    data = content[(block - 1) * BLOCK :] if block > 1 else b""
+    held, spare = len(data) // (width * int(kind[1])), BLOCK // (width * int(kind[1])) + 1
+    frames = _count_frames(parameters, last - first + 1, held, spare)
+    rows = _numbers(data, kind, frames * width).reshape(frames, width)
+    placed = rows[:, : points * 4].reshape(len(rows), points, 4)
+    places = placed[..., :3] * (1.0 if scale < 0 else scale)
+    unseen = (placed[..., 3] < 0) | ~np.isfinite(places).all(axis=2) | (places == 0).all(axis=2)
+    places[unseen] = np.nan
+    labels = [label for n in ("", "2", "3") for label in _texts(parameters, f"POINT.LABELS{n}")]
+    labels = [*labels, *(f"point{number}" for number in range(len(labels) + 1, points + 1))][:points]
+    curves = rows[:, points * 4 :] if samples == 1 else rows[:, :0]
+    count = curves.shape[1]
+    names = [*_texts(parameters, "ANALOG.LABELS"), *(f"analog{n}" for n in range(count))][:count]
+    units = [*_texts(parameters, "ANALOG.UNITS"), *[""] * count][:count]
+    unit, software = (next(iter(_texts(parameters, name)), "") for name in ("POINT.UNITS", "MANUFACTURER.SOFTWARE"))
+    exact_hz = exact_rate(float(f"{rate_hz:.7g}"), 5e-6)
+    return C3dFile(tuple(labels), places, exact_hz, unit or "mm", software, curves, tuple(names), tuple(units))
 
 
 def _count_frames(parameters: dict[str, Values], numbered: int, held: int, spare: int) -> int:
@@ -171,18 +155,18 @@ def _number(parameters: dict[str, Values], name: str, otherwise: float) -> float
     return float(values[0] + (1 << 16) * values[1] if len(values) == 2 else values[0])
 
 
-def _read_parameters(content: bytes, at: int, processor: int) -> dict[str, Values]:
+def _read_parameters(content: bytes, at: int) -> dict[str, Values]:
     groups: dict[int, str] = {}
     stored: list[tuple[int, str, Values]] = []
     while at + 2 <= len(content) and content[at]:
         length, group = abs(struct.unpack_from("b", content, at)[0]), struct.unpack_from("b", content, at + 1)[0]
         name = content[at + 2 : at + 2 + length].decode("ascii").strip().upper()
         body = at + 2 + length
-        step = int(_numbers(content, "i2", 1, body, processor)[0])
+        (step,) = struct.unpack_from("<h", content, body)
         if group < 0:
             groups[-group] = name
         else:
-            stored.append((group, name, _read_values(content, body + 2, processor)))
+            stored.append((group, name, _read_values(content, body + 2)))
         if step == 0:
             break
         if step < 0:
@@ -191,7 +175,7 @@ def _read_parameters(content: bytes, at: int, processor: int) -> dict[str, Value
     return {f"{groups.get(group, '')}.{name}": values for group, name, values in stored}
 
 
-def _read_values(content: bytes, at: int, processor: int) -> Values:
+def _read_values(content: bytes, at: int) -> Values:
     """Return the values of a parameter whose type stands at a place."""
     kind, dimensions = struct.unpack_from("bB", content, at)
     sizes = list(content[at + 2 : at + 2 + dimensions])
@@ -203,7 +187,7 @@ def _read_values(content: bytes, at: int, processor: int) -> Values:
         return [text.decode("latin-1").rstrip("\0 ")[:LONGEST_LABEL_CHARACTERS] for text in texts]
     if kind not in {1, 2, 4} or len(data) < count * kind:
         raise InputError(f"a parameter of type {kind} and sizes {sizes} does not fit; export the capture again")
-    return _numbers(data, {1: "u1", 2: "u2", 4: "f4"}[kind], count, 0, processor)
+    return _numbers(data, {1: "u1", 2: "u2", 4: "f4"}[kind], count)
 
 
 def write_c3d(path: Path, content: C3dFile) -> None:
@@ -264,9 +248,7 @@ def _section(groups: dict[str, dict[str, int | float | Values]]) -> bytes:
 
 
 def check(motion: Motion) -> None:
-    """Raise ExportError if motion does not fit: no frames, or names that are no labels."""
-    if not len(motion.values):
-        raise ExportError("the motion has no frames, required at least one in .c3d")
+    """Raise ExportError if motion has names that are no labels, or too many channels."""
     if "" in motion.names:
         raise ExportError("a channel has no name, required one in .c3d; write .json or .npz")
     for text in [text for channel in motion.channels for text in (channel.name, channel.unit)]:
@@ -345,9 +327,7 @@ def _points(motion: Motion) -> list[int]:
     return [point for point in numbers if all(Channel(f"{axis}_{point}") in eyes for axis in "xyz")]
 
 
-MOTION_FORMAT = MotionFormat(write, read, check)
-
-
+MOTION_FORMAT = MotionFormat(write, read, check, min_frames=1, max_bytes=1 << 28)
 MILLIMETRES = 90.0  # the distance between the outer eye corners of a grown person, where markers do not show it
 UNITS = {"mm": 1.0, "millimeter": 1.0, "cm": 10.0, "m": 1000.0, "meter": 1000.0, "in": 25.4, "inch": 25.4}
 """Units of length in millimetres."""
@@ -359,7 +339,6 @@ RIGID = ("forehead", "head", "nasion", "nosebridge", "glabella", "temple", "ear"
 MIN_RIGID_MARKERS = 3
 LARGEST_COORDINATE = 1e6
 MIN_DISTANCE = 1e-3  # least distance of the eye corners in any frame, as a share of the median
-
 DISTANCES = {"opening": (13, 14), "width": (61, 291), "outer": (0, 17)}  # channels that are the distance of two points
 MARKER = re.compile(r"(?:lip|jaw|p|point)[ _]?(\d{1,3})$", re.IGNORECASE)  # at a point of the face mesh
 
@@ -456,12 +435,6 @@ ROOT_CHANNELS = "Xposition Yposition Zposition Zrotation Xrotation Yrotation"
 POINT_CHANNELS = "Xposition Yposition Zposition"
 
 
-def check_bvh(motion: Motion) -> None:
-    """Raise ExportError if motion has no opening, or no frames."""
-    if "opening" not in motion.names or not len(motion.values):
-        raise ExportError("the motion has no channel 'opening' to place lip points by, or no frame; write .json, .csv")
-
-
 def write_bvh(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write the points; of motion with distances alone, they move as mouths do (``fitting.blendshape_motion``)."""
     motion, template = generation.motion, build_mouth()
@@ -479,4 +452,4 @@ def write_bvh(path: Path, generation: Generation, _source: Mapping[str, str], _m
             file.write(f"0 0 0 0 0 0 {row.replace(',', ' ')}\n")
 
 
-BVH = MotionFormat(write_bvh, check=check_bvh, mouth=True)
+BVH = MotionFormat(write_bvh, needs=("opening",), mouth=True)

@@ -7,8 +7,10 @@ parameters 1 (viseme) and 2 (expression) have four and six values; they are pass
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping
 from functools import partial
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -26,19 +28,10 @@ STEPS = 1024.0
 MOUTH_TO_NOSE = 0.30
 """The distance from the nose to where the lips meet (MNS0) in a mean face, in eye distances; the width of the mouth
 (MW0) is the template's."""
-PARAMETERS = (
-    (3, "open_jaw", 152, 1, -1, "N"), (4, "lower_t_midlip", 13, 1, -1, "N"), (5, "raise_b_midlip", 14, 1, 1, "N"),
-    (6, "stretch_l_cornerlip", 308, 0, 1, "W"), (7, "stretch_r_cornerlip", 78, 0, -1, "W"),
-    (8, "lower_t_lip_lm", 311, 1, -1, "N"), (9, "lower_t_lip_rm", 81, 1, -1, "N"),
-    (10, "raise_b_lip_lm", 402, 1, 1, "N"), (11, "raise_b_lip_rm", 178, 1, 1, "N"),
-    (12, "raise_l_cornerlip", 308, 1, 1, "N"), (13, "raise_r_cornerlip", 78, 1, 1, "N"),
-    (14, "thrust_jaw", 152, 2, 1, "N"), (15, "shift_jaw", 152, 0, -1, "W"), (16, "push_b_lip", 17, 2, 1, "N"),
-    (17, "push_t_lip", 0, 2, 1, "N"), (51, "lower_t_midlip_o", 0, 1, -1, "N"), (52, "raise_b_midlip_o", 17, 1, 1, "N"),
-    (53, "stretch_l_cornerlip_o", 291, 0, 1, "W"), (54, "stretch_r_cornerlip_o", 61, 0, -1, "W"),
-    (55, "lower_t_lip_lm_o", 269, 1, -1, "N"), (56, "lower_t_lip_rm_o", 39, 1, -1, "N"),
-    (57, "raise_b_lip_lm_o", 405, 1, 1, "N"), (58, "raise_b_lip_rm_o", 181, 1, 1, "N"),
-    (59, "raise_l_cornerlip_o", 291, 1, 1, "N"), (60, "raise_r_cornerlip_o", 61, 1, 1, "N"),
-)  # fmt: skip
+_TABLE = resources.files(__package__).joinpath("fap.csv").read_text(encoding="ascii").splitlines()[1:]
+PARAMETERS = tuple(
+    (int(n), name, int(point), int(axis), int(sign), unit) for n, name, point, axis, sign, unit in csv.reader(_TABLE)
+)
 """The parameters of lips and jaw that points show, left and right the speaker's own: number, name, point, axis (x left,
 y up, z out), sign, unit (N: mouth to nose, W: width of the mouth)."""
 VERSION = "2.1"
@@ -74,35 +67,32 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """Return the parameters of a file; one that is not given keeps its value. Raises InputError: not such a file."""
-    try:
-        with path.open(encoding="utf-8-sig") as file:
-            lines = (line for line in iter(partial(file.readline, LONGEST_LINE), "") if line[0] != "#" and line.strip())
-            head = next(lines, "").split()
-            if len(head) < 4 or not head[0].startswith("2."):
-                raise ValueError(f"it begins with {shorten(' '.join(head))!r}, required {VERSION} NAME FPS FRAMES")
-            rate, frames = head[-2], int(head[-1])
-            rows: list[NDArray[np.int32]] = []
-            current, used = np.zeros(COUNT, np.int32), np.zeros(COUNT, bool)
-            if not 0 < frames <= MAX_FRAMES:
-                raise ValueError(f"{frames} frames, required 1 to {MAX_FRAMES}")
-            for frame in range(frames):
-                marks, values = next(lines, "").split(), next(lines, "").split()[1:]
-                if len(marks) != COUNT or set(marks) - {"0", "1"}:
-                    raise ValueError(f"frame {frame} of {frames} has {len(marks)} marks, required {COUNT} of 0 or 1")
-                marked = [number for number, mark in enumerate(marks, 1) if mark == "1"]
-                needed = sum(MANY_VALUES.get(number, 1) for number in marked)
-                if len(values) != needed:
-                    raise ValueError(f"frame {frame} of {frames} has {len(values)} values, required {needed}")
-                skipped = sum(MANY_VALUES[number] for number in marked if number in MANY_VALUES)
-                given = [int(value) for value in values[skipped:]]
-                if max(map(abs, given), default=0) > LARGEST_VALUE:
-                    raise ValueError(f"frame {frame} has a value over {LARGEST_VALUE}")
-                current = current.copy()
-                places = [number - 1 for number in marked if number not in MANY_VALUES]
-                current[places], used[places] = given, True
-                rows.append(current)
-    except ValueError as error:
-        raise InputError(f"not a file of facial animation parameters ({error}); export it again") from error
+    with path.open(encoding="utf-8-sig") as file:
+        lines = (line for line in iter(partial(file.readline, LONGEST_LINE), "") if line[0] != "#" and line.strip())
+        head = next(lines, "").split()
+        if len(head) < 4 or not head[0].startswith("2."):
+            raise InputError(f"it begins with {shorten(' '.join(head))!r}, required {VERSION} NAME FPS FRAMES")
+        rate, frames = head[-2], int(head[-1])
+        rows: list[NDArray[np.int32]] = []
+        current, used = np.zeros(COUNT, np.int32), np.zeros(COUNT, bool)
+        if not 0 < frames <= MAX_FRAMES:
+            raise InputError(f"{frames} frames, required 1 to {MAX_FRAMES}")
+        for frame in range(frames):
+            marks, values = next(lines, "").split(), next(lines, "").split()[1:]
+            if len(marks) != COUNT or set(marks) - {"0", "1"}:
+                raise InputError(f"frame {frame} of {frames} has {len(marks)} marks, required {COUNT} of 0 or 1")
+            marked = [number for number, mark in enumerate(marks, 1) if mark == "1"]
+            needed = sum(MANY_VALUES.get(number, 1) for number in marked)
+            if len(values) != needed:
+                raise InputError(f"frame {frame} of {frames} has {len(values)} values, required {needed}")
+            skipped = sum(MANY_VALUES[number] for number in marked if number in MANY_VALUES)
+            given = [int(value) for value in values[skipped:]]
+            if max(map(abs, given), default=0) > LARGEST_VALUE:
+                raise InputError(f"frame {frame} has a value over {LARGEST_VALUE}")
+            current = current.copy()
+            places = [number - 1 for number in marked if number not in MANY_VALUES]
+            current[places], used[places] = given, True
+            rows.append(current)
     numbers = np.flatnonzero(used) + 1
     channels = tuple(Channel(NAMES.get(int(number), f"fap{number}"), FAP) for number in numbers)
     return Motion(np.stack(rows)[:, numbers - 1].astype(np.float64), exact_rate(float(rate)), channels), Timeline(())

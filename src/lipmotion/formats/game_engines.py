@@ -21,7 +21,10 @@ import json
 import re
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
+from importlib import resources
 from pathlib import Path
+from string import Template
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +48,6 @@ LINEAR, CONSTANT = 69, 103
 """Modes of the tangents of a key in Unity: straight, or held until the next key, on both sides."""
 RATE_HZ = 60.0
 _PLAIN = re.compile(r"[A-Za-z][\w.]*", re.ASCII)  # names that need no quotes
-_EMPTY = ("m_RotationCurves", "m_CompressedRotationCurves", "m_EulerCurves", "m_PositionCurves", "m_ScaleCurves")
 NODE = "."  # the node whose blend shapes move in Godot: the root node of the AnimationPlayer itself
 FORBIDDEN = frozenset('".:@/%')  # characters that no name in a path of Godot has
 
@@ -64,36 +66,15 @@ def _choose_keys(
     return motion.time_s[frames], values[frames], held
 
 
-def check_unity(motion: Motion) -> None:
-    """Raise ExportError if motion has no weights, or fewer than two frames."""
-    if not _list_weights(motion) or len(motion.values) < 2:
-        raise ExportError("the motion has no blendshapes, or no two frames; write .json or .csv")
-
-
 def write_unity(path: Path, generation: Generation, source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write one clip, named as the recording, with a curve for each weight of the motion."""
     motion, name = generation.motion, Path(source.get("path", "")).stem or "speech"
     end_s = float(motion.time_s[-1])
     curves = [line for weight in _list_weights(motion) for line in _list_curve(generation, weight)]
-    lines = [
-        *("%YAML 1.1", "%TAG !u! tag:unity3d.com,2011:", "--- !u!74 &7400000", "AnimationClip:"),
-        *("  m_ObjectHideFlags: 0", "  m_CorrespondingSourceObject: {fileID: 0}", "  m_PrefabInstance: {fileID: 0}"),
-        *("  m_PrefabAsset: {fileID: 0}", f"  m_Name: {_quote(name)}", "  serializedVersion: 6", "  m_Legacy: 0"),
-        *("  m_Compressed: 0", "  m_UseHighQualityCurve: 1", *(f"  {name}: []" for name in _EMPTY)),
-        *("  m_FloatCurves:", *curves, "  m_PPtrCurves: []"),
-        *(f"  m_SampleRate: {motion.rate_hz:.9g}", "  m_WrapMode: 0"),
-        *("  m_Bounds:", "    m_Center: {x: 0, y: 0, z: 0}", "    m_Extent: {x: 0, y: 0, z: 0}"),
-        *("  m_ClipBindingConstant:", "    genericBindings: []", "    pptrCurveMapping: []"),
-        *("  m_AnimationClipSettings:", "    serializedVersion: 2", "    m_AdditiveReferencePoseClip: {fileID: 0}"),
-        *("    m_AdditiveReferencePoseTime: 0", "    m_StartTime: 0", f"    m_StopTime: {end_s:.6f}"),
-        *("    m_OrientationOffsetY: 0", "    m_Level: 0", "    m_CycleOffset: 0", "    m_HasAdditiveReferencePose: 0"),
-        *("    m_LoopTime: 0", "    m_LoopBlend: 0", "    m_LoopBlendOrientation: 0", "    m_LoopBlendPositionY: 0"),
-        *("    m_LoopBlendPositionXZ: 0", "    m_KeepOriginalOrientation: 0", "    m_KeepOriginalPositionY: 1"),
-        *("    m_KeepOriginalPositionXZ: 0", "    m_HeightFromFeet: 0", "    m_Mirror: 0"),
-        *("  m_EditorCurves:", *curves, "  m_EulerEditorCurves: []", "  m_HasGenericRootTransform: 0"),
-        *("  m_HasMotionFloatCurves: 0", "  m_Events: []"),
-    ]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    template = resources.files(__package__).joinpath("unity_clip.yaml").read_text(encoding="ascii")
+    members = {"name": _quote(name), "curves": "\n".join(curves), "rate_hz": f"{motion.rate_hz:.9g}"}
+    text = Template(template).substitute(members, end_s=f"{end_s:.6f}")
+    path.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _quote(name: str) -> str:
@@ -122,11 +103,8 @@ def _list_curve(generation: Generation, name: str) -> Iterator[str]:
 
 
 def check_godot(motion: Motion) -> None:
-    """Raise ExportError if motion has no weights, or a name that no path of Godot can have."""
-    names = _list_weights(motion)
-    if not names or not len(motion.values):
-        raise ExportError("the motion has no blendshapes, or no frames; write .json or .csv")
-    for name in names:
+    """Raise ExportError if a weight has a name that no path of Godot can have."""
+    for name in _list_weights(motion):
         if FORBIDDEN & {*name}:
             letters = '. : @ / % "'
             raise ExportError(f"the blendshape {name!r} has one of the letters {letters}, which Godot replaces: rename")
@@ -153,10 +131,9 @@ def write_godot(path: Path, generation: Generation, _source: Mapping[str, str], 
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 
-UNITY = MotionFormat(write_unity, check=check_unity, curves="face", rate_hz=RATE_HZ, other_curves=True, keyed=True)
-GODOT = MotionFormat(write_godot, check=check_godot, curves="face", other_curves=True, keyed=True)
-
-
+_WEIGHTS: dict[str, Any] = {"needs": (WEIGHT,), "curves": "face", "other_curves": True, "keyed": True}
+UNITY = MotionFormat(write_unity, rate_hz=RATE_HZ, min_frames=2, **_WEIGHTS)
+GODOT = MotionFormat(write_godot, check=check_godot, **_WEIGHTS)
 OPEN, FORM = "ParamMouthOpenY", "ParamMouthForm"
 """Live2D's standard parameters: 0 closed to 1 open; −1 puckered to 1 wide, as in a smile."""
 FULL_GAP = 0.20  # the gap between the lips that is drawn as wholly open, eye distances
@@ -166,19 +143,13 @@ FPS = 30.0  # the frame rate that the file states; its keys are at any time
 TOLERANCE = 0.005  # largest error of a curve through the keys that are kept
 DECIMALS = 3
 LINEAR_SEGMENT, STEPPED_SEGMENT = 0, 2  # types of segments: straight to the next key, or held until it
-SHOWING = frozenset(("opening", "jawOpen"))  # channels that say how far the mouth is open
-
-
-def check_live2d(motion: Motion) -> None:
-    """Raise ExportError if motion shows neither an opening nor an open jaw, or has fewer than two frames."""
-    if not SHOWING & set(motion.names) or len(motion.values) < 2:
-        raise ExportError("the motion has no channel 'opening' or 'jawOpen', or no two frames; write .json or .csv")
+SHOWING = ("opening", "jawOpen")  # channels that say how far the mouth is open
 
 
 def write_live2d(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write two curves, and how many keys they have."""
     motion = generation.motion
-    curves, points, steps = [], 0, bool(SHOWING & set(generation.stepped))
+    curves, points, steps = [], 0, bool({*SHOWING} & {*generation.stepped})
     for name, values in ((OPEN, measure_mouth_open(generation)), (FORM, measure_mouth_form(generation))):
         rounded = np.round(values, DECIMALS) + 0.0
         frames = list_key_frames(motion.time_s, rounded, TOLERANCE, stepped=steps)
@@ -227,9 +198,7 @@ def _sum_effects(motion: Motion, effects: Array) -> Array:
     return total
 
 
-LIVE2D = MotionFormat(write_live2d, check=check_live2d, mouth=True)
-
-
+LIVE2D = MotionFormat(write_live2d, needs=SHOWING, min_frames=2, mouth=True)
 SCRIPT_MODULES = ("takes.py", "curves.py", "keying.py", "script.py")
 """The modules of the add-on that a script holds, one after another."""
 COPIED = "# -- what follows is copied into scripts\n"
@@ -257,7 +226,6 @@ files = "Reads the motion file and the sound that you choose"
 SCRIPT_DECIMALS = 5
 _BEGINNING = re.compile(r'\A""".*?"""\n', re.DOTALL)
 _IMPORT = re.compile(r"^from (\.\w*|__future__) import .*\n", re.MULTILINE)
-
 _HEAD = '''"""Lip motion for Blender, written by lipmotion.
 
 Select the face or the rig and run this script: in the text editor (Alt P), or

@@ -1,21 +1,26 @@
 """JSON of services: words and phones in time of recognisers, voices and aligners, by one table of their shapes.
 
 What a file is follows from the names in it, whatever their spelling (``start_time``, ``StartTime``, ``privStartTime``),
-and the unit of its times from how long its words last. Whatever else a service writes is passed over.
+and the unit of its times from how long its words last (``label_times.csv``). Parallel lists, and phones with durations
+alone, become lists of items first. Whatever else a service writes is passed over.
 
 Source: the public documentation of each service; figures and names of fields alone.
 """
 
 from __future__ import annotations
 
+import csv
 import json
 import logging
 import math
 import re
 from bisect import bisect_right
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
+from importlib import resources
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 from lipmotion.errors import InputError, shorten
@@ -24,7 +29,6 @@ from lipmotion.formats.label_tiers import (
     EARLIEST_S,
     LINES,
     PHONE_LABELS,
-    TICKS_PER_S,
     WORDS,
     LabelTier,
     TimedLabel,
@@ -33,7 +37,6 @@ from lipmotion.formats.label_tiers import (
     find_tier,
     find_time_unit,
     holds_phones,
-    parse_seconds,
     split_ipa,
 )
 from lipmotion.types import values
@@ -53,10 +56,12 @@ ROUNDING_S = 1.0  # an end may be so much before its start; recognisers write th
 
 
 class Times(NamedTuple):
-    """The names of the times of an item; ``per_s``: how many are a second, 0: how long words last decides.
+    """The names of the times of an item: a row of ``label_times.csv``, of which the first that an item has counts.
 
+    per_s  : how many of its times are a second, 0: how long words last decides
     usual  : how many usually are, where nothing can be told; 0: their own form must say it, else they are frames
-    pieces : tokens are pieces of words, and one without a blank before it goes on with the word ahead of it
+    kind   : ``event``: it lasts to the next one; ``sentence``: times begin at 0 in every message; ``pieces``: tokens
+             are pieces of words, and one without a blank before it goes on with the word ahead of it; or empty
     """
 
     start: str
@@ -64,42 +69,28 @@ class Times(NamedTuple):
     duration: str = ""
     per_s: int = 0
     usual: int = 1
-    pieces: bool = False
+    kind: str = ""
 
 
-POLLY = Times("time", usual=1000)
+UNTIMED, POLLY = Times(""), Times("time", usual=1000, kind="event")
 SPEECHIFY = Times("starttime", "endtime", "duration", 1000)  # of marks, whose start and end are places in the text
-TIMES = (
-    Times("offsetsfrom", "offsetsto", per_s=1000),  # whisper.cpp
-    Times("timestampstart", "timestampend", per_s=1),  # transformers
-    Times("startms", "endms", "durationms", 1000, pieces=True),  # Soniox
-    Times("starttimems", "endtimems", "durationms", 1000),
-    Times("starttime", "endtime", "duration"),  # AWS, Google, Yandex, Speechmatics, Qwen3-ASR, servers of Kokoro
-    Times("start", "end", "duration"),  # Whisper, Vosk, Deepgram, AssemblyAI (ms), Gladia, ElevenLabs, Gentle
-    Times("startts", "endts", per_s=1),  # Kokoro
-    Times("ts", "endts", "duration", 1),  # Rev.ai
-    Times("begin", "end", "dur"),  # aeneas
-    Times("tstartms", "", "ddurationms", 1000),  # YouTube, json3
-    Times("offsetinticks", "", "durationinticks", TICKS_PER_S),  # Azure, batch transcription
-    Times("offsetmilliseconds", "", "durationmilliseconds", 1000),  # Azure, fast transcription
-    Times("audiooffset", "", "duration", usual=TICKS_PER_S),  # Azure, speech synthesis
-    Times("offset", "", "duration", usual=TICKS_PER_S),  # Azure, speech recognition
-    Times("startoffset", "endoffset", usual=0),  # Google, version 2 ("0.1s"); NeMo's are frames
-    Times("timestart", "timeend"),  # PlayHT
-    Times("timebegin", "timeend", usual=1000),  # MiniMax, Hume; Gladia's first version in seconds
-    *(Times("startsec", "endsec", per_s=1), Times("startseconds", "endseconds", per_s=1)),
-    *(Times("starttimestamp", "endtimestamp"), Times("from", "to"), Times("begintime", "endtime")),
-    Times("timeseconds", per_s=1),  # Google, text to speech
-    *(Times("", "resultendtime", per_s=1), Times("", "resultendoffset", per_s=1)),  # Google, results without words
-)
+
+
+@cache
+def _list_times() -> tuple[Times, ...]:
+    lines = resources.files(__package__).joinpath("label_times.csv").read_text(encoding="ascii").splitlines()
+    rows = csv.reader(lines[1:])
+    return tuple(Times(start, end, length, int(a), int(b), kind) for start, end, length, a, b, kind, _ in rows)
+
+
 TEXTS = (
     "punctuatedword word alignedword text content value transcript sentence display lexical markname token lines "
-    "displaytext segs alternatives nbest label phone phoneme"
+    "displaytext segs alternatives nbest label phone phoneme symbol char"
 ).split()
 """The names of what is said, in order; of alternatives it is the first one."""
 ALTERNATIVES = ("alternatives", "nbest")
 WORD_LISTS = ("words", "items", "elements", "tokens", "timestamps", "timepoints", "timestampedwords")
-PHONE_LISTS = ("phones", "phonemes")
+PHONE_LISTS, CHARACTER_LISTS = ("phones", "phonemes"), ("characters", "charsegments")
 LISTS = (
     *WORD_LISTS,
     *"segments transcription utterances monologues events chunks fragments channels recognizedphrases".split(),
@@ -111,31 +102,28 @@ KINDS = ("type", "boundarytype", "kind", "category")
 NOT_SAID = re.compile(r"punct|spac|audio.?event|sentence|ssml|pause|silence|non.?speech|blank|laugh|noise|session")
 """Kinds of items that are no words."""
 SPEAKERS = "speaker speakerid speakerlabel speakertag channellabel channeltag channel".split()
-POLLY_VISEMES = {
-    "sil": SILENCE, "p": "p", "t": "t", "S": "sh", "T": "th", "f": "f", "k": "k", "i": "iy", "r": "r", "s": "s",
-    "l": "l", "u": "uw", "@": "ax", "a": "aa", "e": "ey", "E": "eh", "o": "ow", "O": "ao",
-    "B": "v", "D": "dh", "J": "n", "G": "g", "x": "k", "w": "w",
-}  # fmt: skip
-"""A phone with the mouth of each viseme of Amazon Polly; those of the last row are of other languages than English."""
-AZURE_VISEMES = "sil ah aa ao eh er ih uw ow aw oy ay hh r l s sh th f t k p".split()
-"""A phone with the mouth of each of Azure's 22 visemes, by its number."""
+PHONE_OF_VISEME: dict[str | int, str] = {
+    **{"sil": SILENCE, "p": "p", "t": "t", "S": "sh", "T": "th", "f": "f", "k": "k", "i": "iy", "r": "r", "s": "s"},
+    **{"l": "l", "u": "uw", "@": "ax", "a": "aa", "e": "ey", "E": "eh", "o": "ow", "O": "ao"},
+    **{"B": "v", "D": "dh", "J": "n", "G": "g", "x": "k", "w": "w"},
+    **dict(enumerate("sil ah aa ao eh er ih uw ow aw oy ay hh r l s sh th f t k p".split())),
+}
+"""A phone with the mouth of each viseme: of Amazon Polly by its name, the third row of other languages than English; of
+Azure by its number."""
 KOKORO_LETTERS = {"A": "eɪ", "I": "aɪ", "W": "aʊ", "Y": "ɔɪ", "O": "oʊ", "Q": "əʊ", "ᵊ": "ə", "T": "ɾ"}
 KOKORO_FRAMES_PER_S = 40  # durations are in frames of 600 samples at 24 kHz
-EVENTS = ("audiooffset", "time", "timeseconds")
-"""Starts of events, which last to the next one: of Azure, of Amazon Polly, of Google's marks."""
 POLLY_KINDS = ("sentence", "word", "viseme", "ssml")
 MARK = re.compile(r"[^\W\d_]+(?:['’-][^\W\d_]+)*[.,;:!?]?")  # a name of one of Google's marks that is the word after it
 COLUMNS = (
-    ("characters", ("characters", "characterstarttimesseconds", "characterendtimesseconds"), 1),  # ElevenLabs
-    ("characters", ("chars", "charstarttimesms", "chardurationsms"), 1000),  # ElevenLabs' web socket
-    ("characters", ("chars", "charstarttimesms", "charsdurationsms"), 1000),
-    ("characters", ("tokens", "timestamps"), 1),  # sherpa-onnx, pieces of words that last to the next one
-    (WORDS, ("words", "wordstarttimeseconds", "wordendtimeseconds"), 1),  # Inworld
-    (WORDS, ("words", "start", "end"), 1),  # Cartesia, word_timestamps
-    (PHONE_LABELS, ("phonemes", "start", "end"), 1),  # Cartesia, phoneme_timestamps
+    "characters characters=text characterstarttimesseconds=startsec characterendtimesseconds=endsec",  # ElevenLabs
+    "characters chars=text charstarttimesms=sentencestartms chardurationsms=sentencedurationms",  # its web socket
+    "characters chars=text charstarttimesms=sentencestartms charsdurationsms=sentencedurationms",
+    "characters tokens=text timestamps=start",  # sherpa-onnx, pieces of words that last to the next one
+    "words words=word wordstarttimeseconds=sentencestart wordendtimeseconds=sentenceend",  # Inworld
+    "words words=word start=start end=end",  # Cartesia, word_timestamps
+    "phonemes phonemes=symbol start=start end=end",  # Cartesia, phoneme_timestamps
 )
-"""Parallel lists of texts, starts and ends (durations where they are named so), and how many units are a second."""
-COLUMN_OWNERS = ("normalizedalignment", "alignment", "wordtimestamps", "phonemetimestamps", "wordalignment")
+"""Parallel lists: the list of items that they become, and the member that each is of them."""
 SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
 """A word of characters, or a direction in brackets (``[whispers]``), which is not said."""
 PARTIAL = "AddPartialTranscript"  # Speechmatics' message
@@ -152,9 +140,6 @@ class DamagedJsonError(InputError):
     """A text that begins as JSON is none."""
 
 
-UNTIMED = Times("")
-
-
 @dataclass(frozen=True, eq=False)
 class Row:
     """An item of a list: its times as they stand, NaN where they are missing, their names, what it is, and its line."""
@@ -166,6 +151,7 @@ class Row:
     times: Times = UNTIMED
     speaker: str = ""
     role: str = ""
+    is_symbol: bool = False  # of IPA, or a pause of a voice
     parts: tuple[Row, ...] = ()
     owner: Row | None = None
 
@@ -190,14 +176,11 @@ def parse_service_tiers(text: str, where: str) -> list[LabelTier] | None:
     objects = [(place, item) for place, item in numbered if isinstance(item, dict)]
     if not objects or any("mouthcues" in item or {"format", "channels"} <= item.keys() for _, item in objects):
         return None
-    for reader in (_read_columns, _read_durations, _read_named_tiers):
-        tiers = reader(objects, where)
-        if tiers is not None and not any(tier.labels for tier in tiers):
-            raise InputError(f"{where}: holds no word and no phone in time; ask the service for them")
-        if tiers is not None:
-            break
-    else:
-        tiers = _read_lists(objects, where) if len(objects) == len(numbered) else None
+    tiers = _read_named_tiers(objects, where)
+    if tiers is None and len(objects) == len(numbered):
+        tiers = _read_lists(objects, where)
+    if tiers is not None and not any(tier.labels for tier in tiers):
+        raise InputError(f"{where}: holds no word and no phone in time; ask the service for them")
     return tiers and [replace(t, labels=add_pauses(t.labels)) if t.role == PHONE_LABELS else t for t in tiers]
 
 
@@ -236,10 +219,7 @@ def _decode_documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
 
 
 def _parse_number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
-    """Return a time, NaN where it is missing, and how many such are a second where its form says that, else ``per_s``.
-
-    Times are numbers, texts (``"1.5"``, ``"1.500s"``, ``"PT1.5S"``, ``"00:00:01,500"``), or seconds with nanos.
-    """
+    """Return a time, NaN: it is missing, and how many such are a second, where its form says that, else ``per_s``."""
     if isinstance(value, dict) and value.keys() <= {"seconds", "nanos"}:  # 0 is left out
         seconds, nanos = (_parse_number(value.get(name, 0), where)[0] for name in ("seconds", "nanos"))
         return seconds + nanos / 1e9, 1
@@ -276,36 +256,30 @@ def _read_row(item: dict[str, Any], place: str, where: str, name: str, owner: Ro
     if text is None and any(item.get(name) for name in ("text", "word")):
         stored = shorten(repr(item.get("text") or item.get("word"))[:200])
         raise InputError(f"{where}: {place}: its text is {stored}, required a text")
-    if "visemeid" in item or item.get("type") == "viseme":  # a number of Azure's, or a name of Polly's
+    if "visemeid" in item or item.get("type") == "viseme":
         viseme, role = item.get("visemeid", item.get("value")), PHONE_LABELS
-        if isinstance(viseme, str):
-            if viseme not in POLLY_VISEMES:
-                known = " ".join(POLLY_VISEMES)
-                raise InputError(f"{where}: {place}: no viseme of Polly is {shorten(viseme)!r}; known are: {known}")
-            text = POLLY_VISEMES[viseme]
-        else:
-            last = len(AZURE_VISEMES) - 1
-            text = AZURE_VISEMES[require(values.whole(0, last), viseme, f"{where}: {place}: the viseme")]
+        text = PHONE_OF_VISEME[require(values.one_of(PHONE_OF_VISEME), viseme, f"{where}: {place}: the viseme")]
     if text is not None and "markname" in item and not MARK.fullmatch(text):
         raise InputError(
             f"{where}: {place} is the mark {shorten(text)!r}, which is no word; name every mark as the word that "
             'follows it, <mark name="hello"/>hello, or give the words as a transcript'
         )
     start, end, times = _find_times(item, f"{where}: {place}")
-    times = times._replace(pieces=times.pieces and name == "tokens")
-    return None if text is None else Row(start, end, text, place, times, who, role, owner=owner)
+    if times.kind == "pieces" and name != "tokens":
+        times = times._replace(kind="")
+    return None if text is None else Row(start, end, text, place, times, who, role, "symbol" in item, owner=owner)
 
 
 def _find_times(item: dict[str, Any], where: str) -> tuple[float, float, Times]:
-    """Return the start and the end of an item by the first row of ``TIMES`` that it has."""
+    """Return the start and the end of an item, and which names they have."""
     stamp, members = item.get("timestamp"), item
     if isinstance(stamp, list) and len(stamp) == 2:
         members = {**members, "timestampstart": stamp[0], "timestampend": stamp[1]}
     for name in ("time", "offsets"):  # an object of both
         if isinstance(item.get(name), dict):
             members = {**members, **{f"{name}{edge}": time for edge, time in item[name].items()}, name: None}
-    times = next((row for row in TIMES if (row.start or row.end) in members), UNTIMED)
-    if item.get("type") in POLLY_KINDS and times not in TIMES[:2]:
+    times = next((row for row in _list_times() if (row.start or row.end) in members), UNTIMED)
+    if item.get("type") in POLLY_KINDS and not {"offsetsfrom", "timestampstart"} & members.keys():
         is_speechify = {"start", "starttime"} <= members.keys()
         times = POLLY if members.get("time") is not None else SPEECHIFY if is_speechify else times
     start, per_s = _parse_number(members.get(times.start), where, times.per_s)
@@ -333,12 +307,7 @@ def _find_text(value: Any) -> str | None:
 def _collect_rows(
     value: Any, found: Found, where: str, place: str = "", path: Path = ("",), owner: Row | None = None, who: str = ""
 ) -> None:
-    """Add the items with a text in a value and in all its members to those of the same lists.
-
-    path       : the names of the members that lead to the value
-    owner, who : the line that it is in, and who speaks there
-    Of alternatives it is the first one; what is no speech, or not yet sure, is passed over, with all that is in it.
-    """
+    """Add the items with a text in a value, and in all its members, to those of the same lists; of alternatives one."""
     name = path[-1]
     if isinstance(value, list):
         for number, each in enumerate(value[:1] if name in ALTERNATIVES else value, 1):
@@ -350,7 +319,9 @@ def _collect_rows(
                 require(values.members({}), item, f"{where}: {name!r}, item {number}")
     if not isinstance(value, dict) or len(path) > DEEPEST or not _is_said(value):
         return
-    who = _find_speaker(value) or who
+    value = _list_items(value, ": ".join(filter(None, (where, f"{place}, {name}".strip(", ")))))
+    names = (str(value[name]) for name in SPEAKERS if isinstance(value.get(name), str | int))
+    who = next(filter(None, names), who)
     row = _read_row(value, place, where, name, owner, who)
     if name == "words" and row is None:
         raise InputError(f"{where}: {place}: no text; required a member 'word'")
@@ -359,9 +330,51 @@ def _collect_rows(
         _add_row(rows, row, value, where)
         check_count(len(rows), where)
     timed = row is not None and not math.isnan(row.start)
+    passed = {"tokens" if timed else "", "alignment" if isinstance(value.get("normalizedalignment"), dict) else ""}
     for member, each in value.items():
-        if not (timed and member == "tokens"):
+        if member not in passed:
             _collect_rows(each, found, where, place, (*path, member), row if timed else owner, who)
+
+
+def _list_items(item: dict[str, Any], where: str) -> dict[str, Any]:
+    """Return an object with lists of items for parallel lists (``COLUMNS``), and for the phones of Piper and Kokoro."""
+    for column in COLUMNS:
+        name, *pairs = column.split()
+        members = dict(pair.split("=") for pair in pairs)
+        lists: list[Any] = [item.get(member) for member in members]
+        if not all(isinstance(each, list) for each in lists) or any(isinstance(each, dict) for each in lists[0]):
+            continue
+        if len({len(each) for each in lists}) > 1:
+            raise InputError(f"{where}: required are the lists {', '.join(members)}, all of one length")
+        check_count(len(lists[0]), where)
+        items = [dict(zip(members.values(), row, strict=True)) for row in zip(*lists, strict=True)]
+        return {**{key: each for key, each in item.items() if key not in members}, name: items}
+    if isinstance(item.get("phonemealignments"), list):
+        rate = require(values.number(1000, 1e6), item.get("samplerate"), f"{where}: the sample rate in hertz")
+        phonemes = [each if isinstance(each, dict) else {} for each in item["phonemealignments"]]
+        return {
+            "phones": [{"symbol": p.get("phoneme"), "samples": p.get("numsamples"), "rate": rate} for p in phonemes]
+        }
+    if isinstance(item.get("preddur"), list) and "phonemes" in item:
+        letters = f"^{require(_TEXT, item['phonemes'], f'{where}: phonemes')}$"
+        if len(item["preddur"]) != len(letters):
+            what = f"{len(item['preddur'])} durations of {len(letters) - 2} phonemes"
+            raise InputError(f"{where}: {what}, required two more than phonemes")
+        ends = list(accumulate(_parse_time(each, where, KOKORO_FRAMES_PER_S) for each in item["preddur"]))
+        rows = zip(letters, [0.0, *ends], ends, strict=False)
+        phones = [{"symbol": KOKORO_LETTERS.get(a, a), "sentencestart": b, "sentenceend": c} for a, b, c in rows]
+        return {"tokens": item.get("tokens"), "phones": phones}
+    return item
+
+
+def _join_characters(rows: list[Row]) -> list[Row]:
+    """Return the words of characters or pieces of words; one without an end lasts to the next one."""
+    starts = [*(row.start for row in rows[1:]), math.inf]
+    lasting = [replace(row, end=after) if math.isnan(row.end) else row for row, after in zip(rows, starts, strict=True)]
+    owner_of = [row for row in lasting for _ in row.text]
+    found = SPOKEN_WORD.finditer("".join(row.text for row in rows).replace("▁", " "))
+    edges = ((match[0], owner_of[match.start()], owner_of[match.end() - 1]) for match in found)
+    return [replace(first, end=last.end, text=text, role=WORDS) for text, first, last in edges]
 
 
 def _is_said(item: dict[str, Any]) -> bool:
@@ -369,18 +382,21 @@ def _is_said(item: dict[str, Any]) -> bool:
     kinds = () if "chunks" in item else (str(item.get(kind, "")).lower() for kind in KINDS)
     assessed = item.get("pronunciationassessment")
     missed = item.get("case") == MISSED or (isinstance(assessed, dict) and assessed.get("errortype") == OMITTED)
-    unsure = any(item.get(name) == state for name, state in UNFINISHED.items())
+    is_sound = bool({"alignment", "normalizedalignment"} & item.keys())  # that is spoken, not heard
+    unsure = not is_sound and any(item.get(name) == state for name, state in UNFINISHED.items())
     return not (missed or unsure or any(map(NOT_SAID.search, kinds)))
 
 
 def _add_row(rows: list[Row], row: Row, item: dict[str, Any], where: str) -> None:
-    """Add an item; Gentle's phones have lengths alone, and a piece of a word goes on with the token ahead of it."""
+    """Add an item; phones of Gentle and Piper have lengths alone, and a piece of a word goes on with the one before."""
     same = bool(rows) and rows[-1].owner is row.owner
-    if row.role == PHONE_LABELS and math.isnan(row.start) and row.owner:
-        start = rows[-1].end if same else row.owner.start
-        length, phone = _parse_time(item.get("duration"), f"{where}: {row.place}"), row.text.partition("_")[0]
-        row = replace(row, start=start, end=start + length, text=phone, times=row.owner.times)
-    if same and row.times.pieces and not row.text[:1].isspace() and row.speaker == rows[-1].speaker:
+    if row.role == PHONE_LABELS and math.isnan(row.start) and (row.owner or "samples" in item):
+        start = rows[-1].end if same else row.owner.start if row.owner else 0.0
+        length = _parse_time(item.get("samples", item.get("duration")), f"{where}: {row.place}", item.get("rate", 1))
+        phone = row.text if row.is_symbol else row.text.partition("_")[0]
+        times = row.owner.times if row.owner else UNTIMED._replace(per_s=1)
+        row = replace(row, start=start, end=start + length, text=phone, times=times)
+    if same and row.times.kind == "pieces" and not row.text[:1].isspace() and row.speaker == rows[-1].speaker:
         end = rows[-1].end if math.isnan(row.end) or not any(map(str.isalnum, row.text)) else row.end
         before = rows.pop()
         row = replace(before, end=end, text=before.text + row.text)
@@ -388,16 +404,14 @@ def _add_row(rows: list[Row], row: Row, item: dict[str, Any], where: str) -> Non
 
 
 def _choose_rows(found: Found, *, phones: bool) -> list[Row]:
-    """Return the words, or else the lines, or the phones, of the lists that are known best; words within their lines.
-
-    Services say the same in several lists: the first ones count.
-    """
+    """Return the words, or else the lines, or the phones, of the lists that are known best; words in their lines."""
 
     def rank(path: Path) -> tuple[bool, int]:
         has_words = any(row.role == WORDS for row in kept[path])
         return not has_words, LISTS.index(path[-1]) if path[-1] in LISTS else len(LISTS)
 
     kept = {path: rows for (path, kind), rows in found.items() if kind == phones}
+    kept |= {path: _join_characters(rows) for path, rows in kept.items() if path[-1] in CHARACTER_LISTS}
     timed = [path for path in kept if any(row.times.end or not math.isnan(row.start) for row in kept[path])]
     rows = kept[min(timed, key=rank)] if timed else []
     parts: dict[int, list[Row]] = defaultdict(list)
@@ -417,16 +431,15 @@ def _name_stamp(item: Any) -> tuple[str, ...]:
     return ("text", "start", "end") if isinstance(item[0], str) else ("start", "end", "text")
 
 
-def _find_speaker(item: dict[str, Any]) -> str:
-    names = (item[name] for name in SPEAKERS if isinstance(item.get(name), str | int))
-    return next((str(name) for name in names if name != ""), "")
-
-
 def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     """Return lists of items in time: phones, and a tier of each speaker, of words if nearly all are, else of lines."""
     found: Found = defaultdict(list)
     for place, item in objects:
         _collect_rows(item, found, where, place if len(objects) > 1 else "")
+    rows = (row for rows in found.values() for row in rows if row.times.kind == "sentence" and len(objects) > 1)
+    if len(sentences := {row.place.partition(",")[0] for row in rows}) > 1:
+        what = f"{len(sentences)} pieces whose times each begin at 0; save the sound of each apart"
+        raise InputError(f"{where}: holds {what}, and give those of one")
     words = [word for _, item in objects if isinstance(item.get("words"), list) for word in item["words"]]
     missed = sum(isinstance(word, dict) and word.get("case") == MISSED for word in words)
     if missed and where:
@@ -446,7 +459,9 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
         spoken = spoken[half:]
     if any(len({part.speaker for part in row.parts}) > 1 for row in spoken):
         spoken = [part for row in spoken for part in row.parts or (row,)]
-    tiers = [LabelTier(PHONE_LABELS, tuple(_scale_rows(phones, PHONE_LABELS, where)), PHONE_LABELS)] if phones else []
+    labels = _scale_rows(phones, PHONE_LABELS, where)
+    labels = split_ipa(labels, where) if any(row.is_symbol for row in phones) else labels
+    tiers = [LabelTier(PHONE_LABELS, tuple(labels), PHONE_LABELS)] if phones else []
     counts = [len(find_words(extract_spoken_text(each.text[:LONGEST_JUDGED]))) for each in spoken]
     check_word_count(sum(counts) + sum(len(each.parts) for each in spoken), where)
     single = sum(each.role == WORDS or count < 2 for each, count in zip(spoken, counts, strict=True))
@@ -461,7 +476,7 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
 
 def _extend_to_next(rows: list[Row], silences: Iterable[float]) -> list[Row]:
     """Return rows, of which events last to the next one or to a silence, and the last one is open."""
-    starts = [row.start for row in rows if row.times.start in EVENTS]
+    starts = [row.start for row in rows if row.times.kind == "event"]
     if not starts:
         return rows
     edges = sorted([*starts, *silences])
@@ -492,91 +507,6 @@ def _scale_rows(rows: list[Row], role: str, where: str) -> list[TimedLabel]:
         return TimedLabel(start_s, end_s, row.text, row.place, tuple(map(label, row.parts)))
 
     return [label(row) for row in rows]
-
-
-def _make_tiers(words: Sequence[TimedLabel], phones: Sequence[TimedLabel], where: str) -> list[LabelTier]:
-    check_count(max(len(words), len(phones)), where)
-    phones = split_ipa(phones, where)
-    tiers = (LabelTier(WORDS, tuple(words), WORDS), LabelTier(PHONE_LABELS, tuple(phones), PHONE_LABELS))
-    return [tier for tier in tiers if tier.labels]
-
-
-def _read_columns(objects: Objects, where: str) -> list[LabelTier] | None:
-    """Return words and phones of parallel lists: of ElevenLabs' characters, of Cartesia's messages."""
-    columns: dict[str, list[TimedLabel]] = defaultdict(list)
-    pieces = 0
-    for place, item in objects:
-        letters = None if "words" in item else item.get("characters", item.get("charsegments"))
-        if isinstance(letters, list) and letters and all(isinstance(each, dict) for each in letters):
-            lists = ([each.get(name, each.get("char")) for each in letters] for name in ("text", "start", "end"))
-            item = dict(zip(COLUMNS[0][1], lists, strict=True))  # noqa: PLW2901
-        for name in ("result", "timestampinfo"):
-            item = item[name] if isinstance(item.get(name), dict) else item  # noqa: PLW2901
-        owners = {name: item[name] for name in COLUMN_OWNERS if isinstance(item.get(name), dict)}
-        owners.pop("alignment" if "normalizedalignment" in owners else "", None)
-        for name, owner in (owners or {"lists": item}).items():
-            for role, names, per_s in COLUMNS:
-                if isinstance(owner.get(names[0]), list) and owner.keys() >= {*names}:
-                    columns[role] += _label_columns(owner, names, per_s, f"{where}: {place}, {name}")
-                    pieces += per_s != 1 or "wordstarttimeseconds" in names
-    if pieces > 1:
-        raise InputError(f"{where}: holds {pieces} pieces whose times each begin at 0; save the sound of each apart")
-    characters = columns["characters"]
-    owner_of = [number for number, label in enumerate(characters) for _ in label.text]
-    for match in SPOKEN_WORD.finditer("".join(label.text for label in characters).replace("▁", " ")):
-        first, last = characters[owner_of[match.start()]], characters[owner_of[match.end() - 1]]
-        columns[WORDS].append(replace(first, end_s=last.end_s, text=match[0]))
-    tiers = _make_tiers(columns[WORDS], columns[PHONE_LABELS], where)
-    return parse_seconds(tiers, where) if any(columns.values()) else None
-
-
-def _label_columns(owner: dict[str, Any], names: tuple[str, ...], per_s: int, where: str) -> list[TimedLabel]:
-    """Return the items of parallel lists. Raises InputError: they are no lists, or of several lengths."""
-    lists = [owner[name] for name in names]
-    if not all(isinstance(each, list) for each in lists) or len({len(each) for each in lists}) > 1:
-        raise InputError(f"{where}: required are the lists {', '.join(names)}, all of one length")
-    check_count(len(lists[0]), where)
-    lists += [[*lists[1][1:], math.inf][: len(lists[1])]] if len(lists) == 2 else []
-    labels = []
-    for number, (text, *times) in enumerate(zip(*lists, strict=True), 1):
-        start_s, end_s = (time if time is math.inf else _parse_time(time, f"{where} {number}", per_s) for time in times)
-        end_s += start_s if "duration" in names[-1] else 0.0
-        labels.append(TimedLabel(start_s, end_s, require(_TEXT, text, f"{where} {number}"), f"{names[0]} {number}"))
-    return labels
-
-
-def _read_durations(objects: Objects, where: str) -> list[LabelTier] | None:
-    """Return the phones of Piper (samples) and Kokoro (frames), whose durations alone are given, and Kokoro's words."""
-    piper = [(place, item) for place, item in objects if isinstance(item.get("phonemealignments"), list)]
-    kokoro = [item for _, item in objects if "phonemes" in item and isinstance(item.get("preddur"), list)]
-    if len(kokoro) > 1:
-        raise InputError(f"{where}: holds {len(kokoro)} sentences, whose times each begin at 0; give those of one")
-    if not kokoro and (len(piper) < len(objects)):
-        return None
-    phones, end_s = list[TimedLabel](), 0.0
-
-    def add(place: str, text: Any, length: Any, per_s: float) -> None:
-        nonlocal end_s
-        start_s, end_s = end_s, end_s + _parse_time(length, f"{where}: {place}", per_s)
-        phones.append(TimedLabel(start_s, end_s, require(_TEXT, text, f"{where}: {place}"), place))
-
-    for place, item in piper:
-        rate = require(values.number(1000, 1e6), item.get("samplerate"), f"{where}: {place}: the sample rate in hertz")
-        for number, each in enumerate(item["phonemealignments"], 1):
-            fields = each if isinstance(each, dict) else {}
-            add(f"{place}, phoneme {number}", fields.get("phoneme"), fields.get("numsamples"), rate)
-    for item in kokoro:
-        letters = f"^{require(_TEXT, item['phonemes'], f'{where}: phonemes')}$"
-        if len(item["preddur"]) != len(letters):
-            what = f"{len(item['preddur'])} durations of {len(letters) - 2} phonemes"
-            raise InputError(f"{where}: {what}, required two more than phonemes")
-        for number, (letter, frames) in enumerate(zip(letters, item["preddur"], strict=True)):
-            add(f"phoneme {number}", KOKORO_LETTERS.get(letter, letter), frames, KOKORO_FRAMES_PER_S)
-    found: Found = defaultdict(list)
-    for item in kokoro:
-        _collect_rows({"tokens": item.get("tokens")}, found, where)
-    timed = _scale_rows([row for rows in found.values() for row in rows if not math.isnan(row.start)], WORDS, where)
-    return _make_tiers(timed, phones, where)
 
 
 def _read_named_tiers(objects: Objects, where: str) -> list[LabelTier] | None:

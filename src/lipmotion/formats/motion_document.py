@@ -36,7 +36,7 @@ from lipmotion.formats.base import MotionFormat, iterate_json, read_members, wri
 from lipmotion.formats.steady_rate import TIME_COLUMN, clean_column, convert_times, resample_rows, tabulate_frames
 from lipmotion.meshes.model.shape_names import ARKIT_52, is_known
 from lipmotion.printable import is_line
-from lipmotion.storage.archive import UNREADABLE, check_archive, take_array
+from lipmotion.storage.archive import check_archive, take_array
 from lipmotion.storage.json_text import as_json, catch_errors
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.values import items, members, number, require, text, truth
@@ -75,11 +75,9 @@ def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise InputError(f"not a motion document: its 'format' must be {FORMAT!r}")
     version = document.get("version")
-    if not isinstance(version, int) or version < 1:
-        raise InputError(f"the motion document has version {version!r}, required {VERSION}; export it again")
-    if version > VERSION:
-        newer = f"the motion document has version {version}"
-        raise InputError(f"{newer}, this lipmotion reads up to {VERSION}: upgrade lipmotion")
+    if version != VERSION:
+        what = f"the motion document has version {version!r}, this lipmotion reads {VERSION}"
+        raise InputError(f"{what}: upgrade lipmotion, or export it again")
     with catch_errors("the motion document"):
         checked = _DOCUMENT(document)
         channels = tuple(Channel(**channel) for channel in checked["channels"])
@@ -187,22 +185,15 @@ def write_npz(path: Path, generation: Generation, source: Mapping[str, str], mod
 
 def read_npz(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """Return motion and units of a file. Raises InputError: not an .npz file, or not a motion document."""
-    try:
-        with zipfile.ZipFile(path) as file:
-            check_archive(file)
-            values = take_array(file.read("values.npy"))
-            document = json.loads(str(take_array(file.read("document.npy"))))
-    except OSError:
-        raise
-    except UNREADABLE as error:
-        raise InputError(f"not a motion file ({error}); export it again") from error
+    with zipfile.ZipFile(path) as file:
+        check_archive(file)
+        values = take_array(file.read("values.npy"))
+        document = json.loads(str(take_array(file.read("document.npy"))))
     return parse(document, values)
 
 
 JSON = MotionFormat(write_json_file, read_json, units=read_json_units)
 NPZ = MotionFormat(write_npz, read_npz)
-
-
 LOG = logging.getLogger("lipmotion")
 NAMES, WEIGHTS, RATE = "facsNames", "weightMat", "exportFps"
 SOUND, POSES, FRAMES = "trackPath", "numPoses", "numFrames"  # the members of a file
@@ -243,8 +234,6 @@ def read_audio2face(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
 
 _AUDIO2FACE = members({NAMES: items(text(1000)), RATE: number()}, (NAMES, RATE))
-
-
 AUDIO2FACE = MotionFormat(write_audio2face, read_audio2face, curves="face", rate_hz=RATE_HZ, names_sound=True)
 
 

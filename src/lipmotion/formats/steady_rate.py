@@ -17,7 +17,6 @@ from lipmotion.types.motion import RADIAN
 
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")
-
 USUAL_RATES_HZ = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 90.0, 100.0, 120.0, 240.0)  # of cameras
 TELEVISION_RATES_HZ = tuple(whole * 1000 / 1001 for whole in (24, 30, 48, 60, 120, 240))
 """Rates that even rows have where none of the usual ones fits."""

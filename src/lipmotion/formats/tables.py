@@ -31,7 +31,6 @@ from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, T
 
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")
-
 TIME = "time_s"  # the first column
 LONGEST_S = 1e6  # largest time that is accepted: more than eleven days
 _SWAPPED = {"jawLeft": "jawRight", "jawRight": "jawLeft", "mouthLeft": "mouthRight", "mouthRight": "mouthLeft"}
@@ -107,11 +106,7 @@ def read_table_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
 
 def timecode(time_s: float) -> str:
-    """Return a time as the app writes it, ``HH:MM:SS:FF.mmm``, with ``FF.mmm`` in 60ths of a second.
-
-    >>> timecode(3725.025)
-    '01:02:05:01.500'
-    """
+    """Return a time as the app writes it, ``HH:MM:SS:FF.mmm``, with ``FF.mmm`` in 60ths of a second."""
     seconds, part = divmod(round(time_s * TICKS_HZ * 1000), TICKS_HZ * 1000)
     frames, part = divmod(part, 1000)
     return f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}:{frames:02d}.{part:03d}"

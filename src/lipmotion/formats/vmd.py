@@ -24,7 +24,6 @@ from lipmotion.types.motion import RADIAN
 
 Keys = Sequence[tuple[int, float]]  # frames and values
 Turns = Sequence[tuple[int, tuple[float, float, float, float]]]  # frames and rotations, as quaternions x, y, z, w
-
 RATE_HZ = 30.0
 MARK, OLD_MARK = b"Vocaloid Motion Data 0002", b"Vocaloid Motion Data file"
 MARK_BYTES, MODEL_BYTES, OLD_MODEL_BYTES = 30, 20, 10
@@ -40,7 +39,6 @@ LINEAR = (
     *(_SLOW * 5 + _FAST * 8 + bytes(3)),
 )
 """The bytes of a bone's key that say: straight on to the next one."""
-LARGEST_FILE_BYTES = 1 << 28
 LAST_FRAME = 86_400 * 30  # frames of a day
 MORPHS: Mapping[str, tuple[str, ...]] = {
     **{morph: (name,) for morph, name in zip("あいうえおん", (*VRM_VOWELS, CLOSED), strict=True)},
@@ -142,9 +140,6 @@ def _encode_name(name: str, size: int) -> bytes:
 
 def _read_keys(path: Path, is_known: Callable[[str], bool]) -> tuple[Mapping[str, Keys], Mapping[str, Turns], int]:
     """Return the keys of morphs and bones by their names, in order, and the number of the camera's."""
-    size = path.stat().st_size
-    if size > LARGEST_FILE_BYTES:
-        raise InputError(f"{size} bytes, required at most {LARGEST_FILE_BYTES}: divide the motion")
     content = path.read_bytes()
     model_bytes = MODEL_BYTES if content.startswith(MARK) else OLD_MODEL_BYTES
     if not content.startswith((MARK, OLD_MARK)):
@@ -153,17 +148,14 @@ def _read_keys(path: Path, is_known: Callable[[str], bool]) -> tuple[Mapping[str
     bones: dict[bytes, dict[int, tuple[float, float, float, float]]] = {}
     morphs: dict[bytes, dict[int, float]] = {}
     camera = 0
-    try:
-        for name, frame, (_, _, _, x, y, z, w) in _unpack_keys(content, at, BONE_KEY):
-            bones.setdefault(name, {})[frame] = (x, y, z, w)
-        at += COUNT.size + COUNT.unpack_from(content, at)[0] * BONE_KEY.size
-        for name, frame, (value,) in _unpack_keys(content, at, MORPH_KEY) if at < len(content) else ():
-            morphs.setdefault(name, {})[frame] = value
-        if at < len(content):
-            at += COUNT.size + COUNT.unpack_from(content, at)[0] * MORPH_KEY.size
-            camera = COUNT.unpack_from(content, at)[0] if at + COUNT.size <= len(content) else 0
-    except struct.error as error:
-        raise InputError("the motion of MikuMikuDance is cut short; save it again") from error
+    for name, frame, (_, _, _, x, y, z, w) in _unpack_keys(content, at, BONE_KEY):
+        bones.setdefault(name, {})[frame] = (x, y, z, w)
+    at += COUNT.size + COUNT.unpack_from(content, at)[0] * BONE_KEY.size
+    for name, frame, (value,) in _unpack_keys(content, at, MORPH_KEY) if at < len(content) else ():
+        morphs.setdefault(name, {})[frame] = value
+    if at < len(content):
+        at += COUNT.size + COUNT.unpack_from(content, at)[0] * MORPH_KEY.size
+        camera = COUNT.unpack_from(content, at)[0] if at + COUNT.size <= len(content) else 0
 
     def judge(encoding: str) -> tuple[int, int]:  # how many names it makes known, and minus the letters it cannot read
         texts = [name.decode(encoding, "replace") for name in (*morphs, *bones)]
@@ -176,10 +168,10 @@ def _read_keys(path: Path, is_known: Callable[[str], bool]) -> tuple[Mapping[str
 
 
 def _unpack_keys(content: bytes, at: int, form: struct.Struct) -> Iterator[tuple[bytes, int, list[float]]]:
-    """Yield the name of each key of a counted list, its frame and its numbers. Raises struct.error: cut short."""
+    """Yield the name of each key of a counted list, its frame and its numbers. Raises InputError: cut short."""
     (count,) = COUNT.unpack_from(content, at)
     if count * form.size > len(content) - at - COUNT.size:
-        raise struct.error
+        raise InputError("the motion of MikuMikuDance is cut short; save it again")
     for raw, frame, *values in form.iter_unpack(content[at + COUNT.size : at + COUNT.size + count * form.size]):
         name = raw.partition(b"\0")[0]
         numbers = [value for value in values if isinstance(value, float)]
@@ -189,4 +181,6 @@ def _unpack_keys(content: bytes, at: int, form: struct.Struct) -> Iterator[tuple
         yield name, frame, numbers
 
 
-MOTION_FORMAT = MotionFormat(write, read, curves="vowels", rate_hz=RATE_HZ, fixed_rate=True, keyed=True)
+MOTION_FORMAT = MotionFormat(
+    write, read, curves="vowels", rate_hz=RATE_HZ, fixed_rate=True, keyed=True, max_bytes=1 << 28
+)

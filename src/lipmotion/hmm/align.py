@@ -14,8 +14,7 @@ from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import LogLikelihoods, NetworkBuilder, build_chain
 from lipmotion.kernels.paths import Windows
 
-FIT_BLOCK = 2048
-"""Frames whose log densities are in memory at a time."""
+FIT_BLOCK = 2048  # frames whose log densities are in memory at a time
 MAX_BASE_ARCS, ARCS_A_FRAME = 1_000_000, 10
 """The largest number of arcs of a network, and how many more for each frame; sentences need about one a frame."""
 

@@ -10,24 +10,18 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-DECIBEL = np.log(10) / 10
-"""A decibel, as natural logarithm of energy."""
-LEVEL_FRAMES = 25
-"""The loud level is that of the loudest quarter of a second: a click is shorter."""
-NOISE_FRAMES = 201
-"""Within half as many frames of speech there is a closure or a pause, in which the noise is heard."""
-SMOOTHING_FRAMES = 11
-"""The energy is averaged over so many frames."""
+DECIBEL = np.log(10) / 10  # a decibel, as natural logarithm of energy
+LEVEL_FRAMES = 25  # the loud level is that of the loudest quarter of a second: a click is shorter
+NOISE_FRAMES = 201  # within half as many frames of speech there is a closure or a pause, in which the noise is heard
+SMOOTHING_FRAMES = 11  # the energy is averaged over so many frames
 SOUND_DROP, QUIET_DROP = 20 * DECIBEL, 35 * DECIBEL
 """Sound lies less than the first below the loud level: too loud for silence; below the second one is no speech."""
 ABOVE_NOISE, NOISE_SHARE = 6 * DECIBEL, 0.3
 """Sound is louder than the noise by so much, or by this share of the way to the loud level where that is less."""
 MIN_RANGE = 6 * DECIBEL
 """Where the loud level is no further above the noise, as in tones and in noise alone, nothing is said."""
-NEAR_LOUD = 20 * DECIBEL
-"""The noise is measured around frames no further beneath the loud level."""
-PAUSE_FRAMES, MIN_FRAMES = 30, 6
-"""Shorter pauses are part of the sound around them; shorter sounds are clicks."""
+NEAR_LOUD = 20 * DECIBEL  # the noise is measured around frames no further beneath the loud level
+PAUSE_FRAMES, MIN_FRAMES = 30, 6  # shorter pauses are part of the sound around them; shorter sounds are clicks
 QUIET_REACH_FRAMES = 10
 """A frame is quiet only if all frames within so many are: the closure of a stop is part of speech."""
 

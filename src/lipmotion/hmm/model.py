@@ -15,8 +15,7 @@ from lipmotion.stats.mixture import MIXTURES, Mixtures, mixtures_from_arrays
 from lipmotion.storage.schema import NEGATIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Configuration
 
-Neighbour = str | None
-"""The neighbouring unit that a state depends on; None: none."""
+Neighbour = str | None  # the neighbouring unit that a state depends on; None: none
 
 
 @dataclass(frozen=True)

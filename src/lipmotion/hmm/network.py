@@ -5,24 +5,23 @@ Log densities of frames are computed on demand.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
-from lipmotion.hmm.model import Neighbour, StateTable, UnitHmm
+from lipmotion.hmm.model import UnitHmm
 from lipmotion.kernels.paths import NetworkArrays, Windows, best_path
+from lipmotion.stats.bigram import Bigram
 
-LOUD_SILENCE_PENALTY = 8.0
-"""Penalty of silence in a loud frame, subtracted from its log density."""
-QUIET_SPEECH_PENALTY = 1000.0
-"""Penalty of everything but silence in a quiet frame."""
+LOUD_SILENCE_PENALTY = 8.0  # penalty of silence in a loud frame, subtracted from its log density
+QUIET_SPEECH_PENALTY = 1000.0  # penalty of everything but silence in a quiet frame
 
-DensitySelection = NDArray[np.intp] | None
-"""The numbers of the densities to compute; None: all."""
+DensitySelection = NDArray[np.intp] | None  # the numbers of the densities to compute; None: all
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,10 +158,6 @@ def build_chain(
     return builder.build()
 
 
-StateNodes = dict[Neighbour, int]
-"""The nodes of one state of a unit: by neighbour, and under None the node for all other neighbours."""
-
-
 @dataclass(frozen=True, eq=False)
 class UnitLoop:
     """The network of units that may all follow each other; the unit of each node, and the nodes of first states."""
@@ -172,81 +167,98 @@ class UnitLoop:
     entries: frozenset[int]
 
 
-def build_unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
-    """Return the loop over an inventory. Recordings begin and end in silence, or in any unit as if it were beside."""
-    table, silence = hmm.table, hmm.table.free[0]
-    builder = NetworkBuilder()
-    owners: list[str] = []
-    rows: dict[str, list[StateNodes]] = {}
-    for unit in inventory:
-        rows[unit] = []
-        for state in range(table.count(unit)):
-            row: StateNodes = {}
-            for neighbour in _list_neighbours(table, unit, state, inventory):
-                row[neighbour] = builder.state(table.density(unit, state, neighbour), hmm.stay(unit, state))
-                owners.append(unit)
-            if rows[unit]:
-                _advance(builder, hmm, unit, state, rows[unit][-1], row)
-            rows[unit].append(row)
+class _StateNodes(NamedTuple):
+    """The nodes of one state of a unit: one for each class of left and each of right neighbours that it tells apart.
 
-    def leave(unit: str, following: str) -> float:
-        """Return the score of the arc to another unit: with the language model's, unless an earlier arc has it."""
-        score = 0.0 if following in rows[unit][-1] else _language_score(hmm, unit, following)
-        return hmm.move(unit, len(rows[unit]) - 1) + score
+    left, right : [shape=(N,)], the class of every neighbour
+    numbers     : of the nodes [shape=(classes, classes)]
 
-    for unit in inventory:
-        first, last = rows[unit][0], rows[unit][-1]
-        for following in inventory:
-            builder.arc(_node(last, following), _node(rows[following][0], unit), leave(unit, following))
-        at_rest = unit == silence
-        begin = hmm.config.insertion if at_rest else _language_score(hmm, silence, unit)
-        builder.initial[_node(first, silence)] = begin
-        end = hmm.move(unit, len(rows[unit]) - 1) if at_rest else leave(unit, silence)
-        builder.final[_node(last, silence)] = end
-    entries = frozenset(entry for unit_rows in rows.values() for entry in unit_rows[0].values())
+    A node stands for what the states from it on make of the left neighbour, and what the states up to it made of the
+    right one: neighbours that these do not tell apart share it. So the search is exact with the fewest nodes.
+    """
+
+    left: NDArray[np.intp]
+    right: NDArray[np.intp]
+    numbers: NDArray[np.intp]
+
+
+def build_loop(
+    densities: Mapping[str, NDArray[np.intp]],
+    log_stay: Mapping[str, Sequence[float]],
+    silence: str,
+    score: Callable[[str, str], float],
+    insertion: float,
+) -> UnitLoop:
+    """Return the loop of N units. Recordings begin and end in silence, or in any unit as if it were beside.
+
+    densities : by unit, those of its states beside every left and every right one of the units [shape=(states, N, N)]
+    log_stay  : by unit, log P(stay in each of its states)
+    score     : of the language model, for a unit and the one that follows
+    insertion : score of the silence in which a recording begins
+    """
+    builder, owners, nodes = NetworkBuilder(), list[str](), dict[str, list[_StateNodes]]()
+    place = {unit: number for number, unit in enumerate(densities)}
+    leave = {unit: float(np.log(-np.expm1(stays[-1]))) for unit, stays in log_stay.items()}
+    for unit, grids in densities.items():
+        nodes[unit] = []
+        for state, (grid, stay) in enumerate(zip(grids, log_stay[unit], strict=True)):
+            left, right = _classify(grids[state:].transpose(1, 0, 2)), _classify(grids[: state + 1].transpose(2, 0, 1))
+            firsts = (np.unique(classes, return_index=True)[1] for classes in (left, right))
+            numbers = [[builder.state(int(density), stay) for density in row] for row in grid[np.ix_(*firsts)]]
+            nodes[unit].append(_StateNodes(left, right, np.array(numbers, np.intp)))
+            owners += [unit] * nodes[unit][-1].numbers.size
+        for stay, (source, target) in zip(log_stay[unit], pairwise(nodes[unit]), strict=False):
+            _advance(builder, source, target, float(np.log(-np.expm1(stay))))
+    for unit in densities:
+        first, last = nodes[unit][0], nodes[unit][-1]
+        for following in densities:
+            entered, arc_score = nodes[following][0], leave[unit] + score(unit, following)
+            for source in last.numbers[:, last.right[place[following]]].tolist():
+                for target in entered.numbers[entered.left[place[unit]]].tolist():
+                    builder.arc(source, target, arc_score)
+        begin = insertion if unit == silence else score(silence, unit)
+        builder.initial.update(dict.fromkeys(first.numbers[first.left[place[silence]]].tolist(), begin))
+        end = leave[unit] + (0.0 if unit == silence else score(unit, silence))
+        builder.final.update(dict.fromkeys(last.numbers[:, last.right[place[silence]]].tolist(), end))
+    entries = frozenset(int(number) for of_unit in nodes.values() for number in of_unit[0].numbers.ravel())
     return UnitLoop(builder.build(), tuple(owners), entries)
+
+
+def _classify(rows: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the class of every row: those of equal rows are the same [shape=(N,)]."""
+    classes = dict[bytes, int]()  # many times faster than ``np.unique`` of rows
+    return np.array([classes.setdefault(row.tobytes(), len(classes)) for row in rows], np.intp)
+
+
+def _advance(builder: NetworkBuilder, source: _StateNodes, target: _StateNodes, log_move: float) -> None:
+    """Join two successive states: left neighbours that the second tells apart, and right ones that the first did."""
+    for left, left_after in set(zip(source.left.tolist(), target.left.tolist(), strict=True)):
+        for right, right_after in set(zip(source.right.tolist(), target.right.tolist(), strict=True)):
+            builder.arc(int(source.numbers[left, right]), int(target.numbers[left_after, right_after]), log_move)
+
+
+def build_unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
+    """Return the loop over an inventory, with the models' bigram (``build_loop``)."""
+    table, config = hmm.table, hmm.config
+    densities, log_stay = dict[str, NDArray[np.intp]](), dict[str, list[float]]()
+    for unit in inventory:
+        grids = []
+        for state in range(table.count(unit)):
+            row = np.array([table.density(unit, state, neighbour) for neighbour in inventory], np.intp)
+            turned = row[:, None] if table.side(unit, state) == "<" else row
+            grids.append(np.broadcast_to(turned, (len(inventory), len(inventory))))
+        densities[unit] = np.stack(grids)
+        log_stay[unit] = [hmm.stay(unit, state) for state in range(table.count(unit))]
+    language = score_language(hmm.bigram, config.bigram_weight, config.insertion)
+    return build_loop(densities, log_stay, table.free[0], language, config.insertion)
+
+
+def score_language(bigram: Bigram, weight: float, insertion: float) -> Callable[[str, str], float]:
+    """Return the score of the language model for a unit and the one after it: weighted log bigram plus insertion."""
+    return lambda unit, following: weight * bigram(unit, following) + insertion
 
 
 def decode_path(loop: UnitLoop, path: NDArray[np.intp]) -> tuple[tuple[str, ...], NDArray[np.intp]]:
     """Return the units of a path through the loop [shape=(T,)], their first frames, and the frame count at the end."""
     starts = [t for t in range(len(path)) if t == 0 or (path[t] != path[t - 1] and path[t] in loop.entries)]
     return tuple(loop.owners[path[t]] for t in starts), np.array([*starts, len(path)], np.intp)
-
-
-def _language_score(hmm: UnitHmm, unit: str, following: str) -> float:
-    """Return the score of the language model: weighted log bigram plus insertion penalty."""
-    return hmm.config.bigram_weight * hmm.bigram(unit, following) + hmm.config.insertion
-
-
-def _node(row: StateNodes, neighbour: str) -> int:
-    return row[neighbour] if neighbour in row else row[None]
-
-
-def _list_neighbours(table: StateTable, unit: str, state: int, inventory: Sequence[str]) -> list[Neighbour]:
-    """Return the neighbours that need a node of their own; all others (None) share a node, as they share densities.
-
-    A neighbour that any state on one side of the unit depends on has nodes for all states on that side: so a node
-    tells all that a path must know, and the search stays exact.
-    """
-    side = table.side(unit, state)
-    same_side = [k for k in range(table.count(unit)) if table.side(unit, k) == side] if side else []
-    distinct: list[Neighbour] = [
-        neighbour
-        for neighbour in inventory
-        if any(table.density(unit, k, neighbour) != table.density(unit, k) for k in same_side)
-    ]
-    return distinct if len(distinct) == len(inventory) else [*distinct, None]
-
-
-def _advance(
-    builder: NetworkBuilder, hmm: UnitHmm, unit: str, state: int, sources: StateNodes, targets: StateNodes
-) -> None:
-    """Join two successive states of a unit; the arc that fixes the right neighbour has the language model's score."""
-    move = hmm.move(unit, state - 1)
-    same_side = hmm.table.side(unit, state - 1) == hmm.table.side(unit, state)
-    chooses = hmm.table.side(unit, state) == ">" and not same_side
-    for source_neighbour, source in sources.items():
-        for neighbour, target in targets.items():
-            if not same_side or source_neighbour == neighbour:
-                score = _language_score(hmm, unit, neighbour) if chooses and neighbour is not None else 0.0
-                builder.arc(source, target, move + score)

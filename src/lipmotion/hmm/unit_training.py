@@ -25,8 +25,7 @@ from lipmotion.types import Monitor, Progress
 
 CELLS = 1_000_000
 """Frames × utterances × states of a batch whose posteriors are computed together: 8 MB an array, some fifty arrays."""
-MIN_POSTERIOR = 1e-3
-"""Smaller state posteriors are left out of the statistics of densities."""
+MIN_POSTERIOR = 1e-3  # smaller state posteriors are left out of the statistics of densities
 LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES = 200.0, 12.0
 """Largest mean duration, in frames, of a state of silence, and of a state of any other unit. Without the second limit
 the closure of a stop that begins every other sentence absorbs the silence before it."""
@@ -200,8 +199,7 @@ def limit_durations(table: StateTable) -> NDArray[np.float64]:
 
 
 _CHECKPOINT = "phones"
-UTTERANCES_PER_BLOCK = 32
-"""Utterances whose pronunciations are chosen together, by one worker."""
+UTTERANCES_PER_BLOCK = 32  # utterances whose pronunciations are chosen together, by one worker
 ONSET_FRAMES = 21
 """For the flat start, speech is where the energy, averaged over so many frames, is loud. Without averaging a click or
 a breath is taken for the end of speech, and the state before it absorbs the silence: the last words of GRID then

@@ -8,17 +8,15 @@ loop do, their arcs are a **block**, a dense matrix. Arcs from a state to itself
 from __future__ import annotations
 
 from collections import defaultdict
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Index = NDArray[np.intp]
 
-MIN_BLOCK = 8
-"""Sources, and targets, that a block has at least."""
-PADDING_ROWS = 16
-"""Rows of a block are padded to a multiple of this."""
+MIN_BLOCK = 8  # sources, and targets, that a block has at least
+PADDING_ROWS = 16  # rows of a block are padded to a multiple of this
 
 
 class ArcLayout(NamedTuple):
@@ -40,13 +38,6 @@ class ArcLayout(NamedTuple):
     blocks: Index
     block_sources: Index
     block_arcs: Index
-
-
-class ArcWeights(NamedTuple):
-    """Values of arcs, in a layout: by run [shape=(N,)] and by block [shape=(X, Y)]."""
-
-    runs: NDArray[Any]
-    blocks: NDArray[Any]
 
 
 def lay_out_arcs(arc_from: Index, arc_start: Index) -> ArcLayout:

@@ -16,8 +16,7 @@ from lipmotion.kernels.compiler import compiled, pays
 Array = NDArray[np.float64]
 Bands = tuple[Array, Array, Array, Array]
 """Main, first and second diagonal of the symmetric system of each channel, and its right-hand side [shapes=(T, P)]."""
-Rows = list[Any]
-"""A row of each frame: an array of the channels [shape=(P,)], or a number."""
+Rows = list[Any]  # a row of each frame: an array of the channels [shape=(P,)], or a number
 
 
 def solve_mlpg(

@@ -41,12 +41,10 @@ MIN_PRODUCT = {SINGLE: 1e-37, DOUBLE: 1e-300}
 MIN_TOTAL = {SINGLE: 1e-20, DOUBLE: 1e-150}
 """By precision: least sum of these products, as a share of the whole. With such a sum, what was set to 0 or underflowed
 is less than what probabilities are raised to."""
-MIN_POSTERIOR = 1e-20
-"""Smaller posteriors and counts are set to 0, as those of states that cannot be are not quite 0."""
+MIN_POSTERIOR = 1e-20  # smaller posteriors and counts are set to 0, as those of states that cannot be are not quite 0
 MIN_PROBABILITY = 1e-100
 """Least probability of a transition, or of beginning or ending in a state: products of smaller ones may underflow."""
-SPARSE_SHARE = 0.2
-"""A smaller share of possible joint states is fastest in logarithms, which take no time for others."""
+SPARSE_SHARE = 0.2  # a smaller share of possible joint states is fastest in logarithms, which take no time for others
 LARGEST_EXPONENT = 700.0
 """Expected transitions are divided by the probability of the transition: the quotient must stay finite."""
 
@@ -103,7 +101,9 @@ def infer_factorial(
     results = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
     result = next((each for each in results if each is not None), None)
     if result is None:  # there is no path
-        first, second = (LoopCounts(*map(np.zeros_like, (*loop[:2], *loop[3:5]))) for loop in (audio, visual))
+        first, second = (
+            LoopCounts(*map(np.zeros_like, (loop.stay, loop.onward, loop.enter))) for loop in (audio, visual)
+        )
         in_audio, in_visual, in_pairs = (np.zeros(log.shape) for log in logs[:3])
         return FactorialPosteriors(in_audio, in_visual, in_pairs, first, second, -np.inf)
     return result._replace(pair=result.pair[:, np.argsort(order)])
@@ -336,8 +336,7 @@ def _count_entered(last: Array, first: Array, log_overlap: float) -> Double:
     return entered
 
 
-_NONE = np.zeros(()), np.zeros(())
-"""Expected transitions out of the last frame."""
+_NONE = np.zeros(()), np.zeros(())  # expected transitions out of the last frame
 
 
 def _frame(before: Double, beta: Double, pairs: Index, whole: float = 1.0) -> _Frame:
@@ -355,7 +354,7 @@ def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:
     after = np.cumsum(gained[::-1], axis=0)[::-1] - gained
     left = np.maximum(enter.sum(axis=1) + after, 0)
     stay = np.maximum(frames[:-1].sum(axis=0) - left, 0)
-    return LoopCounts(stay, left[:-1], enter, frames[0])
+    return LoopCounts(stay, left[:-1], enter)
 
 
 @compile_to_rounding

@@ -16,8 +16,7 @@ from lipmotion.kernels.compiler import compiled
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Logs = NDArray[np.floating[Any]]
-ROOM_BYTES = 2**27
-"""Memory for what is stored of many frames at once: of as many as fit in, but of √T at least."""
+ROOM_BYTES = 2**27  # memory for what is stored of many frames at once: of as many as fit in, but of √T at least
 
 
 class Loop(NamedTuple):
@@ -42,14 +41,12 @@ class Loop(NamedTuple):
 class LoopCounts(NamedTuple):
     """Expected counts of the transitions of a loop; shapes as in ``Loop``.
 
-    enter   : [shape=(U, U)], of each unit after each; the sum of a row is the count of that unit being left
-    initial : [shape=(n, U)], posteriors of the first frame
+    enter : [shape=(U, U)], of each unit after each; the sum of a row is the count of that unit being left
     """
 
     stay: Array
     onward: Array
     enter: Array
-    initial: Array
 
 
 class FactorialLogLikelihoods(NamedTuple):

@@ -15,10 +15,8 @@ from lipmotion.kernels.compiler import compiled
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-LOG_ZERO = -1e30
-"""Stands for the log probability -inf: sums and differences of it are no NaN."""
-MIN_LOG = -700.0
-"""Probabilities with smaller logarithms are set to 0."""
+LOG_ZERO = -1e30  # stands for the log probability -inf: sums and differences of it are no NaN
+MIN_LOG = -700.0  # probabilities with smaller logarithms are set to 0
 LOG_2 = math.log(2)
 
 

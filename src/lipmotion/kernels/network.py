@@ -25,176 +25,137 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.arcs import PADDING_ROWS, ArcLayout, ArcWeights, lay_out_arcs
+from lipmotion.kernels.arcs import PADDING_ROWS, ArcLayout, lay_out_arcs
 from lipmotion.kernels.compiler import compile_to_rounding
 from lipmotion.kernels.forward_backward import log_forward_backward
 
 Index = NDArray[np.intp]
-Unsigned = NDArray[np.uintp]
-"""Unsigned, as loops over indices that may be negative are not vectorised."""
-Array = NDArray[Any]
-"""float32 or float64."""
-CHUNK = 16
-"""Runs are padded to multiples of this, so that vectorised loops over them have no remainder."""
-FRAMES_AT_ONCE = 256
-"""Frames whose roots are taken at once: they stay in the cache."""
+Unsigned = NDArray[np.uintp]  # unsigned, as loops over indices that may be negative are not vectorised
+Array = NDArray[Any]  # float32 or float64
+CHUNK = 16  # runs are padded to multiples of this, so that vectorised loops over them have no remainder
+FRAMES_AT_ONCE = 256  # frames whose roots are taken at once: they stay in the cache
 LOWEST_ROOT = -80.0
 """Least logarithm of a density's eighth root: exp of less is denormal in single precision, which is slow."""
-MIN_ROOT = 1.9e-35
-"""exp(-80): densities up to its eighth power are set to 0."""
+MIN_ROOT = 1.9e-35  # exp(-80): densities up to its eighth power are set to 0
 MIN_JOINT = 1e-4
 """Least root of a frame's best joint density, relative to the product of the chains' best ones: where it is less, joint
 densities are computed from sums of logarithms, as factors under e^LOWEST_ROOT may count."""
 LIMITS = {np.dtype(np.float32): (1e-24, 1e-12, 1e-4), np.dtype(np.float64): (1e-140, 1e-100, 1e-10)}
 """By precision: ``floor``, ``min_scale`` and ``off`` of ``_forward_backward``."""
-MIN_POSTERIOR = 1e-12
-"""Smaller posteriors are set to 0."""
+MIN_POSTERIOR = 1e-12  # smaller posteriors are set to 0
 SHARE = 1e-6
 """Shares of a block's sources are set to 0 under this times the least probability: less than what is raised."""
-MAX_SCALE = 1e6
-"""Greatest scale of a frame. With a smaller one no share of forward probabilities is set to 0."""
-FRAMES_SUMMED = 256
-"""Frames that are summed in the kernel's precision, before they are added in double precision."""
+MAX_SCALE = 1e6  # greatest scale of a frame. With a smaller one no share of forward probabilities is set to 0.
+FRAMES_SUMMED = 256  # frames that are summed in the kernel's precision, before they are added in double precision
 
 
 class NetworkPosteriors(NamedTuple):
-    """Posteriors of recordings in a network.
+    """Posteriors of a recording in a network.
 
-    posterior      : [shape=(T, S)], of the states by place (``kernels.arcs``), all recordings concatenated; those
-        under 1e-12 may be 0
-    counts         : [shape=(E,)], expected number of times that each arc is followed, over all recordings
-    log_likelihood : [shape=(U,)], of each recording; -inf where there is no path: then its posteriors are 0
+    posterior      : [shape=(T, S)], of the states by place (``kernels.arcs``); those under 1e-12 may be 0
+    counts         : [shape=(E,)], expected number of times that each arc is followed
+    log_likelihood : -inf where there is no path: then everything else is 0
 
-    Guaranteed but for rounding, however improbable a path is at first: a likelihood is right to a share of δ, and the
+    Guaranteed but for rounding, however improbable a path is at first: the likelihood is right to a share of δ, and the
     errors of the posteriors of a frame, or of the counts of a step from frame to frame, sum to 3 δ at most: δ is 1e-4
     for log densities in single precision, 1e-10 for those in double precision (``LIMITS``).
     """
 
     posterior: NDArray[Any]
     counts: Array
-    log_likelihood: Array
+    log_likelihood: float
 
 
-class Chunks(NamedTuple):
-    """Runs of arcs, each padded to a multiple of ``CHUNK``.
+class _Weights(NamedTuple):
+    """The probabilities of arcs relative to the greatest, whose logarithm is ``best``, in the kernels' forms.
 
-    runs   : [shape=(R, 4)], first target's place, first source's place, padded length, position in ``weight``
-    weight : [shape=(M,)], the probabilities of arcs, 0 for padding
-    arcs   : [shape=(N,)], the positions in ``weight`` of the arcs that are no padding
+    runs       : of run arcs, each run padded with zeros to a multiple of ``CHUNK`` [shape=(M,)]
+    run_bounds : [shape=(R, 4)], first target's place, first source's place, padded length, position in ``runs``
+    unpadded   : [shape=(N,)], the positions in ``runs`` of the arcs that are no padding
+    blocks, transposed : of blocks, sources as rows, and targets as rows
     """
 
-    runs: NDArray[np.uintp]
-    weight: Array
-    arcs: Index
+    best: float
+    runs: Array
+    run_bounds: Unsigned
+    unpadded: Index
+    blocks: Array
+    transposed: Array
 
 
 class ForwardBackwardNetwork(NamedTuple):
-    """A network prepared for forward–backward.
-
-    arc_from, arc_log, arc_start, log_initial, log_final : as in ``kernels.paths.NetworkArrays``
-    layout     : of the arcs
-    best_arc   : logarithm of the greatest probability of an arc
-    weights    : the probabilities of arcs relative to that, in the layout
-    transposed : those of blocks, targets as rows, sources as columns
-    chunks     : those of runs
-    """
+    """A network laid out for forward–backward: ``arc_from``, ``arc_start`` as in ``kernels.paths.NetworkArrays``."""
 
     arc_from: Index
-    arc_log: Array
     arc_start: Index
-    log_initial: Array
-    log_final: Array
     layout: ArcLayout
-    best_arc: float
-    weights: ArcWeights
-    transposed: Array
-    chunks: Chunks
 
     @classmethod
-    def of(
-        cls,
-        arc_from: Index,
-        arc_log: NDArray[np.floating[Any]],
-        arc_start: Index,
-        log_initial: NDArray[np.floating[Any]],
-        log_final: NDArray[np.floating[Any]],
-    ) -> ForwardBackwardNetwork:
-        """Return a network prepared for forward–backward; parameters as in ``kernels.paths.NetworkArrays``."""
-        layout = lay_out_arcs(arc_from, arc_start)
-        logs, initial, final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
-        return cls(arc_from, logs, arc_start, initial, final, layout, *_weigh(layout, logs))
-
-    def with_arcs(
-        self, arc_log: NDArray[np.floating[Any]], log_initial: NDArray[np.floating[Any]]
-    ) -> ForwardBackwardNetwork:
-        """Return the network with other probabilities of arcs [shape=(E,)] and of beginnings [shape=(S,)]."""
-        logs, initial = arc_log.astype(np.float64), log_initial.astype(np.float64)
-        return ForwardBackwardNetwork(
-            self.arc_from, logs, self.arc_start, initial, self.log_final, self.layout, *_weigh(self.layout, logs)
-        )
+    def of(cls, arc_from: Index, arc_start: Index) -> ForwardBackwardNetwork:
+        """Return the network of these arcs."""
+        return cls(arc_from, arc_start, lay_out_arcs(arc_from, arc_start))
 
     def posteriors(
-        self, log_emissions: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index], frames: Index
+        self,
+        arc_log: NDArray[np.floating[Any]],
+        log_initial: NDArray[np.floating[Any]],
+        log_emissions: Sequence[NDArray[np.floating[Any]]],
+        columns: Sequence[Index],
     ) -> NetworkPosteriors:
-        """Return the posteriors of recordings, concatenated; their densities are products of one factor a chain.
+        """Return the posteriors of a recording, which may end in any state; densities are products, a factor a chain.
 
+        arc_log, log_initial : log probabilities of arcs [shape=(E,)], and of beginning in each state [shape=(S,)]
         log_emissions : one or more [shape=(T, G_c)], all of one precision, finite or -inf; the log density of the state
             at place s is the sum over chains of ``log_emissions[c][:, columns[c][s]]``
         columns       : of each chain [shape=(S,)]
         What is computed is ``log_forward_backward``: by ``_forward_backward`` in the precision of ``log_emissions``;
-        for recordings of which that would lose what counts, in double precision, and at last in logarithms by NumPy.
+        where that would lose what counts, in double precision, and at last in logarithms by NumPy.
         Cost: O(T·E), and exponentials of the chains' densities; in double precision twice, in logarithms some fifty
         times as slow.
         """
-        precision = log_emissions[0].dtype
-        expected = self._scale(log_emissions, columns, frames)
-        edges = np.append(0, np.cumsum(frames))
-        for u in np.flatnonzero(np.isneginf(expected.log_likelihood)):
-            of_recording = slice(edges[u], edges[u + 1])
-            logs = [log[of_recording].astype(np.float64) for log in log_emissions]
-            again = None
-            if precision == np.float32:
-                again = self._scale(logs, columns, frames[u : u + 1])
-            if again is None or np.isneginf(again.log_likelihood[0]):
-                arc_to = np.repeat(np.arange(len(self.arc_start)), np.diff(self.arc_start, append=len(self.arc_from)))
-                log_posterior, counts, log_likelihood = log_forward_backward(
-                    self.log_initial, _joint(logs, columns)[:, self.layout.place], self.arc_from, arc_to, self.arc_log,
-                    self.log_final,
-                )  # fmt: skip
-                posterior = np.exp(log_posterior)[:, self.layout.order]
-                again = NetworkPosteriors(posterior, counts, np.array([log_likelihood]))
-            expected.posterior[of_recording], expected.log_likelihood[u] = again.posterior, again.log_likelihood[0]
-            expected.counts[:] += again.counts
-        return expected
+        precision, weights = log_emissions[0].dtype, _weigh(self.layout, arc_log.astype(np.float64))
+        initial = log_initial.astype(np.float64)
+        expected = self._scale(weights, initial, log_emissions, columns)
+        logs = [log.astype(np.float64, copy=False) for log in log_emissions]
+        if expected is None and precision != np.float64:
+            expected = self._scale(weights, initial, logs, columns)
+        if expected is not None:
+            return expected
+        arc_to = np.repeat(np.arange(len(self.arc_start)), np.diff(self.arc_start, append=len(self.arc_from)))
+        log_posterior, counts, log_likelihood = log_forward_backward(
+            initial, _joint(logs, columns)[:, self.layout.place], self.arc_from, arc_to, arc_log.astype(np.float64),
+            np.zeros(len(initial)),
+        )  # fmt: skip
+        return NetworkPosteriors(np.exp(log_posterior)[:, self.layout.order].astype(precision), counts, log_likelihood)
 
     def _scale(
-        self, log_emissions: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index], frames: Index
-    ) -> NetworkPosteriors:
-        """Return the posteriors of recordings by scaled probabilities, in the precision of ``log_emissions``.
-
-        A recording for which that is not enough has a log likelihood of -inf, no counts, and no posteriors.
-        """
+        self,
+        weights: _Weights,
+        log_initial: Array,
+        log_emissions: Sequence[NDArray[np.floating[Any]]],
+        columns: Sequence[Index],
+    ) -> NetworkPosteriors | None:
+        """Return the posteriors by scaled probabilities, in the precision of ``log_emissions``; None: it loses some."""
         root, best = _products(log_emissions, columns)
-        layout, edges = self.layout, np.append(0, np.cumsum(frames))
-        (initial, first), (final, last) = (
-            _probabilities(log[layout.order]) for log in (self.log_initial, self.log_final)
-        )
-        run_counts, leaving, entering, scales, ends = _forward_backward(
-            root, edges, initial, final, self.chunks.runs, self.chunks.weight.astype(root.dtype),
+        layout = self.layout
+        initial, first = _probabilities(log_initial[layout.order])
+        run_counts, leaving, entering, scales, is_enough = _forward_backward(
+            root, initial, weights.run_bounds, weights.runs.astype(root.dtype),
             layout.blocks.astype(np.uintp), layout.block_sources.astype(np.uintp),
-            self.weights.blocks.astype(root.dtype), self.transposed.astype(root.dtype), *LIMITS[root.dtype],
+            weights.blocks.astype(root.dtype), weights.transposed.astype(root.dtype), *LIMITS[root.dtype],
         )  # fmt: skip
-        counts = np.zeros(len(self.arc_log))
-        counts[layout.run_arcs] = run_counts[self.chunks.arcs] * self.weights.runs
+        if not is_enough:
+            return None
+        counts = np.zeros(len(self.arc_from))
+        counts[layout.run_arcs] = run_counts[weights.unpadded] * weights.runs[weights.unpadded]
         start = 0
         for _, targets, place, sources in layout.blocks:  # one matrix product each
             arcs = slice(place, place + sources), slice(0, targets)
             pairs = leaving[:, arcs[0]].T @ entering[:, start : start + targets]
-            counts[layout.block_arcs[arcs]] = pairs * self.weights.blocks[arcs]
+            counts[layout.block_arcs[arcs]] = pairs * weights.blocks[arcs]
             start += targets
-        with np.errstate(divide="ignore"):
-            log_likelihood = np.add.reduceat(np.log(scales) + best, edges[:-1]) + (np.log(ends) + first + last)
-        return NetworkPosteriors(root, counts, log_likelihood + (frames - 1) * self.best_arc)
+        log_likelihood = (np.log(scales) + best).sum() + first + (len(root) - 1) * weights.best
+        return NetworkPosteriors(root, counts, float(log_likelihood))
 
 
 def _roots(log_density: NDArray[np.floating[Any]]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -248,25 +209,23 @@ def _probabilities(log: Array) -> tuple[Array, float]:
     return np.exp(log - best), best
 
 
-def _weigh(layout: ArcLayout, arc_log: Array) -> tuple[float, ArcWeights, Array, Chunks]:
-    """Return the log of an arc's greatest probability, and all probabilities relative to it, in the kernels' forms."""
+def _weigh(layout: ArcLayout, arc_log: Array) -> _Weights:
     relative, best = _probabilities(arc_log)
     blocks = relative[layout.block_arcs]
     blocks[layout.block_arcs < 0] = 0
-    weights = ArcWeights(relative[layout.run_arcs], blocks)
     width = -(-layout.blocks[:, 3].max(initial=0) // PADDING_ROWS) * PADDING_ROWS
-    transposed = [np.empty((0, width))]  # targets as rows, sources as columns, padded
+    transposed = [np.empty((0, width))]
     for _, targets, first, sources in layout.blocks:
         matrix = np.zeros((targets, width))
         matrix[:, :sources] = blocks[first : first + sources, :targets].T
         transposed.append(matrix)
-    runs = layout.runs.copy()
-    runs[:, 2] = -(-runs[:, 2] // CHUNK) * CHUNK
-    runs[:, 3] = np.cumsum(runs[:, 2]) - runs[:, 2]
-    weight = np.zeros(runs[:, 2].sum())
-    arcs = np.arange(len(weights.runs)) + np.repeat(runs[:, 3] - layout.runs[:, 3], layout.runs[:, 2])
-    weight[arcs] = weights.runs
-    return best, weights, np.concatenate(transposed), Chunks(runs.astype(np.uintp), weight, arcs)
+    bounds = layout.runs.copy()
+    bounds[:, 2] = -(-bounds[:, 2] // CHUNK) * CHUNK
+    bounds[:, 3] = np.cumsum(bounds[:, 2]) - bounds[:, 2]
+    runs = np.zeros(bounds[:, 2].sum())
+    unpadded = np.arange(len(layout.run_arcs)) + np.repeat(bounds[:, 3] - layout.runs[:, 3], layout.runs[:, 2])
+    runs[unpadded] = relative[layout.run_arcs]
+    return _Weights(best, runs, bounds.astype(np.uintp), unpadded, blocks, np.concatenate(transposed))
 
 
 @compile_to_rounding
@@ -305,61 +264,45 @@ def _fill_joint_roots(roots: Array, columns: NDArray[np.uint32], joint: Array, b
 
 @compile_to_rounding
 def _forward_backward(
-    emission: Array, edges: Index, initial: Array, final: Array, runs: Unsigned, run_weight: Array,
+    emission: Array, initial: Array, runs: Unsigned, run_weight: Array,
     blocks: Unsigned, block_sources: Unsigned, block_weight: Array, transposed: Array,
     floor: float, min_scale: float, off: float,
-) -> tuple[Array, Array, Array, Array, Array]:  # fmt: skip
-    """Return the expected counts of recordings in a network; ``emission`` is overwritten by the posteriors.
+) -> tuple[Array, Array, Array, Array, bool]:  # fmt: skip
+    """Return the expected counts of a recording in a network; ``emission`` is overwritten by the posteriors.
 
-    emission     : [shape=(T, S)], by place, all recordings concatenated: the eighth roots of densities relative to the
-                   best of each frame; its precision, which the weights have too, is that of the computation
-    edges        : [shape=(U + 1,)], the first frame of each recording, and T
-    initial, final : [shape=(S,)], in double precision, the greatest 1
+    emission     : [shape=(T, S)], by place: the eighth roots of densities relative to the best of each frame; its
+                   precision, which the weights have too, is that of the computation
+    initial      : [shape=(S,)], in double precision, the greatest 1
     runs, run_weight : of the layout and its weights (``kernels.arcs``), padded with arcs of weight 0; weights up to 1
     blocks ... block_weight : of the layout and its weights
     transposed   : the weights of blocks, targets as rows
     floor, min_scale, off : least probability, least scale of a frame, and largest error of N (see above)
     Returns the expected count of each run arc divided by its weight [shape=(N,)]; the forward probabilities of all
     blocks' sources and the backward ones of their targets in the next frame, whose products summed over time give the
-    counts of block arcs [shapes=(T, ...)]; the scale of each frame [shape=(T,)] and of each end [shape=(U,)]: the
-    product of all scales is the likelihood. For a recording that was left the scale of the end is 0, and ``emission``
-    has no meaning.
+    counts of block arcs [shapes=(T, ...)]; the scale of each frame, whose product is the likelihood [shape=(T,)]; and
+    whether the precision is enough.
     """
     T, S = emission.shape
-    targets, longest = 0, 0
+    targets = 0
     for b in range(len(blocks)):
         targets += blocks[b, 1]
-    counts, scales, ends = np.zeros(len(run_weight)), np.ones(T), np.zeros(len(edges) - 1)
-    leaving, entering = np.zeros((T, len(block_sources))), np.zeros((T, targets))
-    for u in range(len(ends)):
-        longest = max(longest, edges[u + 1] - edges[u])
-    forward, few = np.empty((longest, S + CHUNK), emission.dtype), np.empty(len(counts), emission.dtype)
+    counts, scale = np.zeros(len(run_weight)), np.ones(T)
+    leave, enter = np.zeros((T, len(block_sources))), np.zeros((T, targets))
+    alpha, few = np.empty((T, S + CHUNK), emission.dtype), np.empty(len(counts), emission.dtype)
     beta, onward = np.zeros(S + CHUNK, emission.dtype), np.zeros(S + CHUNK, emission.dtype)
-    of_recording = np.zeros(len(counts))
     room = np.empty(max(block_weight.shape[1], transposed.shape[1]), emission.dtype)
     share = np.empty(max(len(block_weight), len(transposed)), emission.dtype)
-    for u in range(len(ends)):
-        frames = slice(edges[u], edges[u + 1])
-        density, scale, leave, enter = emission[frames], scales[frames], leaving[frames], entering[frames]
-        alpha = forward[: len(density)]
-        valid = _forward(
-            alpha, density, scale, initial, runs, run_weight, blocks, block_sources, block_weight, leave, room, share,
-            floor, min_scale,
+    valid = _forward(
+        alpha, emission, scale, initial, runs, run_weight, blocks, block_sources, block_weight, leave, room, share,
+        floor, min_scale,
+    )  # fmt: skip
+    if valid:
+        beta[:S] = 1 / scale[-1]
+        valid = _backward(
+            alpha, emission, scale, initial, beta, onward, runs, run_weight, counts, few,
+            blocks, block_sources, transposed, enter, room, share, floor, off,
         )  # fmt: skip
-        end = (alpha[-1, :S] * final).sum() if valid else 0.0
-        if end > min_scale * scale[-1]:
-            beta[:S] = final / end
-            of_recording[:] = 0
-            valid = _backward(
-                alpha, density, scale, initial, beta, onward, runs, run_weight, of_recording, few,
-                blocks, block_sources, transposed, enter, room, share, floor, off,
-            )  # fmt: skip
-            ends[u] = end / scale[-1] if valid else 0.0
-        if ends[u] > 0:
-            counts += of_recording
-        else:
-            leave[:] = 0
-    return counts, leaving, entering, scales, ends
+    return counts, leave, enter, scale, valid
 
 
 @compile_to_rounding

@@ -1,6 +1,6 @@
 """Best paths through networks, in NumPy for a short recording, which must not wait for numba, and compiled.
 
-Both forms give the same bits. Paths are also drawn from their posterior, in NumPy alone.
+Both forms give the same bits.
 """
 
 from __future__ import annotations
@@ -25,8 +25,7 @@ BLOCK, BLOCK_SCORES = 2048, 1 << 22
 WINDOW_BLOCK = 512
 """Frames that are searched at a time, through the states that may have one of them; scores before them are computed
 again from checkpoints."""
-MANY_ARCS = 1000
-"""So many arcs take NumPy as long in a frame as the calls of its functions."""
+MANY_ARCS = 1000  # so many arcs take NumPy as long in a frame as the calls of its functions
 IMPOSSIBLE = np.float32(-np.inf)
 
 

@@ -66,10 +66,8 @@ VMC_VOWELS = {"A": "aa", "I": "ih", "U": "ou", "E": "E", "O": "oh"}
 SUBJECT = "lipmotion"
 DEVICE = "$00000000-0000-0000-0000-6c69706d6f74"
 """The device of Live Link packets: 37 characters, as the app sends them."""
-HEAD_SIGNS = (1.0, -1.0, 1.0)
-"""Live Link's head pitch is positive downwards."""
-EYES = 6
-"""Angles of both eyes in a Live Link packet, which their blendshapes turn instead."""
+HEAD_SIGNS = (1.0, -1.0, 1.0)  # Live Link's head pitch is positive downwards
+EYES = 6  # angles of both eyes in a Live Link packet, which their blendshapes turn instead
 
 
 @contextmanager

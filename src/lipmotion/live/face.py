@@ -89,7 +89,7 @@ class ModelFace:
         self.names = tuple(channel.name for channel in self._space.channels)
         self._bounded = np.array([is_never_negative(channel) for channel in self._space.channels])
         poses = np.concatenate([np.zeros((1, self._space.dimensions)), np.eye(self._space.dimensions)])
-        rows, _ = self._space.restore(poses, np.zeros_like(poses))
+        rows = self._space.restore(poses)
         self._base, self._basis = rows[0], rows[1:] - rows[0]
         row, column = ARTICULATORS.index(OPENING), self._closure.column
         self._closed = (self._closure.closed - self._prior.centre[column]) / self._prior.matrix[row, column]

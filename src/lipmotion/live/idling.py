@@ -40,14 +40,10 @@ ACCENT_S, TALKING_S, TURNING_S = 0.1, 0.5, 0.35
 """Time constants of brows and nods, of the liveliness of the head, and of its turning to somebody."""
 LARGEST_TURN_RAD, HEAD_SHARE = 1.0, 0.7
 """The furthest that somebody may be to the side; and how much of the way the head turns, the eyes the rest."""
-SWAY_STEPS = 250
-"""The sway of so many steps is computed at once."""
-PHRASE_END_SHARE = 0.5
-"""Share of the ends of phrases at which a blink comes."""
-LONGEST_WAIT_S = 0.5
-"""A blink waits so long for a pause: where words end is not known."""
-BORDER_S = 0.8
-"""For so long after a phrase begins the eyes rather leave the listener."""
+SWAY_STEPS = 250  # the sway of so many steps is computed at once
+PHRASE_END_SHARE = 0.5  # share of the ends of phrases at which a blink comes
+LONGEST_WAIT_S = 0.5  # a blink waits so long for a pause: where words end is not known
+BORDER_S = 0.8  # for so long after a phrase begins the eyes rather leave the listener
 
 
 class Idling:

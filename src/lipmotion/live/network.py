@@ -27,8 +27,7 @@ from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS, SPEECH_RATE_HZ
 
 TAPS, BLOCK = 16, 160
 """Zero crossings of the resampling filter on either side; and samples that are resampled at a time, 10 ms."""
-LARGEST_SAMPLE = 1e6
-"""Samples beyond this are no sound, also where full scale is not 1."""
+LARGEST_SAMPLE = 1e6  # samples beyond this are no sound, also where full scale is not 1
 
 
 class Resampler:
@@ -106,8 +105,7 @@ def mono_samples(samples: Any) -> NDArray[np.float32]:
 
 Array = NDArray[np.float32]
 WEIGHTS = "live.npz"
-STEP_FRAMES = 2
-"""Frames of 10 ms in a step."""
+STEP_FRAMES = 2  # frames of 10 ms in a step
 STEP_S = STEP_FRAMES / FRAME_RATE_HZ
 LAGS = (-1, 2, 6, 14, 30)
 """How many steps ago the answers of a step are about: for look-aheads of 0, 80, 160, 320 and 640 ms."""
@@ -121,12 +119,9 @@ START_LEVEL, QUIETEST_LEVEL = 1.0, -2.0
 """Natural logarithm of the power of loud speech that is assumed at first, and the least: quieter sound stays quiet."""
 FALL = 2.3 / (6 * FRAME_RATE_HZ)
 """The level that is assumed falls by so much a frame, 10 dB in 6 s: who begins too loud is not lost afterwards."""
-ATTACK = 0.25
-"""Share of a frame in the power that raises the level: a click does not count as loud speech."""
-RANGE = 14.0
-"""Powers are floored so far below the level, 60 dB."""
-SPEECH_RANGE = 7.0
-"""Frames down to 30 dB under the level are speech, and teach how each band sounds in it."""
+ATTACK = 0.25  # share of a frame in the power that raises the level: a click does not count as loud speech
+RANGE = 14.0  # powers are floored so far below the level, 60 dB
+SPEECH_RANGE = 7.0  # frames down to 30 dB under the level are speech, and teach how each band sounds in it
 KNOWN_FRAMES, REMEMBERED_FRAMES = 40, 300
 """So many frames of speech the typical spectrum counts, to begin with; and so many are remembered."""
 SCALE = 4.0

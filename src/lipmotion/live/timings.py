@@ -17,8 +17,7 @@ from lipmotion.units import PHONES, SILENCE, VOWELS, describe_unknown_phone
 from lipmotion.units.lexicon import Lexicon
 from lipmotion.units.text_normalisation import find_words
 
-VOWEL_SHARE = 1.6
-"""In a word whose phones have no times, a vowel is so many times as long as a consonant."""
+VOWEL_SHARE = 1.6  # in a word whose phones have no times, a vowel is so many times as long as a consonant
 BEFORE_S, REMEMBERED_S = 0.2, 1.0
 """Silence before the first word that is known to be silence; and how long phones are kept once they are said."""
 LONGEST_S, LONGEST_GAP_S = 60.0, 600.0

@@ -104,18 +104,6 @@ def measure_closures(generated: Clips, original: Clips, threshold: float, rate_h
     )
 
 
-def clip_closure_counts(generated: Clips, original: Clips, threshold: float) -> tuple[list[Curve], list[Curve]]:
-    """Return two counts for each clip: original closings with a generated one near them, and all original closings.
-
-    generated, original : openings [each shape=(T, 1)]
-    Both are arrays [shape=(1,)] for each clip; the closure score is the sum of the first divided by the sum of the
-    second, also for clips that are drawn for a bootstrap interval.
-    """
-    expected = [find_closings(o[:, 0], threshold) for o in original]
-    hits = [count_matches(o, find_closings(g[:, 0], threshold)) for g, o in zip(generated, expected, strict=True)]
-    return [np.array([hit], float) for hit in hits], [np.array([len(o)], float) for o in expected]
-
-
 def measure_phones(
     generated: Clips,
     original: Clips,

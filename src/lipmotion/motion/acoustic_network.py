@@ -56,21 +56,14 @@ TARGETS = {
 @final
 @dataclass(frozen=True, eq=False)
 class AcousticNetwork(Predictor):
-    """A network from spectra to motion in noise and rooms, and one beside it that knows posteriors of phones.
+    """A network from spectra to motion in noise and rooms, and one beside it that knows posteriors of phones."""
 
-    network   : its outputs are Q standardised dimensions of motion, and the distortion of the sound
-    mean, scale : mean and standard deviation of the motion in training [each shape=(Q,)]
-    variances : of the error of static value, Δ and Δ² in training [shape=(3, Q)]
-    posterior_network : the network that knows posteriors (None: no phone recogniser was installed in training)
-    encoding  : the regression on the encoding of the sound, for other voices (None: a model of an earlier version)
-    """
-
-    network: ConvolutionalNetwork
-    mean: Array
-    scale: Array
-    variances: Array
-    posterior_network: PosteriorNetwork | None = None
-    encoding: EncodingRegression | None = None
+    network: ConvolutionalNetwork  # its outputs are Q standardised dimensions of motion, and the distortion
+    mean: Array  # of the motion in training [shape=(Q,)]
+    scale: Array  # its standard deviation [shape=(Q,)]
+    variances: Array  # of the error of static value, Δ and Δ² in training [shape=(3, Q)]
+    posterior_network: PosteriorNetwork | None = None  # None: no phone recogniser was installed in training
+    encoding: EncodingRegression | None = None  # for other voices; None: training had no encodings
     name: ClassVar[str] = "network"
     needs: ClassVar[str] = "spectrum"
     ARRAYS: ClassVar[Mapping[str, ArraySpec]] = SHAPE.specs | TARGETS

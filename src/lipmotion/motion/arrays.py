@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from lipmotion.motion import articulation
 from lipmotion.motion.closure import OPENING, Closure
 from lipmotion.motion.generation import LearnedMotion, VarianceScaling
-from lipmotion.motion.modulation_filter import MODULATION, filter_from_arrays, filter_to_arrays
 from lipmotion.motion.space import MotionLimits, MotionSpace, check_poses
 from lipmotion.stats.pca import Pca, check_orthonormal
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
@@ -38,36 +37,22 @@ def motion_to_arrays(
 
 
 def learned_motion_to_arrays(motion: LearnedMotion) -> dict[str, NDArray[Any]]:
-    """Serialise learned motion with limits, variance scaling and modulation filter, for engines that store no more."""
-    return (
-        motion_to_arrays(PHONE_SET, motion.space, motion.closure, motion.prior)
-        | {"limits": np.stack(motion.limits)}
-        | scaling_to_arrays(motion.scaling)
-        | filter_to_arrays(motion.modulation)
-    )
+    """Serialise learned motion with limits and variance scaling, for engines that store no more."""
+    arrays = motion_to_arrays(PHONE_SET, motion.space, motion.closure, motion.prior)
+    scaling = {"scaling": np.stack(motion.scaling)} if motion.scaling is not None else {}
+    return arrays | {"limits": np.stack(motion.limits)} | scaling
 
 
-def scaling_to_arrays(scaling: VarianceScaling | None) -> dict[str, NDArray[Any]]:
-    """Serialise variance scaling; None has no arrays."""
-    return {"scaling": np.stack(scaling)} if scaling is not None else {}
-
-
-def scaling_from_arrays(arrays: Arrays, dimensions: int) -> VarianceScaling | None:
-    """Deserialise what ``scaling_to_arrays`` returned. Raises ValueError: a wrong shape, type or range."""
-    if "scaling" not in arrays:
-        return None
-    return VarianceScaling(*check_arrays(arrays, SCALING, Q=dimensions)["scaling"])
-
-
-def learned_motion_from_arrays(arrays: Arrays, *, filtered: bool = False) -> LearnedMotion:
-    """Deserialise a learned motion; ``filtered``: with a modulation filter. Raises ModelFormatError: damaged arrays."""
+def learned_motion_from_arrays(arrays: Arrays) -> LearnedMotion:
+    """Deserialise a learned motion. Raises ModelFormatError: damaged arrays."""
     with format_errors("the learned motion"):
         _, space, closure, prior = motion_from_arrays(arrays, PHONE_SET.name)
         limits = MotionLimits(*check_arrays(arrays, LIMITS, Q=space.dimensions)["limits"])
         check_poses(limits, space, closure)
-        scaling = scaling_from_arrays(arrays, space.dimensions)
-        modulation = filter_from_arrays(arrays, space.dimensions, needed=filtered)
-        return LearnedMotion(space, closure, limits, scaling, prior, modulation)
+        scaling = None
+        if "scaling" in arrays:
+            scaling = VarianceScaling(*check_arrays(arrays, SCALING, Q=space.dimensions)["scaling"])
+        return LearnedMotion(space, closure, limits, scaling, prior)
 
 
 def motion_from_arrays(
@@ -120,5 +105,5 @@ LIMITS = {"limits": ArraySpec(np.float64, "2 Q")}
 SCALING = {"scaling": ArraySpec(np.float64, "2 Q")}
 MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *UNITS, *articulation.ARTICULATION)
 """Names of the arrays of ``motion_to_arrays``: P channels, of which R are reduced to K dimensions."""
-LEARNED_MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *LIMITS, *SCALING, *articulation.ARTICULATION, *MODULATION)
+LEARNED_MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *LIMITS, *SCALING, *articulation.ARTICULATION)
 """Names of the arrays of ``learned_motion_to_arrays``."""

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from typing import Any
 
 import numpy as np
@@ -15,11 +13,12 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING, REACH_S
-from lipmotion.motion.frame_labels import list_speech_intervals, mark_distant, with_neighbours
+from lipmotion.motion.frame_labels import mark_distant, with_neighbours
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.curves import with_dynamics
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays
-from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Example, Timeline, Unit, frames_of
+from lipmotion.storage.sources import read_shipped_table
+from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Example, Span, Timeline, Unit, frames_of
 from lipmotion.units import PHONES, SILENCE, VOWELS, describe_unknown_phone, find_similar_phone, is_silent
 
 
@@ -33,6 +32,7 @@ Context = tuple[str, str, str]  # the phone before, the phone, and the phone aft
 Statistics = tuple[Array, Array]
 """Means and precisions of successive frames [each shape=(T, 3, Q)], or values and variances [each shape=(T, Q)]."""
 Predict = Callable[[slice], Statistics]
+TABLE = ("lipmotion.motion", "articulation.csv")
 ARTICULATORS = ("opening", "width", "outer", "jaw", "upper_lip", "lower_lip", "protrusion", "inner_width")
 """The columns of the table (docs/articulation.md)."""
 TYPICAL_DEVIATIONS = (0.054, 0.051, 0.055, 0.047, 0.023, 0.032, 0.009, 0.041)
@@ -60,28 +60,21 @@ HALF_FAMILIAR_COUNT = 1.0  # occurrences in training after which a context count
 
 @dataclass(frozen=True, eq=False)
 class ArticulationPrior:
-    """The table of articulations in the range of one speaker, for phones in contexts that training saw little of.
+    """The table of articulations in the range of one speaker, for phones in contexts that training saw little of."""
 
-    centre   : the pose of which the table gives deviations: the median in speech [shape=(Q,)]
-    matrix   : change of the motion space with each articulator, per standard deviation of the speaker [shape=(8, Q)]
-    contexts : occurrences in training of each phone between its neighbours; pauses count as silence
-    weight   : of the table beside a model's own means, in a context that training never saw
-    known_voice_share : share of that weight for a voice that training knows
-    """
-
-    centre: Array
-    matrix: Array
-    contexts: Mapping[Context, int]
-    weight: float = TABLE_WEIGHT
-    known_voice_share: float = 1.0
+    centre: Array  # the pose of which the table gives deviations: the median in speech [shape=(Q,)]
+    matrix: Array  # change of the motion space with each articulator, per deviation of the speaker [shape=(8, Q)]
+    contexts: Mapping[Context, int]  # occurrences in training of each phone between its neighbours
+    weight: float = TABLE_WEIGHT  # beside a model's own means, in a context that training never saw
+    known_voice_share: float = 1.0  # share of that weight for a voice that training knows
 
     def familiarity(self, units: Timeline[Unit], frames: int) -> Array:
         """Return how well training knows each phone between its neighbours, and rest, 0 to 1 [shape=(frames,)]."""
         steps = np.ones((frames, 1))
-        for left, span, right in with_neighbours(units):
+        for context, span in _list_contexts(units):
             at_end = is_silent(span.label.phone) and span in (units[0], units[-1])
-            if span.label.phone and not at_end:
-                count = self.contexts.get((_merge_cells(left), _merge_cells(span.label.phone), _merge_cells(right)), 0)
+            if not at_end:
+                count = self.contexts.get(context, 0)
                 first, stop = frames_of(span, frames)
                 steps[first:stop] = count / (count + HALF_FAMILIAR_COUNT)
         steps[mark_distant(units, frames, REST_S)] = 1
@@ -152,18 +145,22 @@ def smooth_steps(steps: Array) -> Array:
 
 
 @cache
-def average_classes() -> dict[bool, Array]:
-    """Return the mean of articulators in each third of consonants (False) and vowels (True) [each shape=(3, 8)]."""
-    table, counts = read_articulation_table(), {row["phone"]: float(row["count"]) for row in _read_csv()}
-    spoken = [phone for phone in table if not is_silent(phone)]
-    return {
-        vowels: np.average(
-            [table[phone] for phone in spoken if (phone in VOWELS) == vowels],
-            axis=0,
-            weights=[counts[phone] for phone in spoken if (phone in VOWELS) == vowels],
+def compare_vowels() -> Array:
+    """Return how articulators change from the mean consonant to the mean vowel, per change of the opening [shape=(8,)].
+
+    Source: Lindblom 1963 (vowel reduction): the shorter a vowel, the more it misses its target.
+    """
+    table = read_articulation_table()
+    counts = {row["phone"]: float(row["count"]) for row in read_shipped_table(*TABLE)}
+    consonants, vowels = (
+        np.average([table[phone] for phone in phones], axis=0, weights=[counts[phone] for phone in phones])
+        for phones in (
+            [phone for phone in table if not is_silent(phone) and phone not in VOWELS],
+            [phone for phone in table if phone in VOWELS],
         )
-        for vowels in (False, True)
-    }
+    )
+    more_open: Array = (vowels - consonants).mean(axis=0)
+    return more_open / more_open[ARTICULATORS.index(OPENING)]
 
 
 @cache
@@ -171,14 +168,8 @@ def read_articulation_table() -> dict[str, Array]:
     """Return the mean of every articulator in each third of every phone [each shape=(3, 8)]."""
     return {
         row["phone"]: np.array([[float(row[f"{name}_{third}"]) for name in ARTICULATORS] for third in THIRDS])
-        for row in _read_csv()
+        for row in read_shipped_table(*TABLE)
     }
-
-
-@cache
-def _read_csv() -> list[dict[str, str]]:
-    text = resources.files("lipmotion.motion").joinpath("articulation.csv").read_text(encoding="ascii")
-    return list(csv.DictReader(text.splitlines()))
 
 
 def fit_articulation_prior(
@@ -195,20 +186,18 @@ def fit_articulation_prior(
     spoken_poses = []
     for x, example in zip(values, examples, strict=True):
         spoken = np.zeros(len(x), bool)
-        for start_s, end_s in list_speech_intervals(example.speech.units):
-            spoken[int(np.ceil(start_s * FRAME_RATE_HZ)) : int(np.ceil(end_s * FRAME_RATE_HZ))] = True
+        for span in example.speech.units:
+            if not is_silent(span.label.phone):
+                spoken[slice(*frames_of(span, len(x)))] = True
         spoken_poses.append(x[spoken & example.valid])
     poses = np.concatenate(spoken_poses)
     if not len(poses):
         return None
-    channels, _ = space.restore(poses, np.zeros_like(poses))
-    measured = measure_articulators(channels, [channel.name for channel in space.channels])
+    measured = measure_articulators(space.restore(poses), [channel.name for channel in space.channels])
     known = [number for number, name in enumerate(ARTICULATORS) if name in measured]
     columns = np.stack([measured[ARTICULATORS[number]] for number in known], axis=1)
-    centred = columns - columns.mean(axis=0)
-    speaker = np.maximum(columns.std(axis=0), MIN_DEVIATION)
-    standard = centred / speaker
-    deviations = speaker
+    deviations = speaker = np.maximum(columns.std(axis=0), MIN_DEVIATION)
+    standard = (columns - columns.mean(axis=0)) / speaker
     if space.channels[space.direct[space.direct_names.index(OPENING)]].unit == EYE_DISTANCE:
         deviations = np.sqrt(speaker * [TYPICAL_DEVIATIONS[number] for number in known])
     products = standard.T @ standard + RIDGE * len(poses) * np.eye(len(known))
@@ -226,13 +215,7 @@ def fit_articulation_prior(
 
 def count_contexts(timelines: Iterable[Timeline[Unit]]) -> dict[Context, int]:
     """Return how often each phone occurs between its neighbours; pauses count as silence."""
-    counts: Counter[Context] = Counter()
-    for units in timelines:
-        counts.update(
-            (_merge_cells(left), _merge_cells(span.label.phone), _merge_cells(right))
-            for left, span, right in with_neighbours(units)
-            if span.label.phone
-        )
+    counts = Counter(context for units in timelines for context, _ in _list_contexts(units))
     return dict(sorted(counts.items()))
 
 
@@ -266,32 +249,32 @@ ARTICULATION = {
 }
 
 
-def _merge_cells(phone: str) -> str:
+def _list_contexts(units: Timeline[Unit]) -> Iterator[tuple[Context, Span[Unit]]]:
+    """Yield each known phone between its neighbours; pauses count as silence."""
+    for left, span, right in with_neighbours(units):
+        if span.label.phone:
+            yield (_merge_pauses(left), _merge_pauses(span.label.phone), _merge_pauses(right)), span
+
+
+def _merge_pauses(phone: str) -> str:
     return SILENCE if is_silent(phone) else phone
 
 
 def measure_articulators(motion: NDArray[np.floating[Any]], names: Sequence[str]) -> dict[str, Array]:
-    """Return the articulators that motion of named channels [shape=(N, P)] shows, by name [each shape=(N,)]."""
-    curves = {name: np.asarray(curve, float) for name, curve in zip(names, np.asarray(motion).T, strict=True)}
-    measured = {name: curves[name] for name in ARTICULATORS[:3] if name in curves}
-    for name, (points, measure) in _MEASURES.items():
-        if all(point in curves for point in points):
-            measured[name] = measure(curves.__getitem__)
+    """Return the articulators that motion of named channels [shape=(N, P)] shows, by name [each shape=(N,)].
+
+    Points: y is up, z out of the face, the nose does not move.
+    """
+    of = {name: np.asarray(curve, float) for name, curve in zip(names, np.asarray(motion).T, strict=True)}
+    measured = {name: of[name] for name in ARTICULATORS[:3] if name in of}
+    measured |= {name: -of[point] for name, point in (("jaw", "y_152"), ("upper_lip", "y_13")) if point in of}
+    if {"y_14", "y_152"} <= of.keys():
+        measured["lower_lip"] = of["y_14"] - of["y_152"]
+    if {"z_13", "z_14", "z_61", "z_291"} <= of.keys():
+        measured["protrusion"] = (of["z_13"] + of["z_14"] - of["z_61"] - of["z_291"]) / 2
+    if {"x_78", "x_308"} <= of.keys():
+        measured["inner_width"] = np.abs(of["x_78"] - of["x_308"])
     return measured
-
-
-_Channel = Callable[[str], Array]
-_MEASURES: dict[str, tuple[tuple[str, ...], Callable[[_Channel], Array]]] = {
-    "jaw": (("y_152",), lambda of: -of("y_152")),
-    "upper_lip": (("y_13",), lambda of: -of("y_13")),
-    "lower_lip": (("y_14", "y_152"), lambda of: of("y_14") - of("y_152")),
-    "protrusion": (
-        ("z_13", "z_14", "z_61", "z_291"),
-        lambda of: (of("z_13") + of("z_14") - of("z_61") - of("z_291")) / 2,
-    ),
-    "inner_width": (("x_78", "x_308"), lambda of: np.abs(of("x_78") - of("x_308"))),
-}
-"""Points that an articulator is measured on, and how: y is up, z out of the face, the nose does not move."""
 
 
 SOUND_SHARES = (0.75, 0.35)
@@ -325,18 +308,14 @@ where phones cannot be relied on at all, and where they can. The general network
 class UnseenSpeaker:
     """What is changed in the motion of a voice that training does not know; precisions stay those of the model.
 
-    prior       : the table of articulation
-    units       : phones in time, in T frames
-    reliability : of the phones in time, 0 to 1 [shape=(T,)]
-    voice       : how well training knows the voice, 0 to 1; at 1 it only follows the sound in noise
     Every method takes and returns a function that returns means and precisions of a range of frames.
     """
 
-    prior: ArticulationPrior
-    units: Timeline[Unit]
+    prior: ArticulationPrior  # the table of articulation
+    units: Timeline[Unit]  # phones in time, in T frames
     frames: int
-    reliability: Array | float
-    voice: float
+    reliability: Array | float  # of the phones in time, 0 to 1 [shape=(T,)]
+    voice: float  # how well training knows the voice, 0 to 1; at 1 it only follows the sound in noise
 
     def follow_sound(self, statistics: Predict, articulators: Array) -> Predict:
         """Draw motion in and near speech towards articulators that the general network hears [shape=(T, 8)]."""
@@ -359,11 +338,7 @@ class UnseenSpeaker:
         return [r for r in ranges if reliability[r].mean() > 0.5 or opening[r].min() < CONFIRMED]
 
     def raise_contrast(self, statistics: Predict) -> Predict:
-        """Open consonants less, and vowels by their duration.
-
-        All articulators move as from the mean consonant to the mean vowel of the table.
-        Source: Lindblom 1963 (vowel reduction): the shorter a vowel, the more it misses its target.
-        """
+        """Open consonants less, and vowels by their duration; all articulators move as from consonants to vowels."""
         wider = np.zeros((self.frames, 1))
         for span in self.units:
             inside, phone = slice(*frames_of(span, self.frames)), span.label.phone
@@ -371,10 +346,8 @@ class UnseenSpeaker:
                 wider[inside] = OPENING_BY_DURATION * np.log(max(span.duration_s, 1 / FRAME_RATE_HZ) / VOWEL_S)
             elif phone and not is_silent(phone):
                 wider[inside] = -CONSONANT_CLOSING
-        more_open = (average_classes()[True] - average_classes()[False]).mean(axis=0)
-        more_open /= more_open[ARTICULATORS.index(OPENING)]
         gain = count_unseen(self.voice) * np.broadcast_to(self.reliability, self.frames)[:, None]
-        change = gain * smooth_steps(wider) * more_open @ self.prior.matrix
+        change = gain * smooth_steps(wider) * compare_vowels() @ self.prior.matrix
 
         def predict(chosen: slice) -> Statistics:
             means, precisions = statistics(chosen)

@@ -22,16 +22,11 @@ anything."""
 
 @dataclass(frozen=True, eq=False)
 class Closure:
-    """The opening of closed lips, and how the other dimensions of motion change with the opening.
+    """The opening of closed lips, and how the other dimensions of motion change with the opening."""
 
-    column : of the opening in the motion space
-    closed : the opening at which the lips touch, as the tracker measures it, in eye distances
-    follow : float array [shape=(Q,)], change of each dimension per unit of opening (regression through the mean)
-    """
-
-    column: int
-    closed: float
-    follow: NDArray[np.float64]
+    column: int  # of the opening in the motion space
+    closed: float  # the opening at which the lips touch, as the tracker measures it, in eye distances
+    follow: NDArray[np.float64]  # change of each dimension per unit of opening (regression) [shape=(Q,)]
 
 
 def is_never_negative(channel: Channel) -> bool:
@@ -43,6 +38,13 @@ def clip_at_zero(motion: Motion) -> None:
     """Raise values under 0 to 0, in place, in the channels that have none."""
     bounded = [is_never_negative(channel) for channel in motion.channels]
     motion.values[:, bounded] = np.maximum(motion.values[:, bounded], 0)
+
+
+def frames_within(start_s: float, end_s: float, rate_hz: float, frames: int) -> tuple[int, int]:
+    """Return the first frame in a time, both ends included, and the one after the last; cut to so many frames."""
+    first = max(int(np.ceil(start_s * rate_hz - 1e-6)), 0)
+    stop = min(int(np.floor(end_s * rate_hz + 1e-6)) + 1, frames)
+    return first, stop
 
 
 def find_closable_ranges(
@@ -60,8 +62,7 @@ def find_closable_ranges(
         label = span.label
         if closing or (not label.phone and label.unit in closing_units):
             inside_s = min(-reach_s, span.duration_s / 2)
-            first = max(int(np.ceil((span.start_s + inside_s) * FRAME_RATE_HZ - 1e-6)), 0)
-            stop = min(int(np.floor((span.end_s - inside_s) * FRAME_RATE_HZ + 1e-6)) + 1, frames)
+            first, stop = frames_within(span.start_s + inside_s, span.end_s - inside_s, FRAME_RATE_HZ, frames)
             stop = max(stop, min(first + 1, frames)) if reach_s < 0 else stop
             if first < stop:
                 ranges.append(slice(first, stop))
@@ -81,30 +82,6 @@ def estimate_closed_opening(smallest: Sequence[float], *groups: NDArray[np.float
     return max(min([*middle, *bounds], default=0.0), 0.0)
 
 
-def estimate_closure(
-    values: Sequence[Array], valid: Sequence[NDArray[np.bool_]], timelines: Sequence[Timeline[Unit]], column: int
-) -> Closure:
-    """Return the closure of the lips, estimated from motion with its phones.
-
-    values    : motion in the motion space [each shape=(T, Q)]
-    valid     : the frames of each that were measured [each shape=(T,)]
-    timelines : the phones of each
-    column    : of the opening
-    ``closed`` is from ``estimate_closed_opening``, of all measured frames.
-    """
-    smallest = [
-        float(x[frames][known[frames], column].min())
-        for x, known, units in zip(values, valid, timelines, strict=True)
-        for frames in find_closable_ranges(units, len(x))
-        if known[frames].any()
-    ]
-    poses = np.concatenate([x[known] for x, known in zip(values, valid, strict=True)])
-    centred = poses - poses.mean(axis=0)
-    opening = centred[:, column]
-    closed = estimate_closed_opening(smallest, poses[:, column])
-    return Closure(column, closed, opening @ centred / max(float(opening @ opening), 1e-12))
-
-
 def choose_closed_frames(closure: Closure, opening: Array, ranges: Sequence[slice], pinned: Sequence[int]) -> list[int]:
     """Return the frames in which the lips must be made to close: the least open frame of each p, b and m.
 
@@ -122,8 +99,23 @@ def choose_closed_frames(closure: Closure, opening: Array, ranges: Sequence[slic
 
 
 def fit_closure(names: Sequence[str], values: Sequence[Array], examples: Sequence[Example]) -> Closure | None:
-    """Return the closure of the lips in motion of examples [each shape=(T, Q)]; None without a channel ``opening``."""
+    """Return the closure of the lips in motion of examples; None without a channel ``opening``.
+
+    names  : of the dimensions that are channels, the first ones of the motion space
+    values : motion of each example in the motion space [each shape=(T, Q)]
+    ``closed`` is from ``estimate_closed_opening``, of all measured frames.
+    """
     if OPENING not in names:
         return None
-    masks, timelines = [example.valid for example in examples], [example.speech.units for example in examples]
-    return estimate_closure(values, masks, timelines, names.index(OPENING))
+    column = names.index(OPENING)
+    smallest = [
+        float(x[frames][example.valid[frames], column].min())
+        for x, example in zip(values, examples, strict=True)
+        for frames in find_closable_ranges(example.speech.units, len(x))
+        if example.valid[frames].any()
+    ]
+    poses = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
+    centred = poses - poses.mean(axis=0)
+    opening = centred[:, column]
+    closed = estimate_closed_opening(smallest, poses[:, column])
+    return Closure(column, closed, opening @ centred / max(float(opening @ opening), 1e-12))

@@ -27,15 +27,11 @@ WINDOW = {
 
 @dataclass(frozen=True, eq=False)
 class AcousticContext:
-    """Standardised features at ``OFFSETS`` around a frame, projected on their first F principal components.
+    """Standardised features at ``OFFSETS`` around a frame, projected on their first F principal components."""
 
-    mean, scale : float32 arrays [shape=(D·len(OFFSETS),)], of the standardisation
-    basis       : float32 array [shape=(D·len(OFFSETS), F)]
-    """
-
-    mean: NDArray[np.float32]
-    scale: NDArray[np.float32]
-    basis: NDArray[np.float32]
+    mean: NDArray[np.float32]  # of the standardisation [shape=(D·len(OFFSETS),)]
+    scale: NDArray[np.float32]  # of the same [shape=(D·len(OFFSETS),)]
+    basis: NDArray[np.float32]  # [shape=(D·len(OFFSETS), F)]
 
     def __call__(self, features: NDArray[np.float32], frames: NDArray[np.intp] | slice) -> NDArray[np.float32]:
         """Return the reduced features around some frames of a recording [shape=(N, F)]; beyond its ends they repeat."""

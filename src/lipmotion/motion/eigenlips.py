@@ -25,18 +25,14 @@ Images = NDArray[np.uint8]
 class Eigenlips:
     """The space of mouth pictures: of each colour a mean picture and its principal components.
 
-    mean      : float32 array [shape=(3, D)], grey levels, D = height · width, row by row
-    basis     : float32 array [shape=(3, K, D)], orthonormal in each colour, most variance first
-    explained : share of each colour's variance in the training pictures that the components explain [shape=(3,)]
-    size      : height and width of a picture, px
     Source: Xie & Liu 2007, §5, Eqs. 12–13 (there r > d; read r < d). Deviation: the covariance is diagonalised, not the
     correlation matrix, so that Eq. 13 is the least-squares solution of Eq. 12.
     """
 
-    mean: NDArray[np.float32]
-    basis: NDArray[np.float32]
-    explained: NDArray[np.float64]
-    size: tuple[int, int]
+    mean: NDArray[np.float32]  # [shape=(3, D)], grey levels, D = height · width, row by row
+    basis: NDArray[np.float32]  # [shape=(3, K, D)], orthonormal in each colour, most variance first
+    explained: NDArray[np.float64]  # share of each colour's variance that they explain, in training [shape=(3,)]
+    size: tuple[int, int]  # height and width of a picture, px
 
     @property
     def channels(self) -> tuple[Channel, ...]:

@@ -91,16 +91,12 @@ REST_STATE = -1  # the number of the one state of the rest pose: silence far fro
 
 
 class FullContextState(NamedTuple):
-    """A state of a unit in the context of its neighbours.
+    """A state of a unit in the context of its neighbours."""
 
-    left, unit, right : names of the unit before, of the unit, and of the unit after
-    state : number of the state within the unit, from 0; ``REST_STATE`` for the rest pose
-    """
-
-    left: str
-    unit: str
-    right: str
-    state: int
+    left: str  # name of the unit before
+    unit: str  # of the unit
+    right: str  # of the unit after
+    state: int  # number of the state within the unit, from 0; ``REST_STATE`` for the rest pose
 
     @property
     def context(self) -> tuple[str, str, str]:
@@ -110,18 +106,13 @@ class FullContextState(NamedTuple):
 
 @dataclass(frozen=True)
 class StateLayout:
-    """The number of states of every unit, and their durations.
+    """The number of states of every unit, and their durations."""
 
-    speech, silence : states of a unit of speech, and of a unit that is silence only; odd numbers
-    edge_s : seconds that a state before or after the middle one lasts at most: all states of a short unit last an equal
-             share of it, in a long unit only the middle state becomes longer
-    units  : the unit of every phone
-    """
-
-    speech: int
-    silence: int
-    edge_s: float
-    units: UnitSet = UNIT_SETS["phone"]
+    speech: int  # states of a unit of speech: an odd number
+    silence: int  # states of a unit that is silence only: an odd number
+    # all states of a short unit last an equal share of it, in a long unit only the middle state becomes longer
+    edge_s: float  # seconds that a state before or after the middle one lasts at most
+    units: UnitSet = UNIT_SETS["phone"]  # the unit of every phone
 
     def states(self, unit: str) -> int:
         """Return how many states a unit has."""

@@ -50,12 +50,10 @@ class VarianceScaling(NamedTuple):
 
     Source: Silén, Helander, Nurminen & Gabbouj 2012. Deviation: scaling is about the rest pose, not about the mean, so
     that a closed mouth stays closed.
-    factors : from ``fit_scaling_factors`` [shape=(Q,)]
-    rest    : the rest pose [shape=(Q,)]
     """
 
-    factors: Array
-    rest: Array
+    factors: Array  # from ``fit_scaling_factors`` [shape=(Q,)]
+    rest: Array  # the rest pose [shape=(Q,)]
 
     def apply(self, means: Array, precisions: Array) -> tuple[Array, Array]:
         """Return means and precisions of static value, Δ and Δ² of the scaled movements [each shape=(T, 3, Q)]."""
@@ -166,7 +164,7 @@ class LearnedMotion:
             values, variance = self._solve_block(predicted, block_pins, block_ranges)
             self.limits.check(values, self.closure, block_pins)
             inside = slice(inner.start - outer.start, inner.stop - outer.start)
-            motion[inner], _ = space.restore(values[inside], variance[inside])
+            motion[inner] = space.restore(values[inside])
             spread[inner] = variance[inside]
         weights = [channel.unit == WEIGHT for channel in space.channels]
         motion[:, weights] = np.maximum(motion[:, weights], 0)

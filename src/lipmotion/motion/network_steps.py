@@ -95,16 +95,11 @@ def cut_random_piece(sequence: TrainingSequence, rng: np.random.Generator) -> Tr
 
 @dataclass(frozen=True)
 class NetworkShape(ABC, Generic[NetworkT]):
-    """Shape of a network, and how it is trained and stored.
+    """Shape of a network, and how it is trained and stored."""
 
-    prefix : of the names of its arrays in a model file
-    name   : in messages and of its checkpoint
-    inputs : values of a time step
-    """
-
-    prefix: str
-    name: str
-    inputs: int
+    prefix: str  # of the names of its arrays in a model file
+    name: str  # in messages and of its checkpoint
+    inputs: int  # values of a time step
 
     @property
     def specs(self) -> dict[str, ArraySpec]:
@@ -117,30 +112,28 @@ class NetworkShape(ABC, Generic[NetworkT]):
     @property
     @abstractmethod
     def sizes(self) -> dict[str, str]:
-        """Shape of each array, as in ``ArraySpec``, by its name without the prefix; ``output`` is the last one."""
+        """Shapes of the arrays by their names without the prefix: the first weights, the others, ..., ``output``."""
 
     @abstractmethod
-    def stack(self, network: NetworkT) -> tuple[NDArray[np.float32], ...]:
-        """Return the arrays of a network of this shape, in the order of ``sizes``, but for ``output``."""
-
-    @abstractmethod
-    def network(self, stacked: Sequence[NDArray[np.float32]], output: LinearMap) -> NetworkT:
-        """Return the network of the arrays of ``stack``."""
+    def network(self, layers: Iterable[Sequence[NDArray[np.float32]]], output: LinearMap) -> NetworkT:
+        """Return the network of some layers, each as its arrays, and of the linear map of its output."""
 
     @abstractmethod
     def initial(self, outputs: int, seed: int) -> NetworkT:
         """Return an untrained network with random weights."""
 
     def arrays(self, network: NetworkT) -> dict[str, NDArray[np.float32]]:
-        """Return the arrays of a network of this shape."""
+        """Return the arrays of a network of this shape: the first layer has other inputs, the rest is stacked."""
+        weights, *others = zip(*network.layers, strict=True)
         output = np.concatenate([network.output.weights, network.output.biases[None]])
-        return dict(zip(self.specs, (*self.stack(network), output), strict=True))
+        arrays = (weights[0], np.stack(weights[1:]), *(np.stack(each) for each in others), output)
+        return dict(zip(self.specs, arrays, strict=True))
 
     def from_arrays(self, arrays: Arrays, outputs: int) -> NetworkT:
         """Return the network of arrays. Raises KeyError, ValueError: one is missing or damaged."""
         stored = check_arrays(arrays, self.specs, O=outputs)
-        *stacked, output = (stored[name] for name in self.specs)
-        return self.network(stacked, LinearMap(output[:-1], output[-1]))
+        first, weights, *others, output = (stored[name] for name in self.specs)
+        return self.network(zip([first, *weights], *others, strict=True), LinearMap(output[:-1], output[-1]))
 
     def train(
         self,
@@ -184,14 +177,10 @@ class ConvolutionalShape(NetworkShape[ConvolutionalNetwork]):
             "output": f"{hidden + 1} O",
         }
 
-    def stack(self, network: ConvolutionalNetwork) -> tuple[NDArray[np.float32], ...]:  # noqa: D102
-        first, *others = [layer.weights for layer in network.layers]
-        return first, np.stack(others), np.stack([layer.biases for layer in network.layers])
-
-    def network(self, stacked: Sequence[NDArray[np.float32]], output: LinearMap) -> ConvolutionalNetwork:  # noqa: D102
-        first, others, biases = stacked
-        layers = tuple(LinearMap(each, bias) for each, bias in zip([first, *others], biases, strict=True))
-        return ConvolutionalNetwork(layers, self.dilations, output)
+    def network(  # noqa: D102
+        self, layers: Iterable[Sequence[NDArray[np.float32]]], output: LinearMap
+    ) -> ConvolutionalNetwork:
+        return ConvolutionalNetwork(tuple(LinearMap(*each) for each in layers), self.dilations, output)
 
     def initial(self, outputs: int, seed: int) -> ConvolutionalNetwork:  # noqa: D102
         return make_network(self.inputs, self.hidden_units, outputs, self.dilations, seed)
@@ -216,14 +205,10 @@ class RecurrentShape(NetworkShape[RecurrentNetwork]):
             "output": f"{2 * self.cells + 1} O",
         }
 
-    def stack(self, network: RecurrentNetwork) -> tuple[NDArray[np.float32], ...]:  # noqa: D102
-        weights, memory, biases = zip(*network.layers, strict=True)
-        return weights[0], np.stack(weights[1:]), np.stack(memory), np.stack(biases)
-
-    def network(self, stacked: Sequence[NDArray[np.float32]], output: LinearMap) -> RecurrentNetwork:  # noqa: D102
-        first, others, memory, biases = stacked
-        layers = tuple(RecurrentLayer(*each) for each in zip([first, *others], memory, biases, strict=True))
-        return RecurrentNetwork(layers, output)
+    def network(  # noqa: D102
+        self, layers: Iterable[Sequence[NDArray[np.float32]]], output: LinearMap
+    ) -> RecurrentNetwork:
+        return RecurrentNetwork(tuple(RecurrentLayer(*each) for each in layers), output)
 
     def initial(self, outputs: int, seed: int) -> RecurrentNetwork:  # noqa: D102
         return make_recurrent_network(self.inputs, self.cells, outputs, self.layers, seed)

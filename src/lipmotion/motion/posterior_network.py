@@ -16,7 +16,7 @@ from typing import Any, ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import CorpusError, InputError, ModelFormatError
+from lipmotion.errors import CorpusError, InputError
 from lipmotion.motion.articulation import count_unseen
 from lipmotion.motion.network_steps import (
     MIN_DEVIATION,
@@ -74,25 +74,16 @@ TARGETS = {
 @final
 @dataclass(frozen=True, eq=False)
 class PosteriorNetwork(Predictor):
-    """A network from posteriors and spectra to motion.
+    """A network from posteriors and spectra to motion."""
 
-    network     : its outputs are Q standardised dimensions of motion
-    mean, basis : of the logarithms of the posteriors [shape=(K,)], and from them to the inputs [shape=(K, 120)]
-    centre, scale : mean and standard deviation of the motion in training [each shape=(Q,)]
-    variances   : of the error of static value, Δ and Δ² in training [shape=(3, Q)]
-    source      : name, version and digest of the phone recogniser (``TokenPosteriors.source``)
-    recurrent   : for voices that training knows, from the same inputs to the same outputs (None: an example of the
-                  training had no spectrum, or the model is an earlier one)
-    """
-
-    network: ConvolutionalNetwork
-    mean: NDArray[np.float32]
-    basis: NDArray[np.float32]
-    centre: Array
-    scale: Array
-    variances: Array
-    source: str
-    recurrent: RecurrentNetwork | None = None
+    network: ConvolutionalNetwork  # its outputs are Q standardised dimensions of motion
+    mean: NDArray[np.float32]  # of the logarithms of the posteriors [shape=(K,)]
+    basis: NDArray[np.float32]  # from them to the inputs [shape=(K, 120)]
+    centre: Array  # mean of the motion in training [shape=(Q,)]
+    scale: Array  # its standard deviation [shape=(Q,)]
+    variances: Array  # of the error of static value, Δ and Δ² in training [shape=(3, Q)]
+    source: str  # name, version and digest of the phone recogniser (``TokenPosteriors.source``)
+    recurrent: RecurrentNetwork | None = None  # for known voices; None: an example had no spectrum
     name: ClassVar[str] = "posteriors"
     needs: ClassVar[str] = "posteriors"
     ARRAYS: ClassVar[Mapping[str, ArraySpec]] = SHAPE.specs | TARGETS | RECURRENT.specs
@@ -135,34 +126,29 @@ class PosteriorNetwork(Predictor):
         The spectrum counts as far as training knows the voice.
         Raises InputError: speech without posteriors, or with those of another phone recogniser than in training.
         """
-        posteriors, frames = self._check(speech.posteriors), len(speech.features.values)
+        frames = len(speech.features.values)
         share = 0.0 if speech.spectrum is None else 1 - count_unseen(speech.voice)
         motion = np.zeros((frames, len(self.centre)))
         for spectrum, weight in ((None, 1 - share), (speech.spectrum, share)):
             if weight > 0:
-                key, predict = (self, spectrum is None), partial(self._predict, posteriors, spectrum, frames)
-                motion += weight * speech.cached(key, predict)
+                motion += weight * speech.cached((self, spectrum is None), partial(self._predict, speech, spectrum))
         return motion, np.zeros(frames)
 
     def hidden_units(self, posteriors: TokenPosteriors, steps: int) -> NDArray[np.float32]:
         """Return the last hidden layer, without spectrum [shape=(steps, H)]. Raises InputError: as ``predict``."""
-        rows = self.network.hidden(_stack_shift(self._components(self._check(posteriors)), None, 0))
+        rows = self.network.hidden(_stack_shift(self._components(posteriors), None, 0))
         return rows[np.minimum(np.arange(steps), len(rows) - 1)]
 
-    def _predict(self, posteriors: TokenPosteriors, spectrum: NDArray[np.floating] | None, frames: int) -> Array:
-        """Return motion in the motion space [shape=(frames, Q)], with the spectrum or without."""
-        shifted = _stack_inputs(self._components(posteriors), spectrum)
+    def _predict(self, speech: Speech, spectrum: NDArray[np.floating] | None) -> Array:
+        """Return motion in the motion space [shape=(T, Q)], with the spectrum or without."""
+        shifted, frames = _stack_inputs(self._components(speech.posteriors), spectrum), len(speech.features.values)
         outputs = _run(self.network, shifted, frames)
         if self.recurrent is not None and spectrum is not None:
             outputs += RECURRENT_SHARE * (_run(self.recurrent, shifted, frames) - outputs)
         return outputs * self.scale + self.centre
 
-    def _components(self, posteriors: TokenPosteriors) -> NDArray[np.floating]:
-        """Return the principal components of the logarithms of posteriors [shape=(N, 120)]."""
-        return (limit_logarithms(posteriors) - self.mean) @ self.basis
-
-    def _check(self, posteriors: TokenPosteriors | None) -> TokenPosteriors:
-        """Return the posteriors; raise InputError where there are none, or those of another phone recogniser."""
+    def _components(self, posteriors: TokenPosteriors | None) -> NDArray[np.floating]:
+        """Return the principal components of the logarithms of posteriors [shape=(N, 120)]; raise as ``predict``."""
         if posteriors is None:
             raise InputError("the speech has no posteriors; an engine that uses them says so by ``inputs``")
         if posteriors.source != self.source:
@@ -170,7 +156,7 @@ class PosteriorNetwork(Predictor):
                 f"the model was trained with the phone recogniser {self.source}, this one is {posteriors.source}; "
                 f"install that one (pip install {'=='.join(self.source.split()[:2])}), or use the recogniser fast"
             )
-        return posteriors
+        return (limit_logarithms(posteriors) - self.mean) @ self.basis
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Serialise the networks, at half precision."""
@@ -184,9 +170,7 @@ class PosteriorNetwork(Predictor):
 
     @classmethod
     def from_arrays(cls, arrays: Arrays, dimensions: int) -> PosteriorNetwork:
-        """Deserialise a network; as ``Predictor.from_arrays``. Raises ModelFormatError, too: one of an earlier form."""
-        if "posterior_variances" not in arrays:
-            raise ModelFormatError("a posterior network of 2026-11-23, required one with spectra: train again")
+        """Deserialise a network; as ``Predictor.from_arrays``."""
         stored = check_arrays(arrays, TARGETS, Q=dimensions)
         centre, scale = stored["posterior_targets"]
         return cls(
@@ -211,7 +195,7 @@ def _train_convolutional(
     training: PredictorTraining, sequences: Sequence[Sequence[TrainingSequence]], motion_s: float
 ) -> ConvolutionalNetwork:
     def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
-        piece = _draw_piece(rng, sequences[number])
+        piece = _draw_piece(sequences, rng, number)
         if rng.random() >= SPECTRUM_OFF:
             return piece
         rows = piece.inputs.copy()
@@ -229,12 +213,14 @@ def _train_recurrent(
     rate = min(RECURRENT_RATE / math.sqrt(motion_s), LARGEST_RECURRENT_RATE)
     steps = max(round(RECURRENT_STEPS * math.sqrt(motion_s)), 1)
     plan = TrainingPlan(steps, min(RECURRENT_BATCH, len(sequences)), rate, RECURRENT_DROPOUT, SEED)
-    outputs = sequences[0][0].targets.shape[1]
-    return RECURRENT.train(training, outputs, lambda rng, number: _draw_piece(rng, sequences[number]), plan)
+    return RECURRENT.train(training, sequences[0][0].targets.shape[1], partial(_draw_piece, sequences), plan)
 
 
-def _draw_piece(rng: np.random.Generator, shifted: Sequence[TrainingSequence]) -> TrainingSequence:
+def _draw_piece(
+    sequences: Sequence[Sequence[TrainingSequence]], rng: np.random.Generator, number: int
+) -> TrainingSequence:
     """Return one of the shifts of an example, or a piece of it."""
+    shifted = sequences[number]
     return cut_random_piece(shifted[int(rng.integers(len(shifted)))], rng)
 
 

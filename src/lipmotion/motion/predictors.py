@@ -29,23 +29,14 @@ FOLDS = 4
 
 @dataclass(frozen=True, eq=False)
 class PredictorTraining:
-    """What a predictor is trained on, and with.
+    """What a predictor is trained on, and with."""
 
-    examples   : speech with motion; those frames count in which ``Example.valid`` is True
-    values     : the motion of each example in the motion space [each shape=(T, Q)]
-    direct     : number of channels that are modelled as they are: the first dimensions; the others are principal
-                 components
-    epochs     : how often each example is used, in methods that use it several times
-    monitor    : called with reports of progress
-    checkpoint : stores finished stages of long training
-    """
-
-    examples: Sequence[Example]
-    values: Sequence[Array]
-    direct: int
-    epochs: int = 1
-    monitor: Monitor = silent_monitor
-    checkpoint: Checkpoint = NO_CHECKPOINT
+    examples: Sequence[Example]  # speech with motion; those frames count in which ``Example.valid`` is True
+    values: Sequence[Array]  # the motion of each example in the motion space [each shape=(T, Q)]
+    direct: int  # number of channels that are modelled as they are, the first dimensions; the others are components
+    epochs: int = 1  # how often each example is used, in methods that use it several times
+    monitor: Monitor = silent_monitor  # called with reports of progress
+    checkpoint: Checkpoint = NO_CHECKPOINT  # stores finished stages of long training
 
 
 class PredictorFit(NamedTuple):

@@ -9,11 +9,10 @@ from typing import Any, ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import CorpusError, InputError, ModelFormatError
+from lipmotion.errors import CorpusError, InputError
 from lipmotion.motion.articulation import ARTICULATORS, trace_articulators
 from lipmotion.motion.network_steps import STEP, check_scale, interpolate_steps, measure_error_variances
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining, split_folds
-from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
 from lipmotion.types import SPECTRUM_BANDS, Speech
 
@@ -26,16 +25,11 @@ RIDGE = 0.01
 @final
 @dataclass(frozen=True, eq=False)
 class EncodingRegression(Predictor):
-    """Linear regression of motion on the encoding of the sound from 200 ms before a frame to 200 ms after it.
+    """Linear regression of motion on the encoding of the sound from 200 ms before a frame to 200 ms after it."""
 
-    coefficients : float32 array [shape=(704, Q)]
-    centre       : the motion where all regressors are 0 [shape=(Q,)]
-    variances    : of the error of static value, Δ and Δ² in training [shape=(3, Q)]
-    """
-
-    coefficients: NDArray[np.float32]
-    centre: Array
-    variances: Array
+    coefficients: NDArray[np.float32]  # float32 array [shape=(704, Q)]
+    centre: Array  # the motion where all regressors are 0 [shape=(Q,)]
+    variances: Array  # of the error of static value, Δ and Δ² in training [shape=(3, Q)]
     name: ClassVar[str] = "encoding"
     needs: ClassVar[str] = "encoding"
     ARRAYS: ClassVar[Mapping[str, ArraySpec]] = {
@@ -47,21 +41,18 @@ class EncodingRegression(Predictor):
     @classmethod
     def fit(cls, training: PredictorTraining) -> PredictorFit:
         """Return the regression. Raises CorpusError: an example without encoding."""
-        products = targets = 0.0
         rows: list[tuple[Array, Array]] = []
         for example, values in zip(training.examples, training.values, strict=True):
             if example.speech.encoding is None:
                 raise CorpusError("examples without encoding, which the predictor encoding needs")
-            steps = np.arange(0, len(values), STEP)
-            steps = steps[example.valid[steps]]
-            rows.append((stack_encoding(example.speech)[steps // STEP], values[steps]))
+            measured = example.valid[::STEP]
+            rows.append((stack_encoding(example.speech)[measured], values[::STEP][measured]))
         count = sum(len(x) for x, _ in rows)
         if not count:
             raise CorpusError("no frame with measured motion; train on recordings with a face")
-        mean = sum(x.sum(axis=0) for x, _ in rows) / count
-        centre = sum(y.sum(axis=0) for _, y in rows) / count
-        for x, y in rows:
-            products, targets = products + (x - mean).T @ (x - mean), targets + (x - mean).T @ (y - centre)
+        mean, centre = (sum(each.sum(axis=0) for each in arrays) / count for arrays in zip(*rows, strict=True))
+        products = sum((x - mean).T @ (x - mean) for x, _ in rows)
+        targets = sum((x - mean).T @ (y - centre) for x, y in rows)
         penalty = RIDGE * np.trace(products) / len(mean)
         coefficients = np.linalg.solve(products + penalty * np.eye(len(mean)), targets)
         if 0 < training.direct < len(centre):  # jaw and points go with lips as they do in the training
@@ -79,11 +70,12 @@ class EncodingRegression(Predictor):
         if speech.encoding is None:
             raise InputError("the speech has no encoding; an engine that uses one says so by ``inputs``")
         frames = len(speech.features.values)
-        return speech.cached(self, lambda: self._predict(speech, frames)), np.zeros(frames)
 
-    def _predict(self, speech: Speech, frames: int) -> Array:
-        steps = stack_encoding(speech) @ self.coefficients.astype(float) + self.centre
-        return interpolate_steps(steps, frames)
+        def follow() -> Array:
+            steps = stack_encoding(speech) @ self.coefficients.astype(float) + self.centre
+            return interpolate_steps(steps, frames)
+
+        return speech.cached(self, follow), np.zeros(frames)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Serialise the regression; the coefficients at half precision."""
@@ -127,35 +119,25 @@ KINDS = ("prior", "hidden", "articulation", "spectrum", "encoding")
 of articulation for the phones in time, the spectrum and the encoding of the sound around the frame."""
 
 
-PRIOR_ARRAYS = {
-    "prior_sizes": ArraySpec(np.int32, str(len(KINDS)), 0, 1e5),
-    "prior_inputs": ArraySpec(np.float32, "2 R", -1e6, 1e6),
-    "prior_coefficients": ArraySpec(np.float32, "R Q", -1e4, 1e4),
-    "prior_centre": ArraySpec(np.float64, "Q", -1e6, 1e6),
-    "prior_variances": ArraySpec(np.float64, "3 Q", POSITIVE),
-}
-
-
 @final
 @dataclass(frozen=True, eq=False)
 class PriorRegression(Predictor):
-    """Ridge regression of motion on the output of another model (``Speech.prior``), the phones, and the sound.
+    """Ridge regression of motion on the output of another model (``Speech.prior``), the phones, and the sound."""
 
-    sizes        : number of regressors of each of ``KINDS``
-    mean, scale  : of the regressors [each shape=(R,)]
-    coefficients : float32 array [shape=(704, Q)]
-    centre       : mean of the motion [shape=(Q,)]
-    variances    : of the error of static value, Δ and Δ², in cross-validation [shape=(3, Q)]
-    """
-
-    sizes: tuple[int, ...]
-    mean: NDArray[np.float32]
-    scale: NDArray[np.float32]
-    coefficients: NDArray[np.float32]
-    centre: Array
-    variances: Array
+    sizes: tuple[int, ...]  # number of regressors of each of ``KINDS``
+    mean: NDArray[np.float32]  # of the regressors [shape=(R,)]
+    scale: NDArray[np.float32]  # their standard deviation [shape=(R,)]
+    coefficients: NDArray[np.float32]  # [shape=(R, Q)]
+    centre: Array  # mean of the motion [shape=(Q,)]
+    variances: Array  # of the error of static value, Δ and Δ², in cross-validation [shape=(3, Q)]
     name: ClassVar[str] = "prior"
-    ARRAYS: ClassVar[Mapping[str, ArraySpec]] = PRIOR_ARRAYS
+    ARRAYS: ClassVar[Mapping[str, ArraySpec]] = {
+        "prior_sizes": ArraySpec(np.int32, str(len(KINDS)), 0, 1e5),
+        "prior_inputs": ArraySpec(np.float32, "2 R", -1e6, 1e6),
+        "prior_coefficients": ArraySpec(np.float32, "R Q", -1e4, 1e4),
+        "prior_centre": ArraySpec(np.float64, "Q", -1e6, 1e6),
+        "prior_variances": ArraySpec(np.float64, "3 Q", POSITIVE),
+    }
     uses_prior: ClassVar[bool] = True
     uses_articulation: ClassVar[bool] = True
 
@@ -188,11 +170,7 @@ class PriorRegression(Predictor):
                 predictions[number] = interpolate_steps(steps, len(values[number]))
         coefficients, centre = _solve(data, penalty)
         mean_32, scale_32, coefficients_32 = (x.astype(np.float32) for x in (mean, scale, coefficients))
-        errors = [
-            with_dynamics(x - predicted)[mark_known_dynamics(example.valid)]
-            for predicted, x, example in zip(predictions, values, examples, strict=True)
-        ]
-        variances = np.square(np.concatenate(errors)).mean(axis=0) + 1e-12
+        variances = measure_error_variances(training, predictions, spread)
         return PredictorFit(cls(sizes, mean_32, scale_32, coefficients_32, centre, variances), predictions)
 
     def can_predict(self, speech: Speech) -> bool:
@@ -206,8 +184,7 @@ class PriorRegression(Predictor):
         result = np.tile(row, (len(kinds[0]), 1))  # what the training had and this speech has not has its mean
         for kind, start, size in zip(kinds, starts, self.sizes, strict=False):
             result[:, start : start + min(size, kind.shape[1])] = kind[:, :size]
-        regressors = (result - self.mean) / self.scale
-        steps = (regressors @ self.coefficients).astype(float) + self.centre
+        steps = ((result - self.mean) / self.scale @ self.coefficients).astype(float) + self.centre
         frames = len(speech.features.values)
         distortion = speech.prior.distortion if speech.prior is not None else np.zeros(len(steps))
         outputs = interpolate_steps(np.concatenate([steps, distortion[:, None]], axis=1), frames)
@@ -226,9 +203,7 @@ class PriorRegression(Predictor):
     @classmethod
     def from_arrays(cls, arrays: Arrays, dimensions: int) -> PriorRegression:
         """Deserialise a regression; as ``Predictor.from_arrays``."""
-        if np.shape(arrays["prior_sizes"]) == (len(KINDS) - 1,):
-            raise ModelFormatError("a regression without the encoding of the sound, as of 2026-11-27; train again")
-        stored = check_arrays(arrays, PRIOR_ARRAYS, Q=dimensions)
+        stored = check_arrays(arrays, cls.ARRAYS, Q=dimensions)
         sizes = tuple(stored["prior_sizes"].tolist())
         around = (2 * ENCODING_REACH + 1) * ENCODING_COMPONENTS
         known = {(len(ARTICULATORS), (2 * WINDOW + 1) * SPECTRUM_BANDS, size) for size in (0, around)}

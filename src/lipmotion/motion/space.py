@@ -20,16 +20,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class MotionSpace:
-    """The dimensions of motion in a model: distances as they are, points reduced to principal components.
+    """The dimensions of motion in a model: distances as they are, points reduced to principal components."""
 
-    channels : the P channels of the motion
-    direct   : int array [shape=(P',)], columns of the channels that are modelled as they are
-    points   : principal components of all other channels, K of them (None: there are no others); Q = P' + K
-    """
-
-    channels: tuple[Channel, ...]
-    direct: NDArray[np.intp]
-    points: Pca | None
+    channels: tuple[Channel, ...]  # the P channels of the motion
+    direct: NDArray[np.intp]  # int array [shape=(P',)], columns of the channels that are modelled as they are
+    points: Pca | None  # principal components of all other channels, K of them (None: there are no others); Q = P' + K
 
     @property
     def direct_names(self) -> tuple[str, ...]:
@@ -48,15 +43,13 @@ class MotionSpace:
             return direct
         return np.concatenate([direct, self.points.project(values[:, self._reduced])], axis=1)
 
-    def restore(self, values: Array, variance: Array) -> tuple[Array, Array]:
-        """Return values and variances of channels [each shape=(T, P)], from the motion space [each shape=(T, Q)]."""
-        motion, spread = (np.empty((len(values), len(self.channels))) for _ in range(2))
-        count = len(self.direct)
-        motion[:, self.direct], spread[:, self.direct] = values[:, :count], variance[:, :count]
+    def restore(self, values: Array) -> Array:
+        """Return motion of the channels [shape=(T, P)], from the motion space [shape=(T, Q)]."""
+        motion, count = np.empty((len(values), len(self.channels))), len(self.direct)
+        motion[:, self.direct] = values[:, :count]
         if self.points is not None:
             motion[:, self._reduced] = self.points.restore(values[:, count:])
-            spread[:, self._reduced] = variance[:, count:] @ np.square(self.points.basis)
-        return motion, spread
+        return motion
 
     @property
     def mixing(self) -> Array:
@@ -96,21 +89,17 @@ def fit_reduced_motion(examples: Sequence[Example], components: int) -> tuple[Mo
 
 
 def resample_to_model(
-    values: Array, seen: NDArray[np.bool_], rate_hz: float, frames: int, frame_rate_hz: float
+    values: Array, seen: NDArray[np.bool_], rate_hz: float, frames: int
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return curves at the rate of a model by a cubic spline, and the frames that are valid.
+    """Return curves [shape=(T, P)] of a camera in ``frames`` frames at 100 Hz, and whether these are valid.
 
-    values : curves at ``rate_hz`` [shape=(T, P)]
-    seen   : camera frames in which the face was measured [shape=(T,)]
-    Returns curves at ``frame_rate_hz`` [shape=(frames, P)], and whether the nearest camera frame of each was seen
-    [shape=(frames,)].
+    seen : camera frames in which the face was measured [shape=(T,)]; a frame is valid if the nearest one was seen
     The spline is twice differentiable: with linear interpolation, Δ² would be zero nearly everywhere. After the last
     camera frame the last value is repeated; half a camera frame later, frames are not valid.
     """
     from scipy.interpolate import CubicSpline
 
-    camera_s = np.arange(len(values)) / rate_hz
-    model_s = np.arange(frames) / frame_rate_hz
+    camera_s, model_s = np.arange(len(values)) / rate_hz, np.arange(frames) / FRAME_RATE_HZ
     clipped_s = np.minimum(model_s, camera_s[-1])
     curves = CubicSpline(camera_s, values)(clipped_s) if len(values) > 1 else np.repeat(values, frames, axis=0)
     nearest = np.floor(model_s * rate_hz + 0.5).astype(int)
@@ -121,9 +110,7 @@ def resample_to_model(
 def resample_track(track: Track, frames: int) -> tuple[Motion, NDArray[np.bool_]]:
     """Return tracked motion in ``frames`` frames at 100 Hz, and the frames in which it is valid [shape=(frames,)]."""
     motion = track.motion
-    values, valid = resample_to_model(
-        np.asarray(motion.values, float), np.asarray(track.seen), motion.rate_hz, frames, FRAME_RATE_HZ
-    )
+    values, valid = resample_to_model(np.asarray(motion.values, float), np.asarray(track.seen), motion.rate_hz, frames)
     return replace(motion, values=values, rate_hz=FRAME_RATE_HZ), valid
 
 
@@ -165,7 +152,7 @@ class MotionLimits(NamedTuple):
         low, high = self.low.copy(), self.high.copy()
         for (_, column), value in pins.items():
             low[column], high[column] = min(low[column], value), max(high[column], value)
-        span = _span(low, high)
+        span = _floor_span(low, high)
         if closure is not None:
             span = np.maximum(span, np.abs(closure.follow) * (high - low)[closure.column] if pins else 0)
         worst = np.maximum(low - values.min(axis=0), values.max(axis=0) - high) / (LARGEST_EXCESS * span)
@@ -203,7 +190,7 @@ def check_poses(limits: MotionLimits, space: MotionSpace, closure: Closure | Non
 
 def check_rest(rest: Array, limits: MotionLimits) -> None:
     """Raise ValueError if the rest pose [shape=(Q,)] is far from all other poses."""
-    distance = np.maximum(limits.low - rest, rest - limits.high) / _span(limits.low, limits.high)
+    distance = np.maximum(limits.low - rest, rest - limits.high) / _floor_span(limits.low, limits.high)
     column = int(distance.argmax())
     if distance[column] > LARGEST_REST_DISTANCE:
         raise ValueError(
@@ -212,7 +199,7 @@ def check_rest(rest: Array, limits: MotionLimits) -> None:
         )
 
 
-def _span(low: Array, high: Array) -> Array:
+def _floor_span(low: Array, high: Array) -> Array:
     """Return ``high - low``; at least a thousandth of the largest magnitude, or of 1."""
     return np.maximum(high - low, MIN_SPAN * np.maximum(np.maximum(np.abs(low), np.abs(high)), 1))
 

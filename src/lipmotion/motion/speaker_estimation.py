@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,15 +45,14 @@ def add_habits(
     generated : the mean person's motion of each, as the engine generates it [each shape=(T, P)]
     Averages are drawn towards 0 with the weight of ``HABIT_PRIOR_FRAMES``.
     """
-    sums = np.zeros(maps.habits.shape)
-    counts = np.full(maps.habits.shape[:2], HABIT_PRIOR_FRAMES)
+    sums = {name: np.zeros_like(person.habits) for name, person in maps.items()}
+    counts = {name: np.full((len(VISEME_NAMES), 1), HABIT_PRIOR_FRAMES) for name in maps}
     for example, speaker, values in zip(examples, speakers, generated, strict=True):
-        if speaker in maps.names:
+        if speaker in maps:
             weights = weigh_visemes(example.speech.units, len(values)) * example.valid[:, None]
-            number = maps.names.index(speaker)
-            sums[number] += weights.T @ np.where(example.valid[:, None], example.motion.values - values, 0)
-            counts[number] += weights.sum(axis=0)
-    return replace(maps, habits=sums / counts[:, :, None])
+            sums[speaker] += weights.T @ np.where(example.valid[:, None], example.motion.values - values, 0)
+            counts[speaker] += weights.sum(axis=0)[:, None]
+    return {name: replace(person, habits=sums[name] / counts[name]) for name, person in maps.items()}
 
 
 def map_to_mean_person(examples: Sequence[Example], speakers: Sequence[str]) -> tuple[list[Example], SpeakerMaps]:
@@ -79,37 +78,30 @@ def map_to_mean_person(examples: Sequence[Example], speakers: Sequence[str]) -> 
     rest = rests - offset - gain * rests.mean(axis=0)
     shut = float(closed.mean())
     wide = float(np.mean([person.range[column] for person in people])) if column is not None else 0.0
-    habits = np.zeros((len(names), len(VISEME_NAMES), len(channels)))
-    maps = SpeakerMaps(channels, names, gain, offset, rest, habits, (shut, shut + FULL_HABIT_SHARE * wide))
+    habits, lips = np.zeros((len(VISEME_NAMES), len(channels))), (shut, shut + FULL_HABIT_SHARE * wide)
+    maps = {
+        name: SpeakerMap(channels, gain[number], offset[number], rest[number], habits, lips)
+        for number, name in enumerate(names)
+    }
     mapped = []
     for example, speaker in zip(examples, speakers, strict=True):
         motion = example.motion
         restful = measure_restfulness(example.speech.units, len(motion.values))
-        values = maps.of(speaker).to_mean(motion.values, restful)
+        values = maps[speaker].to_mean(motion.values, restful)
         mapped.append(replace(example, motion=replace(motion, values=values)))
-    return mapped, maps.select([name for name in names if name])
+    return mapped, {name: person for name, person in maps.items() if name}
 
 
-@dataclass(frozen=True, eq=False)
-class PersonStatistics:
-    """Statistics of one person's motion.
+class PersonStatistics(NamedTuple):
+    """Statistics of one person's motion of P channels [each array: shape=(P,)]."""
 
-    rest     : rest pose, NaN where there is no silence [shape=(P,)]
-    rest_s   : seconds of silence away from speech
-    spoken   : median pose in speech [shape=(P,)]
-    range    : of each channel in speech [shape=(P,)]
-    follow   : change of each channel per unit of opening [shape=(P,)]; zeros without a channel of that name
-    closed   : opening of closed lips; 0 without a channel of that name
-    speech_s : seconds of speech
-    """
-
-    rest: Array
-    rest_s: float
-    spoken: Array
-    range: Array
-    follow: Array
-    closed: float
-    speech_s: float
+    rest: Array  # rest pose, NaN where there is no silence
+    rest_s: float  # seconds of silence away from speech
+    spoken: Array  # median pose in speech
+    range: Array  # of each channel in speech
+    follow: Array  # change of each channel per unit of opening; zeros without a channel of that name
+    closed: float  # opening of closed lips; 0 without a channel of that name
+    speech_s: float  # seconds of speech
 
 
 def measure_person(examples: Sequence[Example], column: int | None) -> PersonStatistics:
@@ -126,10 +118,8 @@ def measure_person(examples: Sequence[Example], column: int | None) -> PersonSta
             smallest += [values[frames, column][valid[frames]].min() for frames in ranges if valid[frames].any()]
     resting, speech = np.concatenate(silent), np.concatenate(spoken)
     quiet = next((each for each in (resting, np.concatenate(silence)) if len(each) >= MIN_FRAMES), None)
-    if not len(speech):
-        speech = np.concatenate(measured)
-    if not len(speech):
-        speech = np.zeros((1, examples[0].motion.values.shape[1]))
+    for others in (np.concatenate(measured), np.zeros((1, examples[0].motion.values.shape[1]))):
+        speech = speech if len(speech) else others
     low, high = np.percentile(speech, RANGE_PERCENTILES, axis=0)
     follow, closed = np.zeros(speech.shape[1]), 0.0
     if column is not None:

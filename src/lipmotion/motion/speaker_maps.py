@@ -5,8 +5,8 @@ Engines learn and generate the motion of the mean person; ``speaker_estimation``
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,22 +31,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class SpeakerMap:
-    """The map from the mean person's motion to one person's: ``offset + gain · motion``, and ``rest`` in silence.
+    """The map from the mean person's motion to one person's: ``offset + gain · motion``, and ``rest`` in silence."""
 
-    channels : the P channels
-    gain     : the person's range as a multiple of the mean person's [shape=(P,)]
-    offset   : in the units of the channels [shape=(P,)]
-    rest     : what is added in silence away from speech, so that rest pose maps onto rest pose [shape=(P,)]
-    habits   : how the mean person's poses in each of the V visemes are changed before they are mapped [shape=(V, P)]
-    lips     : openings of the mean person's lips up to which habits do not show, and from which on they do wholly
-    """
-
-    channels: tuple[Channel, ...]
-    gain: Array
-    offset: Array
-    rest: Array
-    habits: Array
-    lips: tuple[float, float]
+    channels: tuple[Channel, ...]  # the P channels
+    gain: Array  # the person's range as a multiple of the mean person's [shape=(P,)]
+    offset: Array  # in the units of the channels [shape=(P,)]
+    rest: Array  # what is added in silence away from speech, so that rest pose maps onto rest pose [shape=(P,)]
+    habits: Array  # how poses in each of the V visemes are changed before they are mapped [shape=(V, P)]
+    lips: tuple[float, float]  # the mean person's openings up to which habits do not show, and from which on wholly
 
     def shift(self, values: NDArray[np.floating[Any]], visemes: Array) -> Array:
         """Return by how much the mean person's poses are changed by this person's habits [shape=(T, P)].
@@ -78,45 +70,12 @@ class SpeakerMap:
         if missing:
             raise InputError(f"no map of speakers for the channel {missing[0]!r}; train the model again")
         columns = [self.channels.index(channel) for channel in channels]
-        parts = (self.gain[columns], self.offset[columns], self.rest[columns], self.habits[:, columns])
-        return SpeakerMap(tuple(channels), *parts, self.lips)
+        parts = {part: getattr(self, part)[..., columns] for part in PARTS}
+        return replace(self, channels=tuple(channels), **parts)
 
 
-@dataclass(frozen=True, eq=False)
-class SpeakerMaps:
-    """The maps of all S people of a model.
-
-    channels : the P channels
-    names    : of the S people
-    gain, offset, rest : as in ``SpeakerMap``, of each [each shape=(S, P)]
-    habits   : as in ``SpeakerMap``, of each, in the order of ``VISEME_NAMES`` [shape=(S, V, P)]
-    lips     : as in ``SpeakerMap``, the same for all
-    """
-
-    channels: tuple[Channel, ...]
-    names: tuple[str, ...]
-    gain: Array
-    offset: Array
-    rest: Array
-    habits: Array
-    lips: tuple[float, float]
-
-    def of(self, name: str) -> SpeakerMap:
-        """Return the map of one person. Raises InputError: a person of another name."""
-        if name not in self.names:
-            raise InputError(
-                f"the model knows no speaker {name!r}, only: {', '.join(self.names)}; give one of these, or none for "
-                "the mean person"
-            )
-        number = self.names.index(name)
-        parts = (self.gain[number], self.offset[number], self.rest[number], self.habits[number])
-        return SpeakerMap(self.channels, *parts, self.lips)
-
-    def select(self, names: Sequence[str]) -> SpeakerMaps:
-        """Return the maps of some people."""
-        rows = [self.names.index(name) for name in names]
-        parts = (self.gain[rows], self.offset[rows], self.rest[rows], self.habits[rows])
-        return SpeakerMaps(self.channels, tuple(names), *parts, self.lips)
+SpeakerMaps = Mapping[str, SpeakerMap]
+"""The maps of all people of a model by their names: of the same channels, and with the same ``lips``."""
 
 
 def measure_restfulness(units: Timeline[Unit], frames: int) -> Array:
@@ -147,9 +106,10 @@ def weigh_visemes(units: Timeline[Unit], frames: int) -> Array:
 
 def speakers_to_arrays(maps: SpeakerMaps) -> dict[str, NDArray[Any]]:
     """Serialise maps."""
-    channels = np.array([(channel.name, channel.unit) for channel in maps.channels])
-    parts = {name: getattr(maps, name) for name in ("gain", "offset", "rest", "habits")}
-    return {"channels": channels, "names": np.array(maps.names), **parts, "lips": np.array(maps.lips)}
+    people = list(maps.values())
+    channels = np.array([(channel.name, channel.unit) for channel in people[0].channels])
+    parts = {part: np.stack([getattr(person, part) for person in people]) for part in PARTS}
+    return {"channels": channels, "names": np.array(list(maps)), **parts, "lips": np.array(people[0].lips)}
 
 
 def speakers_from_arrays(arrays: Arrays) -> SpeakerMaps:
@@ -158,12 +118,13 @@ def speakers_from_arrays(arrays: Arrays) -> SpeakerMaps:
         refuse_undeclared(arrays, SPEAKERS)
         stored = check_arrays(arrays, SPEAKERS, V=len(VISEME_NAMES))
         channels = tuple(Channel(name, unit) for name, unit in stored["channels"].tolist())
-        names = tuple(stored["names"].tolist())
+        names = stored["names"].tolist()
         if len({channel.name for channel in channels}) < len(channels) or len({*names} - {""}) < len(names):
             raise ValueError("names of speakers or channels that are empty or repeat")
         closed, opened = stored["lips"].tolist()
-        parts = (stored["gain"], stored["offset"], stored["rest"], stored["habits"])
-        return SpeakerMaps(channels, names, *parts, (closed, opened))
+        people = [{part: stored[part][number] for part in PARTS} for number in range(len(names))]
+        maps = (SpeakerMap(channels, **parts, lips=(closed, opened)) for parts in people)
+        return dict(zip(names, maps, strict=True))
 
 
 SPEAKERS = {
@@ -176,6 +137,7 @@ SPEAKERS = {
     "lips": ArraySpec(np.float64, "2", 0, 1e6),
 }
 """Arrays of the maps of S speakers, P channels and V visemes."""
+PARTS = ("gain", "offset", "rest", "habits")
 
 
 def compose_maps(first: SpeakerMap | None, second: SpeakerMap) -> SpeakerMap:

@@ -116,7 +116,12 @@ def find_speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | Non
             f"the model tells no speakers apart, so that there is no {speaker!r}; leave the speaker out, or train on "
             "several people"
         )
-    return maps.of(speaker)
+    if speaker not in maps:
+        raise InputError(
+            f"the model knows no speaker {speaker!r}, only: {', '.join(maps)}; give one of these, or none for the "
+            "mean person"
+        )
+    return maps[speaker]
 
 
 def find_person(model: Model, request: Request) -> SpeakerMap | None:
@@ -229,7 +234,6 @@ def map_explanation(person: SpeakerMap | None, explanation: Explanation, speech:
         explanation,
         motion=map_values(explanation.motion),
         gaussians=tuple(replace(each, channels=map_values(each.channels)) for each in explanation.gaussians),
-        regressions=tuple(replace(each, channels=map_values(each.channels)) for each in explanation.regressions),
     )
 
 

@@ -209,19 +209,13 @@ def with_person(model: Model, name: str, person: SpeakerMap) -> Model:
     >>> known = lipmotion.with_person(model, "anna", lipmotion.map_onto(model, "anna.mp4"))  # doctest: +SKIP
     >>> lipmotion.save_model(known, "with-anna.lipmotion")  # doctest: +SKIP
     """
-    maps = model.speakers
-    known = maps.names if maps is not None else ()
+    known = model.speakers or {}
     if not name or name in known:
         raise InputError(f"a person named {name!r}, required another name than: {', '.join(('', *known))}")
-    if maps is not None:
-        person = person.reorder(maps.channels)
-    rows = {part: getattr(person, part)[None] for part in ("gain", "offset", "rest", "habits")}
-    if maps is None:
-        speakers = SpeakerMaps(person.channels, (name,), **rows, lips=person.lips)
-    else:
-        rows = {part: np.concatenate([getattr(maps, part), row]) for part, row in rows.items()}
-        speakers = replace(maps, names=(*known, name), **rows)
-    return replace(model, speakers=speakers, about={**model.about, "speakers": list(speakers.names)})
+    channels = next((other.channels for other in known.values()), person.channels)
+    lips = next((other.lips for other in known.values()), person.lips)
+    speakers = {**known, name: replace(person.reorder(channels), lips=lips)}
+    return replace(model, speakers=speakers, about={**model.about, "speakers": list(speakers)})
 
 
 def with_prior(prior: Model | None, speech: Speech) -> Speech:

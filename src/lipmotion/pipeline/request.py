@@ -69,16 +69,13 @@ class Request(Configuration):
     tier       : which tier or speaker of a file of labels is read
     edits      : a file with what is changed of the motion, for jobs and ``animate``
     recogniser : how speech without a transcript is recognised. ``auto``: English words where they fit the sound, phones
-                 elsewhere; ``words``: words alone; ``fast``: phones alone, by the phone models of the model and those
-                 of many voices, weighted by the speaker similarity score; ``own``, ``general``: by one of these alone;
-                 ``whisper``, ``vosk``: words, by what is installed (``installed_recognisers``), aligned as a
-                 transcript is
+                 elsewhere; ``fast``: phones alone, by the phone models of the model and those of many voices, weighted
+                 by the speaker similarity score; ``own``, ``general``: by one of these alone
     speaker    : whose motion is generated, of the people whom the model was trained on; empty: the mean person, or the
                  only one
     pauses     : ``rest``: lips close softly in pauses from 0.25 s, and part no earlier than 0.12 s before a phrase;
                  ``natural``: the mouth does in pauses what the model learned
-    manner     : ``detected``: the mouth opens for laughter and breaths in the sound, and moves as far as whispered and
-                 shouted phrases ask for, unless a mood or a manner is asked for (docs/expression.md); ``asked``: not
+    manner     : ``detected``: the mouth opens for laughter and breaths (docs/expression.md); ``asked``: not
     asymmetry  : 0 to 1: the share that is left of the difference between both sides of the speaker's own mouth, in the
                  lip and jaw points; the mouth of another person (``onto``) stays as it is
     model      : the model file, where no other model is given beside the request; None: the shipped one
@@ -141,8 +138,7 @@ class Request(Configuration):
     recogniser: str = option(
         "auto",
         metavar="KIND",
-        help="auto, words (English), fast (phones alone), own (phone models of the model), general (of many voices), "
-        "or words by an installed recogniser: whisper, vosk (default: auto)",
+        help="auto, fast (phones alone), own (phone models of the model), general (of many voices) (default: auto)",
     )
     speaker: str = option(
         "",
@@ -158,7 +154,7 @@ class Request(Configuration):
         "detected",
         Rule(choices=get_args(Manner)),
         omit_default=True,
-        help="detected: laughter, breaths, whispers and shouts in the sound move the mouth (default); asked: none does",
+        help="detected: laughter and breaths in the sound move the mouth (default); asked: none does",
     )
     asymmetry: float = option(
         0.0,

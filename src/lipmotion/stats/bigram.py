@@ -13,13 +13,10 @@ from numpy.typing import NDArray
 
 from lipmotion.storage.schema import ArraySpec
 
-DISCOUNT = 0.5
-"""Subtracted from the count of every pair of units that occurred."""
+DISCOUNT = 0.5  # subtracted from the count of every pair of units that occurred
 BIGRAM = {"bigram": ArraySpec(np.float32, "U U", -1e4, 0.1)}
-PERPLEXITY_STEPS = 200
-"""After so many steps the shares of the units hardly change."""
-ROW_TOLERANCE = 0.01
-"""Largest error of a sum of stored probabilities."""
+PERPLEXITY_STEPS = 200  # after so many steps the shares of the units hardly change
+ROW_TOLERANCE = 0.01  # largest error of a sum of stored probabilities
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.stats.mixture import Mixtures
 
 Array = NDArray[np.float64]
-SWEEPS = 8
-"""How often all rows are re-estimated, one after the other, from one set of statistics."""
+SWEEPS = 8  # how often all rows are re-estimated, one after the other, from one set of statistics
 
 
 @dataclass(frozen=True, eq=False)

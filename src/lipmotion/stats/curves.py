@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-WINDOW_S = 1.28
-"""Length of a window; the windows overlap by half."""
+WINDOW_S = 1.28  # length of a window; the windows overlap by half
 ROUNDING_SHARE = 1e-6
 """Values that differ by less than this share of the largest are equal: single precision keeps seven digits. Curves
 that are modelled vary by 1e-3 of their magnitude and more."""

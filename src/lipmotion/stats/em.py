@@ -18,8 +18,7 @@ ModelT = TypeVar("ModelT")
 ShardT = TypeVar("ShardT")
 Sums = Mapping[str, NDArray[Any]]
 """Sufficient statistics by name: arrays whose values for all data are the sums of those for its parts."""
-SAVE_S = 10.0
-"""A longer E-step is stored so often, and at its end."""
+SAVE_S = 10.0  # a longer E-step is stored so often, and at its end
 
 
 class ExpectedStatistics(Protocol):

@@ -10,12 +10,9 @@ from numpy.typing import NDArray
 
 from lipmotion.storage.schema import LARGEST_MEAN, LARGEST_VARIANCE, POSITIVE, ArraySpec, CheckedArrays
 
-SPLIT_STEP = 0.2
-"""The halves of a split component move by so many standard deviations, in opposite directions."""
-BLOCK = 256
-"""Frames whose components are computed at a time: these fit into the cache."""
-MIN_LOG_SHARE = np.float32(-50)
-"""Smallest logarithm of a component's posterior, relative to the best component."""
+SPLIT_STEP = 0.2  # the halves of a split component move by so many standard deviations, in opposite directions
+BLOCK = 256  # frames whose components are computed at a time: these fit into the cache
+MIN_LOG_SHARE = np.float32(-50)  # smallest logarithm of a component's posterior, relative to the best component
 LOG_2PI = float(np.log(2 * np.pi))
 MIXTURES = {
     "log_weights": ArraySpec(np.float32, "G M", -np.inf, 0.1),
@@ -23,8 +20,7 @@ MIXTURES = {
     "variances": ArraySpec(np.float32, "G M D", POSITIVE, LARGEST_VARIANCE),
 }
 """How mixtures of standardised values are stored; weights may be rounded to half precision."""
-MIN_WEIGHT, MAX_WEIGHT = 0.5, 1.5
-"""Limits of the sum of a density's stored weights, which is 1 but for rounding."""
+MIN_WEIGHT, MAX_WEIGHT = 0.5, 1.5  # limits of the sum of a density's stored weights, which is 1 but for rounding
 
 
 @dataclass(frozen=True, eq=False)

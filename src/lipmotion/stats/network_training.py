@@ -16,10 +16,8 @@ from lipmotion.kernels.compiler import limit_threads
 Array = NDArray[np.float32]
 NetworkT = TypeVar("NetworkT", bound="SequenceNetwork")
 DECAY_MEAN, DECAY_SQUARE, WEIGHT_DECAY = 0.9, 0.98, 0.01
-LARGEST_GRADIENT = 1.0
-"""Gradients of a larger norm are shortened to it."""
-WARM_UP_SHARE = 0.15
-"""Share of the training in which the learning rate rises; then it falls along a cosine to 0."""
+LARGEST_GRADIENT = 1.0  # gradients of a larger norm are shortened to it
+WARM_UP_SHARE = 0.15  # share of the training in which the learning rate rises; then it falls along a cosine to 0
 
 
 class LinearMap(NamedTuple):

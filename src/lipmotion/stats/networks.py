@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 
 from lipmotion.stats.network_training import Array, Dropout, LinearMap, SequenceNetwork
 
-TAPS = 3
-"""Time steps that each unit sees of the layer below: one before, the same, one after; ``dilation`` steps apart."""
-BLOCK = 4096
-"""Time steps computed at a time, so that the memory does not grow with the sequence."""
+TAPS = 3  # time steps that each unit sees of the layer below: one before, the same, one after; ``dilation`` steps apart
+BLOCK = 4096  # time steps computed at a time, so that the memory does not grow with the sequence
 
 
 class _Pass(NamedTuple):
@@ -120,17 +118,14 @@ def _stack(states: Array, dilation: int) -> Array:
     return result.reshape(batch, length, TAPS * width)
 
 
-GATES = 4
-"""Weighted sums of a cell, in this order: input gate, forget gate, value, output gate."""
+GATES = 4  # weighted sums of a cell, in this order: input gate, forget gate, value, output gate
 SLOPES, OFFSETS = (np.array(values, np.float32)[:, None] for values in ((0.5, 0.5, 1.0, 0.5), (0.5, 0.5, 0.0, 0.5)))
 """A sigmoid is 0.5 + 0.5 tanh(x / 2), the value is tanh(x) [each shape=(4, 1)]."""
-FORGET_BIAS = 1.0
-"""Bias of the forget gates before training: cells remember."""
+FORGET_BIAS = 1.0  # bias of the forget gates before training: cells remember
 PIECE, REACH = 250, 50
 """Long sequences are computed in pieces of PIECE time steps, side by side, each with REACH steps around it for what its
 cells remember."""
-PIECES = 16
-"""Pieces computed at a time, so that the memory does not grow with the sequence."""
+PIECES = 16  # pieces computed at a time, so that the memory does not grow with the sequence
 
 
 class RecurrentLayer(NamedTuple):

@@ -9,18 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-EXACT_ROWS = 1500
-"""Up to so many rows or columns all components are computed; of larger tables only the first ones."""
-ROWS = 256
-"""Rows of a large table that are centred at a time."""
-SPARE_DIRECTIONS = 16
-"""Additional directions of the iteration, which speed up its convergence."""
+EXACT_ROWS = 1500  # up to so many rows or columns all components are computed; of larger tables only the first ones
+ROWS = 256  # rows of a large table that are centred at a time
+SPARE_DIRECTIONS = 16  # additional directions of the iteration, which speed up its convergence
 TOLERANCE, MAX_PASSES = 1e-4, 12
 """The iteration ends when a pass raises the explained variance by less than this share, or after so many passes."""
-ORTHONORMAL_TOLERANCE = 0.01
-"""Largest error of the products of a stored basis' rows."""
-RANK_TOLERANCE = 1e-10
-"""Components with less variance, as a share of the largest, are rounding errors."""
+ORTHONORMAL_TOLERANCE = 0.01  # largest error of the products of a stored basis' rows
+RANK_TOLERANCE = 1e-10  # components with less variance, as a share of the largest, are rounding errors
 CONSTANT = 1e-12
 """Values that deviate from their mean by less than this share of the largest are constant but for rounding."""
 

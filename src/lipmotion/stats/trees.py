@@ -21,8 +21,8 @@ Likelihood = Callable[[Array], Array]
 """Function of N sufficient statistics [shape=(N, K)], the number of frames first: returns the log likelihood of each
 under the density estimated from it [shape=(N,)]."""
 MIN_VARIANCE = 1e-12
-TIE = 1e-10
-"""Gains of questions that differ by less, as a share of the log likelihood or of the frames, are equal."""
+MAX_CONTEXTS = 50_000  # whose leaves are kept, so that motion is generated again sooner
+TIE = 1e-10  # gains of questions that differ by less, as a share of the log likelihood or of the frames, are equal
 
 
 class Question(NamedTuple):
@@ -75,10 +75,22 @@ class Tree:
             nodes.append(at + 1 if node < no[at] else no[at])
         return nodes
 
-    @property
+    @cached_property
     def leaves(self) -> NDArray[np.intp]:
         """The numbers of the leaves."""
         return np.nonzero(self.splits < 0)[0]
+
+    def rank(self, context: Context) -> int:
+        """Return the place of the leaf of a context among ``leaves``; it is looked for once."""
+        if context not in self._ranks:
+            if len(self._ranks) > MAX_CONTEXTS:
+                self._ranks.clear()
+            self._ranks[context] = int(np.searchsorted(self.leaves, self.path(context)[-1]))
+        return self._ranks[context]
+
+    @cached_property
+    def _ranks(self) -> dict[Context, int]:
+        return {}
 
     def name(self, node: int) -> str:
         """Return the answers that lead to a node, in words."""

@@ -52,11 +52,7 @@ _DEVICE = re.compile(r"con|prn|aux|nul|conin\$|conout\$|(?:com|lpt)[0-9\u00b9\u0
 
 
 def make_portable(name: str) -> str:
-    """Return a name of a file or a folder that Windows takes as one, too; as it is, where it does.
-
-    >>> make_portable("nul.wav"), make_portable("Con ."), make_portable("icon.wav")
-    ('nul_.wav', 'Con_', 'icon.wav')
-    """
+    """Return a name of a file or a folder that Windows takes as one, too; as it is, where it does."""
     stem, dot, rest = name.rstrip(" .").partition(".")
     return f"{stem.rstrip()}_{dot}{rest}" if _DEVICE.fullmatch(stem.rstrip()) else name.rstrip(" .")
 
@@ -177,16 +173,13 @@ def remove(path: Path) -> None:
             path.unlink()
 
 
-def check_own(path: Path) -> None:
+def check_own(path: Path, opened: IO[bytes] | None = None) -> None:
     """Raise ExportError unless a path is free, or a file of that name alone: what we write into is not another's."""
     with suppress(OSError):  # it is free, or cannot be reached
-        _check_own(path, path.lstat())
-
-
-def _check_own(path: Path, status: os.stat_result) -> None:
-    if not stat.S_ISREG(status.st_mode) or status.st_nlink > 1:
-        what = f"{path}: is a link, a folder, a pipe or a device, or a file that has another name, too;"
-        raise ExportError(f"{what} required a file that lipmotion writes itself; remove it, or give another folder")
+        status = path.lstat() if opened is None else os.fstat(opened.fileno())
+        if not stat.S_ISREG(status.st_mode) or status.st_nlink > 1:
+            what = f"{path}: is a link, a folder, a pipe or a device, or a file that has another name, too;"
+            raise ExportError(f"{what} required a file that lipmotion writes itself; remove it, or give another folder")
 
 
 def open_own(path: Path, buffering: int = -1) -> IO[bytes]:
@@ -201,7 +194,7 @@ def open_own(path: Path, buffering: int = -1) -> IO[bytes]:
             flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | _NO_LINK | _BINARY
             place = path if folder is None else path.name
             file = os.fdopen(os.open(place, flags, 0o666, dir_fd=folder), "a+b", buffering)
-        _check_own(path, os.fstat(file.fileno()))
+        check_own(path, file)
         return file
     except BaseException:
         if file is not None:
@@ -212,11 +205,6 @@ def open_own(path: Path, buffering: int = -1) -> IO[bytes]:
 def _check_parent(target: Path) -> None:
     if not target.parent.is_dir():
         raise ExportError(f"{target}: the folder {target.parent} does not exist; create it first")
-
-
-def _temporary(target: Path, suffix: str) -> Path:
-    _check_parent(target)
-    return target.with_name(f"{_prefix(target)}{os.getpid()}-{uuid.uuid4().hex[:8]}{suffix.lower()}")
 
 
 def _prefix(target: Path) -> str:
@@ -259,7 +247,8 @@ def find_place(target: Path) -> Path:
 
 @contextmanager
 def _replace(target: Path, place: Path, *, folder: bool) -> Iterator[Path]:
-    temporary = _temporary(place, target.suffix)
+    _check_parent(place)
+    temporary = place.with_name(f"{_prefix(place)}{os.getpid()}-{uuid.uuid4().hex[:8]}{target.suffix.lower()}")
     try:
         with _reached(place.parent):
             temporary.mkdir() if folder else remove_left_files(place)

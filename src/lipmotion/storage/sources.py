@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import csv
 import ctypes
 import hashlib
 import logging
@@ -14,6 +15,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -150,6 +152,12 @@ def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES, *, 
     return text
 
 
+@cache
+def read_shipped_table(package: str, name: str) -> list[dict[str, str]]:
+    """Return the rows of a table that is a file of a package: fields by the names of their columns."""
+    return list(csv.DictReader(resources.files(package).joinpath(name).read_text(encoding="ascii").splitlines()))
+
+
 def check_source(path: Path, kind: str) -> None:
     """Raise InputError unless ``path`` is a file that is not empty; ``kind`` is what it should be, for the message."""
     check_regular(path, kind)
@@ -199,54 +207,6 @@ _NEXT = {
     "sound": "motion is made of it by: lipmotion animate FILE -o OUT; its words by: -o WORDS.vtt",
 }
 """What to do with a file that is given in the place of another, by group."""
-_KINDS: dict[str, dict[str, tuple[tuple[int, bytes], ...]]] = {
-    "document": {
-        "a PDF": ((0, b"%PDF"),), "a Word document": ((-1, b"word/document.xml"),),
-        "an Excel table": ((-1, b"xl/workbook.xml"),), "a PowerPoint file": ((-1, b"ppt/presentation.xml"),),
-        "an OpenDocument file": ((30, b"mimetypeapplication/vnd.oasis"),),
-        "a Word document or another of an old Office": ((0, b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"),),
-        "a rich-text file (RTF)": ((0, b"{\\rtf"),), "a binary TextGrid": ((0, b"ooBinaryFile"),),
-    },
-    "project": {
-        "a project of Ableton Live": ((-2, b"<Ableton"),),
-        "a project of Audacity": ((68, b"AUDY"), (-2, b"audacityproject")),
-        "a project of Reaper": ((0, b"<REAPER_PROJECT"),), "a project of FL Studio": ((0, b"FLhd"),),
-        "a project of Cubase": ((8, b"NUND"),), "a project of Pro Tools": ((0, b"\x030010111100101011"),),
-        "a session of Audition": ((-2, b"<sesx"),), "a project of Premiere": ((-2, b"<PremiereData"),),
-        "a project of After Effects": ((8, b"Egg!"),), "a MIDI file of notes": ((0, b"MThd"),),
-        "a sound bank of a game": ((0, b"BKHD"), (0, b"FSB5")),
-    },
-    "scene": {
-        "a Blender file": ((0, b"BLENDER-"), (0, b"BLENDER_"), (0, b"BLENDER1")),
-        "a Blender file, or another that is compressed (Zstandard)": ((0, b"(\xb5/\xfd"),),
-        "an FBX file": ((0, b"Kaydara FBX"), (0, b"; FBX")),
-        "a Maya file": ((0, b"//Maya"), (0, b"FOR4"), (0, b"FOR8")), "a Cinema 4D file": ((0, b"QC4DC4D6"),),
-        "a USD scene": ((0, b"PXR-USDC"), (0, b"#usda")), "an asset of Unreal": ((0, b"\xc1\x83*\x9e"),),
-        "a bundle of Unity": ((0, b"UnityFS"),),
-    },
-    "drawing": {"a Photoshop file": ((0, b"8BPS"),), "a Krita file": ((30, b"mimetypeapplication/x-krita"),)},
-    "picture": {"a picture": (
-        (0, b"\x89PNG\r\n"), (0, b"\xff\xd8\xff"), (0, b"GIF8"), (8, b"WEBP"), (-2, b"<svg"), (0, b"II*\x00"),
-        (0, b"MM\x00*"), (0, b"gimp xcf"), (4, b"ftypheic"), (4, b"ftypavif"),
-    )},
-    "archive": {"an archive": (
-        (0, b"PK\x03\x04"), (0, b"7z\xbc\xaf"), (0, b"Rar!\x1a"), (0, b"\x1f\x8b\x08"), (0, b"BZh"), (0, b"\xfd7zXZ"),
-        (257, b"ustar"),
-    )},
-    "stand-in": {
-        "a web page": ((0, b"<!DOCTYPE html"), (0, b"<!doctype html"), (0, b"<html"), (0, b"<HTML")),
-        "a list or an index of other files": ((0, b"#EXTM3U"), (0, b"[playlist]"), (0, b"# VobSub")),
-        "a session description": ((0, b"v=0\no="), (0, b"v=0\r\no=")),
-        "a pointer of Git LFS": ((0, b"version https://git-lfs"),),
-        "a note of macOS beside a file": ((0, b"\x00\x05\x16\x07"),),
-    },
-    "sound": {"a recording": (
-        (8, b"WAVE"), (8, b"AIFF"), (8, b"AIFC"), (8, b"AVI "), (4, b"ftyp"), (0, b"fLaC"), (0, b"OggS"), (0, b"ID3"),
-        (0, b"\xff\xfb"), (0, b"\x1aE\xdf\xa3"),
-    )},
-}  # fmt: skip
-"""Group and name of files, and what is in them at a byte; -1: anywhere at the end, -2: anywhere at the beginning. What
-is packed with gzip is unpacked."""
 _NO_MISTAKE = {
     "recording": {"sound"},
     "video": {"sound", "picture", "archive"},
@@ -254,6 +214,15 @@ _NO_MISTAKE = {
     "motion file": {"archive", "picture"},
 }
 """Groups that may be what is wanted; of anything else: archives, pictures and sound."""
+
+
+@cache
+def _read_kinds() -> list[tuple[str, str, int, bytes]]:
+    """Return group and name of each kind of file, and its mark at a byte; -1: anywhere in the tail, -2: in the head."""
+    lines = resources.files(__package__).joinpath("file_kinds.csv").read_text(encoding="ascii").splitlines()
+    rows = csv.reader(lines[1:])
+    marks = ((group, name, int(at), mark.encode().decode("unicode_escape")) for group, name, at, mark in rows)
+    return [(group, name, at, mark.encode("latin-1")) for group, name, at, mark in marks]
 
 
 def check_kind(path: Path, wanted: str, kind: str = "") -> None:
@@ -268,12 +237,11 @@ def check_kind(path: Path, wanted: str, kind: str = "") -> None:
         with suppress(zlib.error):
             unpacked = unpacked or zlib.decompressobj(31).decompress(head, HEAD)
         fine = _NO_MISTAKE.get(wanted, {"archive", "picture", "sound"})
-        wrong = ((group, *each) for group, kinds in _KINDS.items() if group not in fine for each in kinds.items())
-        for group, name, marks in wrong:
-            for at, mark in marks:
-                beginnings = (head[at : at + len(mark)], unpacked[at : at + len(mark)])
-                if mark in (tail if at == -1 else unpacked) if at < 0 else mark in beginnings:
-                    raise InputError(f"{path}: is {name}, required a {kind or wanted}; {_NEXT[group]}")
+        for group, name, at, mark in _read_kinds():
+            beginnings = (head[at : at + len(mark)], unpacked[at : at + len(mark)])
+            is_there = mark in (tail if at == -1 else unpacked) if at < 0 else mark in beginnings
+            if is_there and group not in fine:
+                raise InputError(f"{path}: is {name}, required a {kind or wanted}; {_NEXT[group]}")
 
 
 def is_text(path: Path) -> bool:

@@ -25,8 +25,6 @@ LONGEST_LINE = 1 << 20  # most characters of a line
 SEPARATORS = ",;\t"
 MISSING = frozenset(("", "nan", "na", "n/a", "none", "null", "-", "-nan", "nan(ind)", "-nan(ind)"))
 """Fields that hold no number, in lower case."""
-
-
 QUOTE = "'"
 Rows = list[tuple[int, list[str]]]  # rows of a table: the number of the last line of each, and its fields
 

@@ -24,13 +24,12 @@ __all__ = [
     "ChainStates", "Channel", "ChannelValue", "ConditionSpectrum", "Configuration", "Constraints", "CurveEdit",
     "Delivery", "DominantGaussian", "DrawnCurve", "Example", "Explanation", "Features", "Gain", "Generation", "Hold",
     "Item", "JoinedRows", "Monitor", "Motion", "NamedProbability", "Outlook", "ParallelMap", "Pin", "PriorOutput",
-    "Progress", "Prosody", "ReducedVariance", "RegressedMean", "Rule", "SlopedPin", "Span", "Speech",
+    "Progress", "Prosody", "ReducedVariance", "Rule", "SlopedPin", "Span", "Speech",
     "SpeechKnowledge", "SpeechPart", "SpokenText", "Staging", "StateTrace", "TimedTranscript", "TimedWord", "Timeline",
     "TokenPosteriors", "Track", "TranscriptLine", "Unit", "Utterance", "VoiceEvent", "check_curves",
     "check_magnitude", "frame_of", "frames_of", "from_sixteen_bits", "option", "silent_monitor", "sort_lines",
     "sub_monitor", "to_sixteen_bits", "with_progress",
 ]  # fmt: skip
-
 _MODULES = (
     *("configuration", "delivery", "audio", "timeline", "motion"),
     *("edits", "speech", "generation", "progress"),

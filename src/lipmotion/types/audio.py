@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from lipmotion.types.timeline import Span
 
 SPEECH_RATE_HZ = 16_000  # of all speech that is analysed
-FULL_SCALE = 32_768
-"""The 16-bit value of a sample of 1, which is one more than there is."""
-LAUGHTER, BREATH, WHISPER, SHOUT = "laughter", "breath", "whisper", "shout"
+FULL_SCALE = 32_768  # the 16-bit value of a sample of 1, which is one more than there is
+LAUGHTER, BREATH = "laughter", "breath"
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,9 +65,8 @@ class VoiceEvent:
     """Something detected in a voice beside its words (``speech.sound.voice_events``).
 
     start_s, end_s : seconds
-    kind     : ``LAUGHTER`` (a bout), ``BREATH`` (drawn in, in a pause), ``WHISPER`` or ``SHOUT`` (a phrase)
-    strength : 0 to 1: how sure laughter and whispering are; of a breath, how far it stands out of the noise of the
-               recording; of a shout, how far it is from the recording's other phrases
+    kind     : ``LAUGHTER`` (a bout) or ``BREATH`` (drawn in, in a pause)
+    strength : 0 to 1: how sure laughter is; of a breath, how far it stands out of the noise of the recording
     calls    : of laughter, the time in seconds of each "ha", and its loudness beside the loudest one, 0 to 1: half of
                it 10 dB lower
     """
@@ -85,12 +83,9 @@ class VoiceEvent:
         return replace(self, start_s=self.start_s + offset_s, end_s=self.end_s + offset_s, calls=calls)
 
 
-FRAME_RATE_HZ = 100.0
-"""Frames per second of all models; frame n is centred at n / FRAME_RATE_HZ seconds."""
-ENERGY_FEATURE = 12
-"""The acoustic feature that is the log energy."""
-SPECTRUM_BANDS = 40
-"""Mel bands of a spectrum, the input of acoustic networks."""
+FRAME_RATE_HZ = 100.0  # frames per second of all models; frame n is centred at n / FRAME_RATE_HZ seconds
+ENERGY_FEATURE = 12  # the acoustic feature that is the log energy
+SPECTRUM_BANDS = 40  # mel bands of a spectrum, the input of acoustic networks
 
 
 @dataclass(frozen=True, eq=False)

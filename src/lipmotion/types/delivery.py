@@ -30,9 +30,6 @@ class MoodKey:
     mood     : one of ``MOODS``, or ``NEUTRAL``; or one of ``MANNERS``, or ``PLAIN``
     strength : 0 to 1
     Raises InputError: no such mood, or a value out of its range.
-
-    >>> str(MoodKey(1.2, "happy", 0.7))
-    'happy:0.7 at 1.2'
     """
 
     time_s: float
@@ -81,9 +78,6 @@ def parse_moods(text: str) -> tuple[MoodKey, ...]:
 
     text : ``MOOD``, ``MOOD:STRENGTH``, or several with their times in seconds: ``happy:0.7, sad at 2.5``
     Raises InputError: another form, or as ``MoodKey``.
-
-    >>> parse_moods("sad at 2.5, happy:0.7")
-    (MoodKey(time_s=0.0, mood='happy', strength=0.7), MoodKey(time_s=2.5, mood='sad', strength=1.0))
     """
     keys = []
     for part in filter(None, map(str.strip, text.split(","))):

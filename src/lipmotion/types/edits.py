@@ -11,8 +11,7 @@ from typing import ClassVar
 from lipmotion.errors import InputError, shorten
 from lipmotion.types.audio import FRAME_RATE_HZ
 
-LARGEST_GAIN, MAX_DRAWN = 3.0, 10_000
-"""Largest factor of movements, and largest number of values of a drawn curve."""
+LARGEST_GAIN, MAX_DRAWN = 3.0, 10_000  # largest factor of movements, and largest number of values of a drawn curve
 
 
 @dataclass(frozen=True)
@@ -90,9 +89,6 @@ class DrawnCurve:
     values  : at equal distances from the start to the end, in the unit of the channel
     Raises InputError: fewer than 2 values, or more than ``MAX_DRAWN``; no numbers; or an end that is not after the
     start.
-
-    >>> DrawnCurve(1.0, 1.5, "opening", (0.0, 0.1, 0.0)).channel
-    'opening'
     """
 
     start_s: float
@@ -132,8 +128,7 @@ class Locked:
     channel: ClassVar[str] = ""
 
 
-CurveEdit = Pin | Gain | DrawnCurve | Hold | Locked
-"""Changes of one curve, or of all curves of the mouth."""
+CurveEdit = Pin | Gain | DrawnCurve | Hold | Locked  # changes of one curve, or of all curves of the mouth
 
 
 def _check_stretch(start_s: float, end_s: float) -> None:

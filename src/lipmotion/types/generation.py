@@ -60,9 +60,6 @@ class Outlook:
     voice      : 0 (unknown) to 1 (as in the training); None where it was not needed
     range_db   : decibels between loud and quiet moments; under 20 the recording is noisy
     advice     : what would help, the most helpful first
-
-    >>> Outlook("words", 0.66, 0.0, 31.2, ("the words",)).text
-    'words recognised, confidence 0.66; voice 0.00 (1: as in training); levels 31 dB apart; would help most: the words'
     """
 
     words: str
@@ -266,20 +263,6 @@ class DominantGaussian:
 
 
 @dataclass(frozen=True)
-class RegressedMean:
-    """A mean of a stream that is regressed on the acoustic features and posteriors around a frame.
-
-    stream   : name of the stream
-    shares   : weight of each regression, largest first; ``rest`` in silence away from speech
-    channels : weighted mean of the regressions, and its standard deviation, by channel
-    """
-
-    stream: str
-    shares: tuple[NamedProbability, ...]
-    channels: Mapping[str, ChannelValue]
-
-
-@dataclass(frozen=True)
 class Explanation:
     """What determined one frame of generated motion; returned by ``explain``.
 
@@ -292,7 +275,6 @@ class Explanation:
     chains      : posterior probabilities of the states of each chain (empty: the engine has no chains)
     joint       : the most probable joint state of all chains (None: the engine does not list joint states)
     gaussians   : the dominant Gaussian of each stream
-    regressions : the regressed mean of each stream that has one
 
     >>> import lipmotion
     >>> (explanation,) = lipmotion.explain("examples/welcome.flac", at=1.0)
@@ -309,7 +291,6 @@ class Explanation:
     chains: tuple[ChainStates, ...] = ()
     joint: NamedProbability | None = None
     gaussians: tuple[DominantGaussian, ...] = ()
-    regressions: tuple[RegressedMean, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

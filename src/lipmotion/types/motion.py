@@ -13,18 +13,13 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, shorten
 from lipmotion.printable import is_formula
 
-EYE_DISTANCE = "eye_distance"
-"""The unit of all tracked lengths: the distance between the outer eye corners."""
-WEIGHT = "weight"
-"""The unit of blendshapes: 0 is no effect, 1 the full effect; never negative."""
-RADIAN = "radian"
-"""The unit of angles."""
-GREY = "grey"
-"""The unit of eigenlips: coefficients of an orthonormal basis of mouth pictures in grey levels, 0 to 255."""
+EYE_DISTANCE = "eye_distance"  # the unit of all tracked lengths: the distance between the outer eye corners
+WEIGHT = "weight"  # the unit of blendshapes: 0 is no effect, 1 the full effect; never negative
+RADIAN = "radian"  # the unit of angles
+GREY = "grey"  # the unit of eigenlips: coefficients of an orthonormal basis of mouth pictures in grey levels, 0 to 255
 LARGEST_MAGNITUDE = {EYE_DISTANCE: 1e4, WEIGHT: 255.0, GREY: 1e5}
 """Largest plausible magnitude of motion of a face, by unit; values in pixels, in files without units, are allowed."""
-LARGEST_OTHER = 1e6
-"""The same for all other units."""
+LARGEST_OTHER = 1e6  # the same for all other units
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,7 @@ from typing import Protocol, TypeVar, cast
 
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
-REPORT_INTERVAL = 10
-"""Every so many pictures are reported."""
+REPORT_INTERVAL = 10  # every so many pictures are reported
 
 
 @dataclass(frozen=True)
@@ -48,8 +47,7 @@ class Item:
     reason: str = ""
 
 
-Monitor = Callable[[Progress | Item], None]
-"""A function that long work calls with its reports, in their order."""
+Monitor = Callable[[Progress | Item], None]  # A function that long work calls with its reports, in their order
 
 
 def silent_monitor(event: Progress | Item) -> None:

@@ -175,10 +175,6 @@ class TimedTranscript:
     """What is said, in order. Times are as people and recognisers write them: late, early, rounded, overlapping.
 
     tags : the moods that tags in the text ask for
-
-    >>> line = TranscriptLine((TimedWord("hello"), TimedWord("you")), 1.5, 2.5)
-    >>> TimedTranscript((line,)).words, TimedTranscript((line,)).has_times
-    (('hello', 'you'), True)
     """
 
     lines: tuple[TranscriptLine, ...]
@@ -188,18 +184,6 @@ class TimedTranscript:
     def words(self) -> tuple[str, ...]:
         """The words of all lines."""
         return tuple(word.word for line in self.lines for word in line.words)
-
-    def shifted(self, offset_s: float) -> TimedTranscript:
-        """Return the transcript with ``offset_s`` seconds added to all times."""
-
-        def shift(time_s: float | None) -> float | None:
-            return None if time_s is None else time_s + offset_s
-
-        lines = []
-        for line in self.lines:
-            words = tuple(TimedWord(word.word, shift(word.start_s), shift(word.end_s)) for word in line.words)
-            lines.append(TranscriptLine(words, shift(line.start_s), shift(line.end_s)))
-        return replace(self, lines=tuple(lines))
 
     def with_words(self, words: Callable[[str], Iterable[str]]) -> TimedTranscript:
         """Return the transcript with other words in place of each one; they have its times."""

@@ -138,13 +138,6 @@ class SpeechKnowledge:
     voice  : 0 to 1, how well training knows the voice (``Speech.voice``)
     phones : 0 to 1, how sure the phones are (``Speech.confidence``), on average; 1 where they are known
     fit    : 0 to 1, how far the transcript or given phones fit, in all or in each frame; 1 where there are none
-
-    >>> import numpy as np
-    >>> curve, variance = np.array([0.0, 0.1, 0.2, 0.1]), np.full(4, 1e-4)
-    >>> SpeechKnowledge(voice=1.0, phones=1.0).confidence(curve, variance).round(2)
-    array([0.86, 0.86, 0.86, 0.86])
-    >>> SpeechKnowledge(voice=0.0, phones=0.9).confidence(curve, variance).round(2)
-    array([0.32, 0.62, 0.32, 0.62])
     """
 
     voice: float

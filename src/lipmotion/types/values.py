@@ -51,9 +51,6 @@ def parse_number(
 
     finite : whether ``nan`` and ``inf`` are refused; False where the caller checks a range
     Raises InputError: another text, as ``1_0`` or digits of other scripts.
-
-    >>> parse_number(" -1.5e3")
-    -1500.0
     """
     value = float(text) if _NUMBER.fullmatch(text.strip()) else None
     if value is None or (finite and not math.isfinite(value)):

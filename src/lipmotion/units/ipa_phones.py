@@ -16,6 +16,8 @@ from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
+from lipmotion.units.spelling import read_table
+
 HEIGHTS = ("close", "near-close", "close-mid", "mid", "open-mid", "near-open", "open")
 
 
@@ -27,55 +29,20 @@ class Vowel(NamedTuple):
     phone: str
 
 
-_UNROUNDED = {
-    "close": "i iy  ɨ ix  ᵻ ix  ɯ ix", "near-close": "ɪ ih", "close-mid": "e eh  ɘ ax  ɤ ax", "mid": "ə ax  ɚ axr",
-    "open-mid": "ɛ eh  ε eh  ɜ ah  ɝ er  ʌ ah", "near-open": "æ ae  ɐ aa", "open": "a aa  ɑ aa  A aa",
-}  # fmt: skip
-_ROUNDED = {
-    "close": "y uw  ʉ uw  u uw", "near-close": "ʏ uh  ʊ uh", "close-mid": "ø ow  ɵ ow  o ow",
-    "open-mid": "œ ao  ɞ ao  ɔ ao", "open": "ɶ ao  ɒ ao",
-}  # fmt: skip
 VOWEL_CHART: dict[str, Vowel] = {
-    letter: Vowel(HEIGHTS.index(height), rounded, phone)
-    for rounded, rows in ((False, _UNROUNDED), (True, _ROUNDED))
-    for height, row in rows.items()
-    for letter, phone in zip(row.split()[::2], row.split()[1::2], strict=True)
+    letter: Vowel(HEIGHTS.index(height), lips == "rounded", phone)
+    for letter, row in read_table("vowels").items()
+    for height, lips, phone in [row.split()]
 }
-"""The vowels, front to back in every row. A rounded one has the phone of its height, wherever the tongue is."""
-_OTHERS: dict[str, str] = {
-    # diphthongs; a long eː is as close at its end as ey; Japanese ɯᵝ is rounded a little; o- is espeak-ng's Mandarin ɤ
-    "aɪ ai": "ay", "aʊ au ɑu": "aw", "ɔɪ ɔʏ ɔy oɪ oi": "oy", "eɪ ei ɛɪ eː": "ey", "oʊ əʊ ou": "ow", "ɯᵝ": "uh",
-    "ə˞": "axr", "ɜ˞": "er", "˞": "r", "o-": "ax",
-    # both lips; the fricatives ɸ and β do not close them, the trill ʙ does; ʷ: the lips round
-    "p ʘ": "p", "b ɓ ʙ": "b", "m": "m", "ɸ Φ pɸ": "f", "β": "v", "w ʍ ɥ ʷ": "w",
-    # lip and teeth
-    "f": "f", "v ʋ ɱ ⱱ": "v",
-    # tip of the tongue: at the teeth, behind them, further back (ʃ and its like round the lips)
-    "θ": "th", "ð": "dh", "t ʈ ǀ ǃ ǁ": "t", "d ɖ ɗ ɾ": "d", "n ɲ ɳ": "n", "s": "s", "z": "z", "ʦ": "t s", "ʣ": "d z",
-    "l ɫ ɭ ʎ ɬ ɮ ɺ ʟ": "l", "r ɹ ɽ ɻ": "r", "ʃ ɕ ʂ S": "sh", "ʒ ʑ ʐ": "zh", "tʃ tɕ tʂ ʧ": "ch", "dʒ dʑ dʐ ʤ": "jh",
-    # back of the tongue, throat: the lips are those of the vowels beside
-    "j ç ʝ": "y", "k c q x χ ɧ": "k", "g ɡ ɟ ɢ ɠ ɣ ɰ ʛ ʄ": "g", "ŋ ɴ": "ng", "h ɦ ħ ʕ ʁ ʀ ʜ ʢ": "hh",
-    # consonants that are a syllable; a stop of the throat
-    "l̩": "el", "m̩": "em", "n̩": "en", "ʔ ʡ": "",
-    # letters of Mandarin that recognisers write as they are: yi, bu
-    "一": "iy", "不": "b uw",
-}  # fmt: skip
 IPA_PHONES: dict[str, tuple[str, ...]] = {letter: (vowel.phone,) for letter, vowel in VOWEL_CHART.items()} | {
     unicodedata.normalize("NFD", symbol): tuple(phones.split())
-    for symbols, phones in _OTHERS.items()
+    for symbols, phones in read_table("ipa").items()
     for symbol in symbols.split()
 }
 """IPA symbols to phones of the inventory; the longest symbol counts."""
 _LONGEST = max(map(len, IPA_PHONES))
-_SAMPA = (
-    "A ɑ B β C ç D ð E ɛ F ɱ G ɣ H ɥ I ɪ J ɲ K ɬ L ʎ M ɯ N ŋ O ɔ P ʋ Q ɒ R ʁ S ʃ T θ U ʊ V ʌ W ʍ X χ Y ʏ Z ʒ @ ə { æ "
-    "} ʉ 1 ɨ 2 ø 3 ɜ 4 ɾ 5 ɫ 6 ɐ 7 ɤ 8 ɵ 9 œ & ɶ ? ʔ g ɡ = ̩ ~ ̃ : ː ' ʲ \" ˈ % ˌ ! ꜜ | | . . "
-    "B\\ ʙ G\\ ɢ H\\ ʜ I\\ ᵻ J\\ ɟ K\\ ɮ L\\ ʟ M\\ ɰ N\\ ɴ O\\ ʘ R\\ ʀ U\\ ʊ X\\ ħ h\\ ɦ j\\ ʝ l\\ ɺ p\\ ɸ r\\ ɹ "
-    "s\\ ɕ v\\ ʋ x\\ ɧ z\\ ʑ 3\\ ɞ @\\ ɘ ?\\ ʕ <\\ ʢ >\\ ʡ |\\ ǀ |\\|\\ ǁ !\\ ǃ =\\ ǃ :\\ ˑ -\\ ‿ r\\` ɻ "
-    "d` ɖ l` ɭ n` ɳ r` ɽ s` ʂ t` ʈ z` ʐ @` ɚ 3` ɝ b_< ɓ d_< ɗ g_< ɠ G\\_< ʛ J\\_< ʄ _= ̩ _~ ̃ _w ʷ _j ʲ _h ʰ tS tʃ dZ dʒ"
-).split()  # fmt: skip
-XSAMPA = dict(zip(_SAMPA[::2], _SAMPA[1::2], strict=True)) | {letter: letter for letter in "abcdefhijklmnopqrstuvwxyz"}
-"""X-SAMPA's symbols, and so SAMPA's of WebMAUS, in IPA. Source: J. C. Wells, "Computer-coding the IPA", 1995, 2000."""
+XSAMPA = read_table("xsampa") | {letter: letter for letter in "abcdefhijklmnopqrstuvwxyz"}
+"""X-SAMPA's symbols, and so SAMPA's of WebMAUS, in IPA."""
 _XSAMPA_SYMBOL = re.compile("|".join(map(re.escape, sorted(XSAMPA, key=len, reverse=True))) + r"|_[^\s\\]\\?|[`^-]")
 _IGNORED = frozenset("'#\"ˈˌː.|‿^-_*!?;:,~%<>ˑʰʲˤˠʼʱⁿˡ0123456789()¹²³⁰⁴⁵⁻⁽⁾")
 """Marks that no mouth shape depends on; further ones are combining marks and tones."""

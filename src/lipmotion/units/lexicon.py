@@ -21,7 +21,7 @@ from lipmotion.storage.sources import read_text_file
 from lipmotion.types.languages import ENGLISH, LANGUAGES, find_script
 from lipmotion.units.ipa_phones import read_tokens
 from lipmotion.units.phones import OTHER_NAMES, PAUSE, PHONES, REDUCED_VOWELS, is_silent
-from lipmotion.units.spelling import guess_pronunciation, normalise_text, remove_accents
+from lipmotion.units.spelling import guess_pronunciation, normalise_text, read_table, remove_accents
 from lipmotion.units.written_forms import list_readings
 
 LONGEST_WORD = 30  # letters of the longest word that is read by the network: longer ones are web addresses and noise
@@ -58,9 +58,8 @@ OWNED = dict.fromkeys("p t k f th".split(), ("s",)) | dict.fromkeys("s z sh zh c
 """The phones of an ``'s`` after some phones; ``z`` after all others."""
 WEAK_WORDS = frozenset("a an the of and from was but than that's her were your for if in is it its".split())
 """Monosyllables that are unstressed in running speech."""
-LARGEST_LEXICON_BYTES, MAX_LINES = 1 << 25, 1 << 20
-"""Most bytes and lines of a user's file; the dictionary of 134,000 words has 3.3 million bytes."""
-LONGEST_LINE = 2000  # most characters of a line: a word, its phones and a comment
+LARGEST_LEXICON_BYTES = 1 << 25  # of a user's file; the dictionary of 134,000 words has 3.3 million
+LONGEST_PRONUNCIATION = 1000  # most phones of a word
 OFTEN_LENGTHENED = frozenset("no so go do to who hello yo bro ho he me we she be the long stop".split())
 """Words that are meant rather than those with their vowel twice (``noo``, ``loong``, ``stoop``)."""
 LENGTHENED, REPEATED = re.compile(r"(.)\1\1|^(..+?)\2"), re.compile(r"([a-z]{2,4}?)\1+h?")
@@ -102,24 +101,19 @@ class Lexicon:
         """Return the lexicon of a file: a pronunciation ``word PHONE PHONE ...`` a line; ``#`` starts a comment.
 
         Phones are ARPAbet in either case, with or without stress digits, or names of the inventory.
-        Raises InputError: no such file, not UTF-8, larger than allowed (``LARGEST_LEXICON_BYTES``, ``MAX_LINES``,
-        ``LONGEST_LINE``, ``MAX_VARIANTS``), no phones after a word, or an unknown phone (with its line).
+        Raises InputError: no such file, not UTF-8, larger than allowed (``LARGEST_LEXICON_BYTES``), or with its line:
+        no phones after a word, more than ``LONGEST_PRONUNCIATION`` or ``MAX_VARIANTS``, or an unknown phone.
         """
         text = read_text_file(Path(path), "lexicon", LARGEST_LEXICON_BYTES)
-        count = text.count("\n") + 1
-        if count > MAX_LINES:
-            raise InputError(f"{path}: {count} lines, required at most {MAX_LINES}; keep the words that are said")
         user: dict[str, list[Pronunciation]] = {}
         for number, line in enumerate(StringIO(text), start=1):
-            where, length = f"{path}, line {number}", len(line.rstrip("\n"))
-            if length > LONGEST_LINE:
-                what = f"{where}: {length} characters, required at most {LONGEST_LINE};"
-                raise InputError(f"{what} write one pronunciation of a word a line")
+            where = f"{path}, line {number}"
             word, *labels = line.split("#", maxsplit=1)[0].split() or [""]
             if not word:
                 continue
-            if not labels:
-                raise InputError(f"{where}: a word without phones; write the word, then its phones")
+            if not 0 < len(labels) <= LONGEST_PRONUNCIATION:
+                what = f"{len(labels)} phones after a word, required 1 to {LONGEST_PRONUNCIATION}"
+                raise InputError(f"{where}: {what}; write a pronunciation of a word a line")
             word = VARIANT_NUMBER.sub("", normalise_text(word)).strip("'")  # as in ``split_words``
             phones = tuple([find_phone(label) or "" for label in labels])
             for label, phone in zip(labels, phones, strict=True):
@@ -257,15 +251,7 @@ def reduce_vowels(word: str, phones: Pronunciation) -> Pronunciation:
     return tuple(REDUCED_VOWELS.get(p, p) if i != stressed else p for i, p in enumerate(phones))
 
 
-COMMON_WORDS = {
-    "en": "the and of to is that it was you for with this",
-    "es": "el los las que y en es por con para una del",
-    "fr": "le les et est des je vous une dans pas il du",
-    "de": "der die und das ist nicht ich ein den zu mit es",
-    "it": "il che di è non un per sono con gli della una",
-    "pt": "o os que não um uma do da em com para é",
-    "nl": "de het een en van is ik niet dat op zijn te",
-}
+COMMON_WORDS = read_table("common_words")
 """The commonest words of languages in Latin letters, as any frequency list has them."""
 MIN_COMMON, AHEAD = 3, 1.5
 """A text is in a language with so many of its common words in it, and so many times as many as of any other one."""

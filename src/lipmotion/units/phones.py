@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from lipmotion.errors import shorten
 from lipmotion.types import Timeline, Unit
-from lipmotion.units.spelling import parse_table
+from lipmotion.units.spelling import parse_table, read_table
 
 VISEMES: dict[str, tuple[str, ...]] = {
     "sip": ("sil", "sp"),  # silence (the print's /sip/ is /sil/; sp joins it)
@@ -100,16 +100,7 @@ FULL_FORMS = {reduced: vowel for vowel, reduced in REDUCED_VOWELS.items()} | {"e
 
 LIP_CLOSING: tuple[str, ...] = (*VISEMES["bi"], "em")  # the phones in which the lips meet
 
-SIMILAR_PHONES: dict[str, tuple[str, ...]] = {
-    phone: tuple(others.split())
-    for phone, others in parse_table(
-        "aa=ao_ah ae=eh_aa ah=ax_aa ao=aa_ow aw=aa_ow ax=ah_ix_ih axr=er_r_ax ay=aa_ey b=p_m_d ch=jh_sh_t d=t_dh_n "
-        "dh=th_v_d eh=ae_ih el=l_ow em=m_ax en=n_ax er=axr_r_ax ey=eh_iy f=v_th_s g=k_d hh=th_f_k ih=ix_iy_eh "
-        "ix=ih_ax iy=ih_ey jh=ch_zh_d k=g_t l=el_ow_w m=n_em n=m_en ng=n_m ow=ao_uh_uw oy=ao_ow p=b_t r=axr_er_w "
-        "s=z_sh_f sh=ch_s t=d_k th=f_dh_s uh=uw_ax_ow uw=uh_ow v=f_dh_b w=uw_l_r y=iy_ih z=s_zh zh=jh_sh_z sil=sp "
-        "sp=sil"
-    ).items()
-}
+SIMILAR_PHONES = {phone: tuple(others.split()) for phone, others in read_table("similar_phones").items()}
 """A phone that is not in a corpus borrows the model of the first of these that is."""
 
 
@@ -171,29 +162,7 @@ def find_similar_lips(phone: str, known: Collection[str]) -> str:
     return find_similar_phone(phone, same_viseme or known)
 
 
-CLASSES: dict[str, tuple[str, ...]] = {
-    name: tuple(phones.split())
-    for name, phones in {
-        # How a sound is made.
-        "silence": "sil sp",
-        "vowel": "aa ae ah ao aw ax axr ay eh er ey ih ix iy ow oy uh uw",
-        "diphthong": "aw ay ey ow oy",
-        "stop": "p b t d k g",
-        "voiced stop": "b d g",
-        "nasal": "m n ng em en",
-        "fricative": "f v th dh s z sh zh hh",
-        "affricate": "ch jh",
-        "approximant": "l el r w y",
-        # Where it is made, as far as lips and jaw show it.
-        "lips": "p b m em f v w",
-        "alveolar": "t d n en s z l el",
-        "front vowel": "iy ih ix eh ey ae ay y",
-        "back vowel": "aa ao ow uw uh oy aw",
-        "high vowel": "iy ih ix uw uh y w",
-        "low vowel": "aa ae ah aw ay ao",
-        "rounded": "w uw uh ow ao oy aw",
-    }.items()
-}
+CLASSES = {name: tuple(phones.split()) for name, phones in read_table("phone_classes").items()}
 """Classes by articulation, as in any textbook of phonetics: what the questions of decision trees are made of."""
 
 

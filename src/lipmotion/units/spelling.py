@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from pathlib import Path
 
 from lipmotion.errors import InputError, shorten
 
@@ -13,13 +14,14 @@ def parse_table(rows: str) -> dict[str, str]:
     return {key: value.replace("_", " ") for key, _, value in (row.partition("=") for row in rows.split())}
 
 
-SPELLINGS = parse_table(
-    "tion=sh_ah_n sion=zh_ah_n ture=ch_er ough=ao augh=ao eigh=ey igh=ay tch=ch dge=jh sch=sh ee=iy ea=iy ie=iy "
-    "ei=ey ai=ey ay=ey ey=iy oa=ow oo=uw ou=aw ow=ow oi=oy oy=oy au=ao aw=ao ew=uw ue=uw ar=aa_r er=er ir=er "
-    "or=ao_r ur=er ch=ch ck=k gh=g kn=n ng=ng ph=f qu=k_w rh=r sh=sh th=th wh=w wr=r ce=s_eh ci=s_ih cy=s_iy "
-    "ge=jh_eh a=ae b=b c=k d=d e=eh f=f g=g h=hh i=ih j=jh k=k l=l m=m n=n o=aa p=p q=k r=r s=s t=t u=ah v=v w=w "
-    "x=k_s y=iy z=z '="
-)
+def read_table(name: str) -> dict[str, str]:
+    """Return a table of the package (``tables/NAME.tsv``): a key, a tab and a value a line; ``# `` begins a comment."""
+    text = Path(__file__).with_name("tables").joinpath(f"{name}.tsv").read_text(encoding="utf-8")
+    rows = (line.partition("\t") for line in text.splitlines() if not line.startswith("# "))
+    return {key: value for key, _, value in rows}
+
+
+SPELLINGS = read_table("spellings")
 """The longest match from the left wins. ARPAbet, lower case; an empty value is a silent letter."""
 LONG_VOWELS = {"a": "ey", "e": "iy", "i": "ay", "o": "ow", "u": "uw"}
 ACCENTS = re.compile("[\u0300-\u036f]")  # the accents of Latin letters; the marks of other scripts are sounds

@@ -19,6 +19,7 @@ from lipmotion.types import TimedWord, Timeline, Unit
 from lipmotion.types.delivery import MANNERS, MOODS, NEUTRAL, PLAIN, MoodKey, MoodTag, sort_moods
 from lipmotion.types.values import parse_clock
 from lipmotion.units.phone_timelines import group_words
+from lipmotion.units.spelling import read_table
 from lipmotion.units.text_normalisation import find_words, tokenise
 from lipmotion.units.written_forms import list_readings
 
@@ -201,25 +202,11 @@ INSIDE_WORDS = frozenset("a b i u s em strong mark sub sup font span color colou
 """Tags of style, which may stand inside a word."""
 _NAME = re.compile(r"([a-z][a-z '-]*?)\s*(?::\s*(\d*\.?\d+))?")
 SYNONYMS: dict[str, tuple[str, float]] = {
-    **dict.fromkeys(
-        "happily joy joyful joyfully cheerful cheerfully excited laughs laughing laughter".split(), ("happy", 1.0)
-    ),
-    **dict.fromkeys("smile smiles smiling warm warmly friendly amused".split(), ("happy", 0.6)),
-    **dict.fromkeys("sadly sadness crying cries sobbing sorrow sorrowful grief".split(), ("sad", 1.0)),
-    **dict.fromkeys("sighs sigh disappointed gloomy melancholy".split(), ("sad", 0.5)),
-    **dict.fromkeys("angrily anger furious rage mad".split(), ("angry", 1.0)),
-    **dict.fromkeys("annoyed frustrated irritated stern".split(), ("angry", 0.6)),
-    **dict.fromkeys("fear fearful fearfully scared terrified frightened".split(), ("afraid", 1.0)),
-    **dict.fromkeys("disgust disgustedly revolted".split(), ("disgusted", 1.0)),
-    **dict.fromkeys("surprise surprisedly amazed astonished shocked gasps".split(), ("surprised", 1.0)),
-    **dict.fromkeys("nervous nervously anxious anxiously stressed worried".split(), ("tense", 1.0)),
-    **dict.fromkeys("tiredly exhausted sleepy yawns bored".split(), ("tired", 1.0)),
-    **dict.fromkeys("calm calmly normal normally relaxed".split(), (NEUTRAL, 1.0)),
-    **dict.fromkeys("whispers whispering whispered softly".split(), ("whisper", 1.0)),
-    **dict.fromkeys("shouts shouting shouted yells yelling screams loudly".split(), ("shout", 1.0)),
-    **dict.fromkeys("mumbles mumbling muttering mutters".split(), ("mumble", 1.0)),
-    **{name: (name, 1.0) for name in (NEUTRAL, *MOODS, PLAIN, *MANNERS)},
-}
+    word: (mood, float(strength))
+    for meaning, words in read_table("moods").items()
+    for mood, strength in [meaning.split()]
+    for word in words.split()
+} | {name: (name, 1.0) for name in (NEUTRAL, *MOODS, PLAIN, *MANNERS)}
 """The words of tags that are understood, and what they mean."""
 
 

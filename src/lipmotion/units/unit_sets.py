@@ -1,23 +1,16 @@
 """Unit sets: maps from every phone of the inventory to the unit that models it, built in or read from table files.
 
-The five of Hofer 2008 (§6, Table 1) have a reason for each group of phones: the paper gives the number of units of each
-set and a line of text on them; the groups are ours. Counts, and silence:
-
-- ``2vis``: 2; silence belongs to the closed mouth;
-- ``sVis``: 6 groups of speech as printed, and silence is a unit beside them;
-- ``pbVis``: 9 drawings of a speaking mouth; Preston Blair's mouth at rest is a unit beside them;
-- ``eVis``: 19; silence is one of the 10 that are not vowels;
-- ``phone``: 46, silence among them; ``sp``, a pause between words, is the 47th phone of our inventory.
+Of the five of Hofer 2008 (§6, Table 1) the paper gives the number of units and a line of text. The groups, with their
+reasons, are ours: ``tables``. ``sp``, a pause between words, is the 47th phone of our inventory, beside their 46.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.storage.sources import read_text_file
@@ -53,8 +46,12 @@ class UnitSet:
         for phone, unit in self.unit_of_phone.items():
             if unit.split() != [unit]:
                 raise InputError(f"unit set {self.name}: the unit of {phone} is {shorten(unit)!r}, not a word")
-        for unit in _mix(self.unit_of_phone):
-            raise InputError(f"unit set {self.name}: {_ADVICE.format(shorten(unit))}")
+        spoken = {unit for phone, unit in self.unit_of_phone.items() if not is_silent(phone)} - {CLOSED_UNIT}
+        for unit in sorted(spoken.intersection(self.silence)):
+            raise InputError(
+                f"unit set {self.name}: unit {shorten(unit)!r} holds silence and speech; give sil and sp a unit "
+                f"without other phones, or call this one {CLOSED_UNIT!r}: silence is then a closed mouth"
+            )
 
     @cached_property
     def units(self) -> tuple[str, ...]:
@@ -144,80 +141,25 @@ def read_unit_table(path: Path) -> UnitSet:
             if phone in phone_line:
                 raise InputError(f"{where}: phone {phone!r} has a unit in line {phone_line[phone]} already; keep one")
             phone_line[phone], unit_of_phone[phone] = number, unit
-    for unit in _mix(unit_of_phone):
-        raise InputError(f"{path}, line {unit_line[unit]}: {_ADVICE.format(shorten(unit))}")
     try:
         return UnitSet(path.stem, unit_of_phone)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
 
-def _mix(of: Mapping[str, str]) -> list[str]:
-    """Return the units, other than ``closed``, that hold silence and speech."""
-    silent, spoken = ({unit for phone, unit in of.items() if is_silent(phone) is wanted} for wanted in (True, False))
-    return sorted((silent & spoken) - {CLOSED_UNIT})
+def _read_own(name: str, uncounted: str = "") -> UnitSet:
+    """Return a set of the paper, with the unit that its printed count leaves out."""
+    table = read_unit_table(Path(__file__).with_name("tables") / f"{name}.txt")
+    return replace(table, uncounted=frozenset(uncounted.split()))
 
 
-_ADVICE = f"""unit {{!r}} holds silence and speech; give sil and sp a unit without other phones, or call this one \
-{CLOSED_UNIT!r}: silence is then a closed mouth"""
-
-
-class UnitGroup(NamedTuple):
-    """The phones of one unit, and why they are together."""
-
-    unit: str
-    phones: str
-    reason: str
-
-
-def _list_groups(*rows: str) -> tuple[UnitGroup, ...]:
-    return tuple(UnitGroup(*row.split("; ", 2)) for row in rows)
-
-
-_BILABIAL = "bilabial; p b m em; the lips meet"
-_LABIODENTAL = "labiodental; f v; the lower lip is at the upper teeth"
-_SILENCE = "silence; sil sp; no speech; the mouth rests or prepares for speech"
-GROUPS: dict[str, tuple[UnitGroup, ...]] = {
-    "2vis": _list_groups(
-        "open; aa ae ah ao aw ax axr ay ch d dh eh el en er ey f g hh ih ix iy jh k l n ng ow oy r s sh t th "
-        "uh uw v w y z zh; the lips are apart, in f v, too: the lip is at the teeth, not at the other lip",
-        "closed; p b m em sil sp; the lips meet; in silence they rest on each other",
-    ),
-    "sVis": _list_groups(
-        "front; iy ih ix eh ey ax axr er; not low, not back: jaw half shut, lips spread or slack",
-        "low; aa ae ah aw ay; low: the jaw drops; diphthongs stand where they begin, for that part is longer",
-        "back; ao ow oy uh uw; back, not low: the vowels that round the lips", _BILABIAL, _LABIODENTAL,
-        "other; ch d dh el en g hh jh k l n ng r s sh t th w y z zh; all other consonants: lips hardly "
-        "needed; w rounds them, but does not shut them", _SILENCE,
-    ),
-    "pbVis": _list_groups(
-        "AI; aa ae ah aw ay; wide open: a as in father, i as in ice",
-        "E; eh ey iy ih ix ax er axr; open and spread: e as in let and in see, and the slack vowels near them",
-        "O; ao ow oy; round and open", "U; uh uw; round and nearly shut",
-        "WQ; w; puckered tightly; q is written k w here", "MBP; p b m em; the lips meet",
-        "FV; f v; the lower lip is at the upper teeth", "L; l el; the tongue shows behind the upper teeth",
-        "etc; ch d dh en g hh jh k n ng r s sh t th y z zh; teeth together: his C D G K N R S TH Y Z and "
-        "those made like them", "rest; sil sp; lips together and relaxed",
-    ),
-    "eVis": _list_groups(
-        "aw; aw; diphthong: open, then rounding", "ay; ay; diphthong: open, then spreading",
-        "ey; ey; diphthong: half open, then spreading", "ow; ow; diphthong: rounded, then narrower",
-        "oy; oy; diphthong: rounded, then spreading", "high; iy ih ix; high front vowels: jaw nearly shut, lips spread",
-        "mid; eh ax axr er; mid vowels, front and central: jaw half shut, lips slack",
-        "low; aa ae ah; low vowels: the jaw drops", "back; ao uh uw; back vowels: lips rounded", _BILABIAL,
-        _LABIODENTAL, "dental; th dh; the tongue's tip at or between the teeth: the jaw stays a little open for it",
-        "alveolar; t d n en; the tongue at the gum, lips free to do what the neighbours want",
-        "sibilant; s z; teeth together", "palatal; sh zh ch jh; teeth together, lips pushed forward",
-        "hidden; k g ng hh; made at the back: nothing of it shows, the neighbours decide",
-        "glide; l el y; the tongue raised, lips not rounded", "rounded; w r; lips rounded or pushed forward", _SILENCE,
-    ),
-    "phone": tuple(UnitGroup(phone, phone, "itself") for phone in PHONES),
-}  # fmt: skip
-_UNCOUNTED = {"sVis": "silence", "pbVis": "rest", "phone": "sp"}  # units that the paper's count leaves out
-
-
-_UNITS_OF = {name: {p: group.unit for group in groups for p in group.phones.split()} for name, groups in GROUPS.items()}
-UNIT_SETS = {name: UnitSet(name, of, frozenset(_UNCOUNTED.get(name, "").split())) for name, of in _UNITS_OF.items()}
+UNIT_SETS = {
+    "2vis": _read_own("2vis"),
+    "sVis": _read_own("sVis", "silence"),
+    "pbVis": _read_own("pbVis", "rest"),
+    "eVis": _read_own("eVis"),
+    "phone": UnitSet("phone", {phone: phone for phone in PHONES}, frozenset(["sp"])),
+}
 """The unit sets in the order of the paper's Table 1, except sVis, which is placed by its size."""
 VISEME_SET = UnitSet("viseme", VISEME_OF)  # the 13 visemes of Xie & Liu 2007, Table 1; not one of the five
 

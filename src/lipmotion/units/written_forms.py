@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Iterator
 from functools import cache
 
-from lipmotion.units.spelling import parse_table
+from lipmotion.units.spelling import parse_table, read_table
 
 Reading = tuple[str, ...]
 Forms = tuple[tuple[str, str | Callable[[str], Iterator[str]]], ...]
@@ -25,38 +25,10 @@ MONTHS = "january february march april may june july august september october no
 _MONTHS = {name[:3]: name for name in MONTHS}
 ORDINALS = parse_table("one=first two=second three=third five=fifth eight=eighth nine=ninth twelve=twelfth")
 """The ordinals that do not end in ``th`` after the cardinal."""
-CURRENCIES = parse_table(
-    "$=dollars_cents_bucks £=pounds_pence_quid €=euros_cents_euro ¥=yen_sen_yen ₹=rupees_paise_rupees ₩=won_jeon_won "
-    "¢=cents_cents_cents"
-)
-"""Many of each, of its parts, and how it is also called."""
+CURRENCIES = {sign: tuple(names.split()) for sign, names in read_table("currencies").items()}
 MAGNITUDES = {"h": "hundred", "k": "thousand", "m": "million", "b": "billion", "t": "trillion"}
 """By the first letter, which the whole names begin with, too: ``mn``, ``bn``, ``million``."""
-UNITS = parse_table(
-    "km=kilometers cm=centimeters mm=millimeters m=meters kg=kilograms mg=milligrams g=grams lb=pounds lbs=pounds "
-    "oz=ounces km/h=kilometers_per_hour kph=kilometers_per_hour m/s=meters_per_second mi=miles yd=yards ft=feet "
-    "in=inches ml=milliliters l=liters hz=hertz khz=kilohertz mhz=megahertz ghz=gigahertz kb=kilobytes tb=terabytes "
-    "mb=megabytes gb=gigabytes kw=kilowatts kwh=kilowatt_hours w=watts v=volts ms=milliseconds s=seconds sec=seconds "
-    "secs=seconds min=minutes mins=minutes hr=hours hrs=hours h=hours yrs=years px=pixels fps=frames_per_second "
-    "db=decibels °=degrees mph=miles_per_hour %=percent μs=microseconds μm=micrometers μg=micrograms "
-    "kbps=kilobits_per_second mbps=megabits_per_second gbps=gigabits_per_second mb/s=megabytes_per_second "
-    "gb/s=gigabytes_per_second km/hr=kilometers_per_hour"
-)
-ABBREVIATIONS = parse_table(
-    "Dr=doctor|drive Mr=mister Mrs=missus Ms=miz Prof=professor Gov=governor Sen=senator Rep=representative "
-    "Gen=general Col=colonel Lt=lieutenant Sgt=sergeant Capt=captain Rev=reverend Hon=honorable Mt=mount Ft=fort "
-    "jr=junior sr=senior vs=versus|v_s etc=et_cetera e.g=for_example|e_g i.e=that_is|i_e a.k.a=a_k_a|also_known_as "
-    "approx=approximately dept=department ave=avenue blvd=boulevard inc=inc|incorporated ltd=limited st=street|saint "
-    "corp=corporation|corp jan=january|jan feb=february aug=august sept=september oct=october nov=november "
-    "dec=december mon=monday tues=tuesday thurs=thursday fri=friday ph.d=p_h_d"
-)
-"""Without the full stop; those with a capital stand before a name."""
-SIGNS = parse_table(
-    "±=plus_or_minus ≈=about ≥=at_least ≤=at_most ≠=is_not "
-    "&=and @=at +=plus|and ×=times|by ÷=divided_by #=hashtag|number|hash ~=about -=minus|negative −=minus|negative "
-    "–=to w/=with w/o=without .=dot /=slash _=underscore :=colon"
-) | {"=": "equals"}
-"""Signs that are said where they stand alone, and in addresses."""
+UNITS, ABBREVIATIONS, SIGNS = map(read_table, ("measures", "abbreviations", "signs"))
 PARTS = "War|Part|Chapter|Act|Scene|Volume|Book|Episode|Section|Phase|Type|Level|Class|Round|Title|Bowl|Rocky|Stage"
 """What is counted by cardinals: ``Chapter IV``, but ``Henry VIII``."""
 
@@ -244,9 +216,9 @@ SAID: dict[str, Callable[[str], str]] = {
     "e": lambda amount: _cardinal(_thousands(amount)),
     "k": lambda amount: _hundreds(_thousands(amount)),
     "x": lambda letters: MAGNITUDES["h" if letters[0] == "h" else letters.strip()[0].lower()],
-    "s": lambda sign: CURRENCIES[sign].split()[0],
-    "S": lambda sign: CURRENCIES[sign].split()[1],
-    "b": lambda sign: CURRENCIES[sign].split()[2],
+    "s": lambda sign: CURRENCIES[sign][0],
+    "S": lambda sign: CURRENCIES[sign][1],
+    "b": lambda sign: CURRENCIES[sign][2],
     "u": lambda unit: UNITS["".join(unit.lower().split())],
     "v": lambda unit: _COUNTED.sub(_singular, f"one {UNITS[unit.lower()]}").removeprefix("one "),
     "r": lambda numeral: _cardinal(_roman(numeral)),
@@ -268,7 +240,7 @@ DOMAIN = "(?:com|org|net|edu|gov|io|uk|de|ai|tv)"
 PARTED = "([3-9]|12|16|20|32|64)"
 NUMERAL = "((?:XL|L?X{0,3})(?:IX|IV|V?I{0,3}))"
 TITLE = "|".join(name for name in ABBREVIATIONS if name[0].isupper())
-_NAMES = {each.split()[0] for each in UNITS.values()} | set(" ".join(CURRENCIES.values()).split())
+_NAMES = {each.split()[0] for each in UNITS.values()} | set().union(*CURRENCIES.values())
 _COUNTED: re.Pattern[str] = re.compile(rf"((?:^|\band )one )({'|'.join(sorted(_NAMES))})\b")
 NUMERIC: Forms = (
     (r"(?:\+\d{1,3}[ .-]?|1[-.])?(?:\(\d{3}\)[ -]?|\d{3}[-.])?\d{3}-\d{4}|\d{3}\.\d{3}\.\d{4}|\+\d{7,14}", _telephone),

@@ -16,19 +16,13 @@ from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_err
 Pictures = NDArray[np.uint8]
 Array = NDArray[np.float64]
 
-STILL_SHARE = 0.1
-"""Share of the frames of a clip, those in which least moves, from which noise is estimated."""
-DIFFERENCE_GAIN = 6.0
-"""Variance of the second difference 1, −2, 1 of independent values of variance 1."""
-ROUNDING_VARIANCE = 1 / 12
-"""Variance of rounding to whole grey levels."""
-FIELD_SCALE = 2
-"""Height and width of the field of noise, in heights and widths of a picture."""
+STILL_SHARE = 0.1  # share of the frames of a clip, those in which least moves, from which noise is estimated
+DIFFERENCE_GAIN = 6.0  # variance of the second difference 1, −2, 1 of independent values of variance 1
+ROUNDING_VARIANCE = 1 / 12  # variance of rounding to whole grey levels
+FIELD_SCALE = 2  # height and width of the field of noise, in heights and widths of a picture
 WHITE = 255
-LARGEST_SPREAD_PX = 3.0
-"""Noise is taken to be spread over no more: what is smoother is movement."""
-MIN_CORRELATION = 0.02
-"""Neighbouring pixels that are correlated less are taken as independent."""
+LARGEST_SPREAD_PX = 3.0  # noise is taken to be spread over no more: what is smoother is movement
+MIN_CORRELATION = 0.02  # neighbouring pixels that are correlated less are taken as independent
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +138,7 @@ def camera_noise_from_arrays(arrays: Arrays) -> CameraNoise:
         return CameraNoise(covariance, stored["noise_spread_px"])
 
 
-EIGENVALUE_TOLERANCE = 1e-6
-"""An eigenvalue may be so far below 0 by rounding, grey²."""
+EIGENVALUE_TOLERANCE = 1e-6  # an eigenvalue may be so far below 0 by rounding, grey²
 NOISE_ARRAYS = {
     "noise_covariance": ArraySpec(np.float64, "3 3", -(255.0**2), 255.0**2),
     "noise_spread_px": ArraySpec(np.float64, "2", 0, LARGEST_SPREAD_PX),

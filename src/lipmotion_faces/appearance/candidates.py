@@ -17,17 +17,14 @@ Values = NDArray[np.float32]
 Pictures = NDArray[np.uint8]
 Index = NDArray[np.intp]
 
-CANDIDATES = 500
-"""Number of candidate mouths. Source: Xie & Liu 2007, §6.1."""
-ROUNDS = 8
-"""Rounds in which the centres of the groups are moved: more did not lower the error on GRID."""
+CANDIDATES = 500  # number of candidate mouths. Source: Xie & Liu 2007, §6.1
+ROUNDS = 8  # rounds in which the centres of the groups are moved: more did not lower the error on GRID
 MIXED_CANDIDATES, MIXTURE_SHARE = 20, 0.95
 """Recorded mouths of which a predicted one is mixed, and the share of the mixture."""
 MIN_NEARNESS = 1e-3
 """The furthest of them is penalised as if its squared distance were smaller by this share than the largest one."""
 PICTURES_AT_ONCE = 16
-BLOCK = 2048
-"""Pictures whose distances to all candidates are in memory at a time."""
+BLOCK = 2048  # pictures whose distances to all candidates are in memory at a time
 LARGEST_DETAIL = 100
 """The largest detail of an undamaged picture, in grey levels. Of 499 candidates of GRID s1, one has more (139): an
 error of the video left a blue square in it. The others have at most 70."""
@@ -184,8 +181,7 @@ def square_distances(some: Values, others: Values) -> Values:
     return np.maximum(lengths - 2 * products, 0)
 
 
-LARGEST_COEFFICIENT = 1e6
-"""No coefficient of a picture is larger: 255 · √D of D pixels, and pictures have at most 10⁷."""
+LARGEST_COEFFICIENT = 1e6  # no coefficient of a picture is larger: 255 · √D of D pixels, and pictures have at most 10⁷
 
 
 def _find_nearest(values: Values, others: Values) -> Index:
@@ -226,8 +222,7 @@ class RefinementOptions:
             raise InputError(f"{self.neighbours} neighbours, required at least 1")
 
 
-STEADY = RefinementOptions()
-"""The default: one candidate for all colours, and steady detail."""
+STEADY = RefinementOptions()  # the default: one candidate for all colours, and steady detail
 PAPER = RefinementOptions(together=False, steadiness=0.0, neighbours=1)
 """The refinement of the paper: the nearest candidate of every colour and frame."""
 

@@ -19,16 +19,13 @@ Array = NDArray[np.float64]
 Floats = NDArray[np.floating[Any]]
 Scenes = Sequence[tuple[int, int]]
 
-FRAME_CELLS = 32
-"""Cells of the thumbnail of the whole frame along its longer side."""
+FRAME_CELLS = 32  # cells of the thumbnail of the whole frame along its longer side
 UPPER_FACE = (-54.0, -45.0, 54.0, 42.0)
 EYES = (-50.0, -14.0, 50.0, 14.0)
 """Left, top, right and bottom of the regions that are compared with the face aligned, px of the face that looks
 straight ahead, from the point between the eyes."""
-LOWER_FACE = (-60.0, 42.0, 60.0, 140.0)
-"""The region that is replaced, or moves with speech: not compared."""
-FACE_STEP, EYES_STEP = 6.0, 4.0
-"""Distance of the samples of these regions, px of the face that looks straight ahead."""
+LOWER_FACE = (-60.0, 42.0, 60.0, 140.0)  # the region that is replaced, or moves with speech: not compared
+FACE_STEP, EYES_STEP = 6.0, 4.0  # distance of the samples of these regions, px of the face that looks straight ahead
 MIN_ORDINARY = (0.2, 0.2, 0.2)
 """Least ordinary difference of neighbouring frames, in the whole frame and the upper face, levels, and of the
 place of the face, px of the frame: smaller differences are not seen."""
@@ -36,18 +33,12 @@ place of the face, px of the frame: smaller differences are not seen."""
 
 @dataclass(frozen=True, eq=False)
 class FrameDescriptors:
-    """What T frames look like, in levels of green.
+    """What T frames look like, in levels of green."""
 
-    whole : thumbnails of the whole frame; the cells of the lower face are 0 in all of them [shape=(T, A)]
-    face  : the upper face, aligned [shape=(T, B)]
-    eyes  : the eyes, aligned [shape=(T, C)]
-    place : x and then y of the eye corners and the mouth in the frame, px [shape=(T, 6)]
-    """
-
-    whole: Array
-    face: Array
-    eyes: Array
-    place: Array
+    whole: Array  # thumbnails of the whole frame; the cells of the lower face are 0 in all of them [shape=(T, A)]
+    face: Array  # the upper face, aligned [shape=(T, B)]
+    eyes: Array  # the eyes, aligned [shape=(T, C)]
+    place: Array  # x and then y of the eye corners and the mouth in the frame, px [shape=(T, 6)]
 
     def __len__(self) -> int:
         return len(self.whole)
@@ -161,18 +152,14 @@ USUAL_RUN_S = 4.0
 """A run of this length costs as much as a join at which everything moves as usual; longer ones cost less."""
 CHOICE_COST_RANGE = 1.0
 """Joins whose cost exceeds the least one by less than this are chosen by chance, so that no rhythm is seen."""
-FADE_S = 0.56
-"""Time over which a jump is cross-faded; the head moves from one place to the other in it."""
+FADE_S = 0.56  # time over which a jump is cross-faded; the head moves from one place to the other in it
 REPEAT_COST, REPEAT_S = 4.0, 10.0
 """What going to frames that were just shown costs, and in which time it falls to 1/e of this."""
-REPEATS_COST = 3.0
-"""What an order costs all of whose frames are shown again within ``REPEAT_S``."""
+REPEATS_COST = 3.0  # what an order costs all of whose frames are shown again within ``REPEAT_S``
 BUSY_CHANGE_RATIO, BUSY_S = 2.5, 0.12
 """Eyes that change by more than this many times the median change blink or look elsewhere: no join so near, s."""
-BUSY_COST = 10.0
-"""What a join there costs: more than any other."""
-MAX_COMPARED_FRAMES = 1500
-"""In longer backgrounds no jumps are searched, as every pair of frames would be compared."""
+BUSY_COST = 10.0  # what a join there costs: more than any other
+MAX_COMPARED_FRAMES = 1500  # in longer backgrounds no jumps are searched, as every pair of frames would be compared
 TRIES = 32
 """Orders that are drawn; the one with the least cost of its worst join, its last frame and its repeats is returned."""
 _DYNAMICS = ((-2, 0.125), (-1, 0.375), (0, 0.375), (1, 0.125))

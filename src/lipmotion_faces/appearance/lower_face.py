@@ -20,22 +20,17 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Pictures = NDArray[np.uint8]
 
-WIDTH, HEIGHT = 128, 128
-"""Size of a picture of the lower face, px."""
-CORNER = (-64.0, 32.0)
-"""Upper left corner of the region, in px from the point between the eyes, y down."""
+WIDTH, HEIGHT = 128, 128  # size of a picture of the lower face, px
+CORNER = (-64.0, 32.0)  # upper left corner of the region, in px from the point between the eyes, y down
 LARGEST_SCALE = 4
 """Most samples a pixel: an eye distance of 360 px. More would make the edge of the region too long to clone."""
-TOP_PX = 50.0
-"""Where the part that is replaced begins: under the nose, px below the eyes."""
+TOP_PX = 50.0  # where the part that is replaced begins: under the nose, px below the eyes
 MARGIN_PX = 3.0
 """The part that is replaced ends so far above the tip of the chin at its highest: on skin, not on neck or collar."""
-JAW_SHARE = 1.15
-"""Half of its width, as a share of half the distance between the ends of the tracked jaw line."""
+JAW_SHARE = 1.15  # half of its width, as a share of half the distance between the ends of the tracked jaw line
 NARROWEST_PX, WIDEST_PX = 34.0, 58.0
 """Limits of half its width: the mouth must fit in, and it must fit into the picture."""
-MIN_BOTTOM_PX = 106.0
-"""The part that is replaced holds the mouth, whatever the chin."""
+MIN_BOTTOM_PX = 106.0  # the part that is replaced holds the mouth, whatever the chin
 MOUTH_AXES_PX = 34.0, 26.0
 """Half width and half height of the ellipse in which the mouth is replaced, about the middle of the mouth region."""
 CHEEK_PX = 12, 10
@@ -148,24 +143,16 @@ def compare_faces(one: NDArray[np.float32], other: NDArray[np.float32]) -> float
     return float(one @ other)
 
 
-STILL_PX = 74.0
-"""Above this, about the middle of the mouth, nothing is moved."""
-ABOVE_PX, BELOW_PX = 8.0, 4.0
-"""The skin so far above and below the tip of the chin moves as the tip does;"""
-NECK_PX = 26.0
-"""and so far below that, nothing."""
-HINGE_PX = 75.0
-"""Half the distance between the joints of the jaw: the nearer to them, the less it moves."""
-SIDE_PX = 46.0, 60.0
-"""Between these distances from the middle the movement ends: beyond is what is behind the head."""
-LARGEST_PX = 14.0
-"""The chin is not moved further: more would fold the neck."""
+STILL_PX = 74.0  # above this, about the middle of the mouth, nothing is moved
+ABOVE_PX, BELOW_PX = 8.0, 4.0  # the skin so far above and below the tip of the chin moves as the tip does;
+NECK_PX = 26.0  # and so far below that, nothing
+HINGE_PX = 75.0  # half the distance between the joints of the jaw: the nearer to them, the less it moves
+SIDE_PX = 46.0, 60.0  # between these distances from the middle the movement ends: beyond is what is behind the head
+LARGEST_PX = 14.0  # the chin is not moved further: more would fold the neck
 LARGEST_RISE_SHARE, LARGEST_DROP_SHARE = 0.6, 1.2
 """Nor further than these shares of its distance to what is not moved: more would fold or tear a short chin."""
-MIN_PX = 0.05
-"""A smaller movement is none."""
-A = -0.5
-"""The parameter of cubic convolution (Keys 1981)."""
+MIN_PX = 0.05  # a smaller movement is none
+A = -0.5  # the parameter of cubic convolution (Keys 1981)
 
 
 def mark_moved(scale: int) -> Mask:

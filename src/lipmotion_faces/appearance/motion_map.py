@@ -17,24 +17,17 @@ from lipmotion_faces.appearance.candidates import choose_candidates, square_dist
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
-COMPONENTS = 20
-"""Principal components of the motion that are regressors."""
-LIKENESS_COMPONENTS = 12
-"""The first of them, in which likenesses to recorded poses are measured."""
-CENTRES = 400
-"""Recorded poses to which the likeness is a regressor."""
-FRAMES_PER_CENTRE = 3
-"""So many frames are needed for each of them."""
-WIDTH = 4.0
-"""Standard deviation of the Gaussian of likeness, in deviations of a component."""
-WEIGHT = 10.0
-"""Weight of the likenesses beside the components, against which the ridge is."""
+COMPONENTS = 20  # principal components of the motion that are regressors
+LIKENESS_COMPONENTS = 12  # the first of them, in which likenesses to recorded poses are measured
+CENTRES = 400  # recorded poses to which the likeness is a regressor
+FRAMES_PER_CENTRE = 3  # so many frames are needed for each of them
+WIDTH = 4.0  # standard deviation of the Gaussian of likeness, in deviations of a component
+WEIGHT = 10.0  # weight of the likenesses beside the components, against which the ridge is
 RIDGE, RIDGE_FRAMES = 1.0, 1000
 """The ridge parameter of T frames is RIDGE + (RIDGE_FRAMES / T)²: short footage is trusted less."""
 OUTER_PERCENTAGE = 0.2
 """Percentage of the frames at each end of a component beyond which it is cut off: no map holds far from all footage."""
-MIN_DEVIATION = 1e-4
-"""A channel that moves less, in its unit, is left out."""
+MIN_DEVIATION = 1e-4  # a channel that moves less, in its unit, is left out
 
 
 @dataclass(frozen=True, eq=False)

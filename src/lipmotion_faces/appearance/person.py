@@ -43,16 +43,12 @@ Floats = NDArray[np.float32]
 Index = NDArray[np.intp]
 Pictures = NDArray[np.uint8]
 
-TRAINING_PICTURES = 980
-"""Pictures of which the principal components are computed. Source: Xie & Liu 2007, §5."""
-JAW_COMPONENTS = 12
-"""Principal components of the jaw, of each colour."""
-JAW_CANDIDATES = 120
-"""Recorded lower faces whose detail the jaw has."""
+TRAINING_PICTURES = 980  # pictures of which the principal components are computed. Source: Xie & Liu 2007, §5
+JAW_COMPONENTS = 12  # principal components of the jaw, of each colour
+JAW_CANDIDATES = 120  # recorded lower faces whose detail the jaw has
 JAW_OPTIONS = candidates.RefinementOptions(steadiness=0.3)
 PICTURES_PER_BLOCK = 256
-EDGE_PX = 3
-"""The jaw's pictures are its own so far beyond the part that is replaced: cloning reads its edge."""
+EDGE_PX = 3  # the jaw's pictures are its own so far beyond the part that is replaced: cloning reads its edge
 LIP_DISTANCES = ("opening", "width", "outer")
 """Channels in which the mixture of recorded mouths is to be like the motion."""
 DISTANCE_GAINS = np.array([1.0, 1.1, 1.0])
@@ -62,8 +58,7 @@ DISTANCE_WEIGHTS = np.array([800.0, 1600.0, 800.0])
 alone shows two thirds of the width's deviation (docs/results/video.md)."""
 LONGEST_CLOSURE_S = 0.3
 """A closure that lasts no longer shows one recorded mouth; in pauses mouths are mixed, as they live on."""
-MOUTH_RIDGE = 1e-3
-"""Ridge of the regression of the jaw on the mouth, as a share of the variance of the mouth."""
+MOUTH_RIDGE = 1e-3  # ridge of the regression of the jaw on the mouth, as a share of the variance of the mouth
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,10 +311,8 @@ def enlarge(eigenlips: Eigenlips, scale: int) -> Eigenlips:
     )
 
 
-CRF = 6.0
-"""Quality of the pictures: detail is what they are kept for."""
-PARTS = ("mouth", "jaw", "from_motion", "noise")
-"""Prefixes of the names of the arrays of parts."""
+CRF = 6.0  # quality of the pictures: detail is what they are kept for
+PARTS = ("mouth", "jaw", "from_motion", "noise")  # prefixes of the names of the arrays of parts
 REMEDY = "build the face again"
 
 

@@ -28,8 +28,7 @@ CLEARANCE = 4
 """A pixel is interpolated from neighbours at distance s only where the edge of the region is further away than this
 times s. At least 3, the reach of the interpolation. With 4 the error for noise of grey levels is below 1 grey level;
 with 5 it is a third of that, at a quarter more time (docs/results/video.md)."""
-LEVELS = 4
-"""The pixels of the widest grid are 2 to this power apart, px."""
+LEVELS = 4  # the pixels of the widest grid are 2 to this power apart, px
 TAPS = ((-3, -1 / 16), (-1, 9 / 16), (1, 9 / 16), (3, -1 / 16))
 """Offset, in spacings of the grid that is filled, and weight of the four neighbours of cubic interpolation."""
 
@@ -43,13 +42,10 @@ class NestedGrids:
     grid every pixel of the region is a node. For a function that satisfies the Laplace equation this loses little: the
     further from the edge, the smoother it is.
     Source: the adaptive grid of Agarwala 2007, with cubic instead of linear interpolation.
-
-    region : bool array [shape=(H, W)]
-    nodes  : of each grid, finest first: numbers of the pixels of the picture, counted row by row
     """
 
-    region: NDArray[np.bool_]
-    nodes: tuple[Index, ...]
+    region: NDArray[np.bool_]  # bool array [shape=(H, W)]
+    nodes: tuple[Index, ...]  # of each grid, finest first: numbers of the pixels of the picture, counted row by row
 
     def shape(self, level: int) -> tuple[int, int]:
         """Return the number of rows and columns of a grid."""
@@ -154,10 +150,8 @@ Mask = NDArray[np.bool_]
 Pictures = NDArray[np.uint8] | NDArray[np.floating[Any]]
 
 COLOURS = 3
-LARGEST_EDGE = 2048
-"""Largest number of pixels on the edge of a region; the matrix grows with its square, to 100 MB."""
-CHUNK = 1 << 17
-"""About the number of pixels that are interpolated at once: what fits into the cache of a processor."""
+LARGEST_EDGE = 2048  # largest number of pixels on the edge of a region; the matrix grows with its square, to 100 MB
+CHUNK = 1 << 17  # about the number of pixels that are interpolated at once: what fits into the cache of a processor
 BATCH = 64
 
 

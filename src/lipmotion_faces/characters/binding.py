@@ -45,18 +45,15 @@ BINDING_ARRAYS = {
 UPPER_REACH, LOWER_REACH, JAW_REACH = 0.32, 0.45, 0.65
 """How far a control point of the upper lip and the corners, of the lower lip, of the jaw reaches along the surface, in
 eye distances."""
-MAX_WEIGHTS = 8
-"""Most control points that a vertex follows."""
+MAX_WEIGHTS = 8  # most control points that a vertex follows
 MIN_WEIGHT = 1e-3
 VERTICES_AT_ONCE = 1 << 13
 SOFTNESS = 0.03
 """Added to all distances, in eye distances: without it every control point would stick out of its surroundings."""
-PLATEAU_SHARE = 0.4
-"""Within this share of the reach of a control point nothing of a vertex is fixed to the head."""
+PLATEAU_SHARE = 0.4  # within this share of the reach of a control point nothing of a vertex is fixed to the head
 JAW_FOLLOWERS = (152, 199, 200, 175)
 """What lies inside the mouth below the lips (lower teeth, tongue) follows the mean of these points."""
-_CAVITY_REACH = 0.75
-"""The mouth's inside reaches so many eye distances back from the lips, and so far down."""
+_CAVITY_REACH = 0.75  # the mouth's inside reaches so many eye distances back from the lips, and so far down
 
 
 def bind(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> ControlBinding:

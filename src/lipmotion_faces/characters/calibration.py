@@ -38,17 +38,14 @@ def describe_character(character: DrivenCharacter) -> Iterator[str]:
         yield f"{'moved by':14} {len(placement.points)} control points, {len(character.binding.rows)} vertices follow"
 
 
-Sources = Mapping[str, Sequence[float]]
-"""By the name of a curve its value in each of ``POSES``."""
+Sources = Mapping[str, Sequence[float]]  # by the name of a curve its value in each of ``POSES``
 POSES = ("open", "closed", "rounded")
-PHONES = ("aa", "m", "uw")
-"""The phones that have these mouths."""
+PHONES = ("aa", "m", "uw")  # the phones that have these mouths
 OPENINGS, WIDTHS = (0.25, 0.0, 0.06), (1.0, 0.98, 0.85)
 """Their openings in eye distances (the first is as wide as talkers go), and widths relative to the mouth at rest."""
 RATE_HZ, PHONE_S, PAUSE_S = 100.0, 0.3, 0.5
 DIGITS = 6
-MIN_CHANGE = 1e-3
-"""A control that changes by less between two poses does not follow them."""
+MIN_CHANGE = 1e-3  # a control that changes by less between two poses does not follow them
 
 
 def calibrate_rows(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str, Mapping[str, float]]) -> list[RigRow]:

@@ -45,14 +45,11 @@ MIN_SHARE = 1e-5
 head are written with rounded numbers."""
 LARGEST_NUMBER = 1e9
 LARGEST_LIBRARY_BYTES = 1 << 20
-MAX_CORNERS = 1000
-"""Most corners of a polygon."""
+MAX_CORNERS = 1000  # most corners of a polygon
 LONGEST_LINE = 1 << 16
-MIN_OPAQUE_LEVEL = 250
-"""A texture with pixels of a lower opacity than this, of 255, has holes."""
+MIN_OPAQUE_LEVEL = 250  # a texture with pixels of a lower opacity than this, of 255, has holes
 _NO_COLOUR = (np.nan,) * 3
-_SHININESS = 60.0
-"""The specular exponent (``Ns``) of a gloss of 1/2."""
+_SHININESS = 60.0  # the specular exponent (``Ns``) of a gloss of 1/2
 _REST = rb")(?=\s|\Z)[^\r\n\\]*(?:\\(?:\r?\n)?[^\r\n\\]*)*)"
 _STATEMENTS = re.compile(rb"(?:\A|(?<=[\r\n]))[ \t]*((?:v|vt|f|o|g|usemtl|mtllib" + _REST)
 _LOOKS = re.compile(rb"(?:\A|(?<=[\r\n]))[ \t]*((?:newmtl|map_Kd|Kd|Ns|d|Tf" + _REST)
@@ -318,8 +315,7 @@ def read_character(path: str | Path) -> Mesh:
 
 
 JAW_OPEN = "jawOpen"
-WIDEST_RAD = np.radians(22.0)
-"""How far a jaw turns at weight 1."""
+WIDEST_RAD = np.radians(22.0)  # how far a jaw turns at weight 1
 
 
 def with_jaw(mesh: Mesh) -> Mesh:
@@ -379,8 +375,7 @@ def load_character(
         raise InputError(text if str(path) in text else f"{path}: {text}") from error
 
 
-MIN_DISPLACEMENT = 0.02
-"""A blendshape that moves no lip point by this many eye distances is none of the mouth."""
+MIN_DISPLACEMENT = 0.02  # a blendshape that moves no lip point by this many eye distances is none of the mouth
 MAX_SHAPES = 200
 
 

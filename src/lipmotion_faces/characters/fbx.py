@@ -15,8 +15,7 @@ from pathlib import Path
 from lipmotion.errors import ExportError, MissingDependencyError
 from lipmotion.storage.files import atomic_file
 
-LONGEST_S = 1800
-"""Half an hour is far more than an hour of speech takes."""
+LONGEST_S = 1800  # half an hour is far more than an hour of speech takes
 SCRIPT = """
 import os, sys
 import bpy

@@ -26,7 +26,6 @@ ALLOWANCE = {
     "morph targets": 20_000,
     "displacements": 8_000_000,
     "numbers": 80_000_000,
-    "compressed bytes": 3 << 24,
     "bytes of pictures": 1 << 28,
     "pixels of pictures": 1 << 27,
 }
@@ -35,7 +34,7 @@ ALLOWANCE = {
 joints        : of all skins, or their matrices
 parts         : primitives, counted again for every node that shows them
 morph targets : of all parts;  displacements : vertices that they, or expressions, move
-numbers       : of the arrays that are read;  compressed bytes : of them, what is decoded from meshopt
+numbers       : of the arrays that are read
 """
 MAX_VERTICES = ALLOWANCE["vertices"]
 

@@ -33,15 +33,12 @@ from lipmotion.types.values import (
     whole,
 )
 from lipmotion_faces.characters.file_limits import ALLOWANCE, Budget
-from lipmotion_faces.characters.meshopt import decode_attributes, decode_exponents, decode_indices, decode_triangles
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-COMPRESSION = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-LARGEST_NUMBER = 1e9
-"""Largest plausible number of a file: a place, a factor."""
-MAX_GROUPS = 8
-"""Most groups of four joints a vertex."""
+COMPRESSIONS = {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"}
+LARGEST_NUMBER = 1e9  # largest plausible number of a file: a place, a factor
+MAX_GROUPS = 8  # most groups of four joints a vertex
 _LISTS = (
     *("accessors", "animations", "buffers", "bufferViews", "images", "materials", "meshes", "nodes", "scenes", "skins"),
     "textures",
@@ -51,8 +48,7 @@ _NAME = if_fits(text(1000))
 _WORD = text(1000)
 _SIZE = whole(0, _LARGEST_INTEGER)
 _NUMBER = number(-LARGEST_NUMBER, LARGEST_NUMBER)
-ASSET = members({"asset": members({"version": text(20)}, ["version"])}, ["asset"])
-"""What a document of any version has."""
+ASSET = members({"asset": members({"version": text(20)}, ["version"])}, ["asset"])  # what a document of any version has
 
 
 _ANY_NUMBER = whole(-_LARGEST_INTEGER, _LARGEST_INTEGER)
@@ -120,7 +116,10 @@ def build_schema(json: Mapping[str, Any]) -> Schema:
         "accessors": members(accessor, ["componentType", "count", "type"]),
         "animations": if_fits(members(_build_animation_schema(to("nodes"), to("accessors")))),
         "buffers": members({"uri": text(_LARGEST_INTEGER), "byteLength": _SIZE}),
-        "bufferViews": members(_build_view_schema(to("buffers")), ["buffer", "byteLength"]),
+        "bufferViews": members(
+            {"buffer": to("buffers"), "byteOffset": _SIZE, "byteLength": _SIZE, "byteStride": whole(0, 1 << 16)},
+            ["buffer", "byteLength"],
+        ),
         "images": members({"uri": text(_LARGEST_INTEGER), "bufferView": to("bufferViews")}),
         "materials": members(_build_material_schema(to("textures"), list_of)),
         "meshes": members(mesh, ["primitives"]),
@@ -146,19 +145,6 @@ def _build_animation_schema(node: Schema, accessor: Schema) -> dict[str, Schema]
     }
 
 
-def _build_view_schema(buffer: Schema) -> dict[str, Schema]:
-    place = {"buffer": buffer, "byteOffset": _SIZE, "byteLength": _SIZE}
-    packed = {
-        **{**place, "byteStride": whole(1, 256), "count": _SIZE, "filter": _WORD},
-        "mode": one_of(["ATTRIBUTES", "TRIANGLES", "INDICES"]),
-    }
-    needed = ["buffer", "byteLength", "byteStride", "count", "mode"]
-    return {
-        **{**place, "byteStride": whole(0, 1 << 16)},
-        "extensions": members(dict.fromkeys(COMPRESSION, members(packed, needed))),
-    }
-
-
 def _build_material_schema(texture: Schema, list_of: Any) -> dict[str, Schema]:
     moved = members({"offset": list_of(2), "scale": list_of(2), "rotation": _NUMBER})
     placed = {"index": texture, "extensions": members({"KHR_texture_transform": moved})}
@@ -177,8 +163,7 @@ JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 MAX_CHUNKS = 100
 LONGEST_NAME_CHARACTERS = 1000
 READABLE = {
-    *("KHR_mesh_quantization", "EXT_meshopt_compression", "KHR_meshopt_compression"),
-    *("KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "KHR_texture_transform"),
+    *("KHR_mesh_quantization", "KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "KHR_texture_transform"),
     *("KHR_materials_unlit", "KHR_lights_punctual", "VRM", "VRMC_vrm", "VRMC_springBone", "VRMC_node_constraint"),
     *("VRMC_materials_mtoon", "KHR_xmp_json_ld", "KHR_animation_pointer", "VRMC_vrm_animation"),
 }
@@ -188,18 +173,13 @@ extensions are accepted as well."""
 
 @dataclass(frozen=True, eq=False)
 class GltfDocument:
-    """The JSON of a glTF file, and its buffers.
-
-    parts   : what is used of it, of the types and in the ranges of ``build_schema``
-    budget  : what has been read so far
-    buffers : by number; a buffer that only the extension for compression could use is missing
-    """
+    """The JSON of a glTF file, and its buffers."""
 
     json: dict[str, Any]
-    parts: Mapping[str, Any]
+    parts: Mapping[str, Any]  # what is used of it, of the types and in the ranges of ``build_schema``
     folder: Path
-    budget: Budget
-    buffers: dict[int, memoryview] = field(default_factory=dict)
+    budget: Budget  # what has been read so far
+    buffers: dict[int, memoryview] = field(default_factory=dict)  # by number
 
     def get(self, name: str) -> list[dict[str, Any]]:
         """Return a list of objects of the document; none if it is missing."""
@@ -248,8 +228,8 @@ def read_gltf_document(path: Path) -> GltfDocument:
     except SchemaError as error:
         raise InputError(f"{error}; export it again") from error
     for name in document.parts.get("extensionsRequired", []):
-        if name == "KHR_draco_mesh_compression":
-            raise InputError("it is compressed by Draco, which is not read; export it without, or with meshopt")
+        if name in COMPRESSIONS:
+            raise InputError(f"it is compressed ({name}), which is not read; export it without compression")
         if name not in READABLE and not name.startswith("KHR_materials_"):
             raise InputError(f"it requires the extension {shorten(name)!r}, which is not read; export without it")
     for index, buffer in enumerate(document.get("buffers")):
@@ -300,11 +280,10 @@ def write_container(path: Path, json: dict[str, Any], body: bytes) -> None:
 
 
 class GltfArrays:
-    """Reads the accessors of a document; a compressed view is decoded once."""
+    """Reads the accessors of a document."""
 
     def __init__(self, document: GltfDocument) -> None:
         self._document = document
-        self._decoded: dict[int, memoryview] = {}
 
     def count(self, number: int) -> int:
         """Return the number of elements of an accessor, as the document says."""
@@ -375,14 +354,6 @@ class GltfArrays:
         Raises InputError: it leads out of its buffer.
         """
         view = self._document.get("bufferViews")[number]
-        packed = next((view["extensions"][name] for name in COMPRESSION if name in view.get("extensions", {})), None)
-        if packed is None:
-            return self._slice(view), view.get("byteStride", 0)
-        if number not in self._decoded:
-            self._decoded[number] = memoryview(_decode(self._slice(packed), packed, self._document.budget))
-        return self._decoded[number], packed["byteStride"]
-
-    def _slice(self, view: dict[str, Any]) -> memoryview:
         number, offset, length = view["buffer"], view.get("byteOffset", 0), view["byteLength"]
         buffer = self._document.buffers.get(number, memoryview(b""))
         if offset + length > len(buffer):
@@ -390,26 +361,11 @@ class GltfArrays:
                 f"it refers to bytes {offset} to {offset + length} of buffer {number} with {len(buffer)} bytes; "
                 "copy it again, with its buffers"
             )
-        return buffer[offset : offset + length]
-
-
-def _decode(data: memoryview, packed: dict[str, Any], budget: Budget) -> bytes:
-    count, stride, mode, kind = packed["count"], packed["byteStride"], packed["mode"], packed.get("filter", "NONE")
-    budget.spend("compressed bytes", count * stride + len(data))
-    if kind not in {"NONE", "EXPONENTIAL"}:
-        raise InputError(f"a compressed array under the filter {shorten(kind)!r}, which is not read")
-    if mode == "ATTRIBUTES":
-        elements = decode_attributes(bytes(data), count, stride)
-        return decode_exponents(elements).tobytes() if kind == "EXPONENTIAL" else elements.tobytes()
-    if stride not in {2, 4}:
-        raise InputError(f"compressed indices of {stride} bytes, required 2 or 4; export without compression")
-    indices = (decode_triangles if mode == "TRIANGLES" else decode_indices)(bytes(data), count)
-    return indices.astype("<u2" if stride == 2 else "<u4").tobytes()
+        return buffer[offset : offset + length], view.get("byteStride", 0)
 
 
 Matrix = NDArray[np.float64]
-DEEPEST_NESTING = 256
-"""Most levels of nodes."""
+DEEPEST_NESTING = 256  # most levels of nodes
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,19 +36,15 @@ Rows = NDArray[np.int64]
 UNKNOWN = (0.8, 0.72, 0.66)
 """The colour (sRGB) of a material whose texture cannot be read: a pale skin, rather than the white that is usually
 multiplied by the texture."""
-WHITE = (1.0, 1.0, 1.0)
-"""The colour of a primitive that has colours of vertices and no material."""
+WHITE = (1.0, 1.0, 1.0)  # the colour of a primitive that has colours of vertices and no material
 MIN_WEIGHT = 1e-6
-TRIANGLES = 4
-"""The mode of primitives that are lists of triangles; strips, fans, lines and points are not read."""
+TRIANGLES = 4  # the mode of primitives that are lists of triangles; strips, fans, lines and points are not read
 MIN_DISPLACEMENT = 1e-9
 """Vertices that a morph target moves by no more than this, in the unit of the file, are not stored."""
 PRESETS = {"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh", "joy": "happy", "sorrow": "sad", "fun": "relaxed"}
 """Names of presets of VRM 0.x in the words of VRM 1.0; all others are the same in both."""
-FULL_WEIGHT = 100.0
-"""Weights of VRM 0.x are per cent."""
-Bind = tuple[int, int, float]
-"""A mesh of the document, one of its morph targets, and the weight of it."""
+FULL_WEIGHT = 100.0  # weights of VRM 0.x are per cent
+Bind = tuple[int, int, float]  # a mesh of the document, one of its morph targets, and the weight of it
 
 
 class _Materials:

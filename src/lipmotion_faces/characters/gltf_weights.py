@@ -37,15 +37,11 @@ from lipmotion_faces.characters.gltf_scene import name_mesh_targets
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")
 STEP, CUBIC = "STEP", "CUBICSPLINE"
-SAMPLED_HZ = 60.0
-"""Frames a second where the keys are not even."""
-EVEN_SHARE = 0.02
-"""Keys are even where steps differ by no more than this share of one."""
-SLOWEST_HZ = 10.0
-"""Even keys further apart are those of an animator, not frames."""
+SAMPLED_HZ = 60.0  # frames a second where the keys are not even
+EVEN_SHARE = 0.02  # keys are even where steps differ by no more than this share of one
+SLOWEST_HZ = 10.0  # even keys further apart are those of an animator, not frames
 LONGEST_S = 86_400.0
-ROUNDING_FRAMES = 0.01
-"""Times are in single precision: a key may be that much beside its frame."""
+ROUNDING_FRAMES = 0.01  # times are in single precision: a key may be that much beside its frame
 KNOWN_AS = {
     "blink": ("eyeBlinkLeft", "eyeBlinkRight"),
     "blinkLeft": ("eyeBlinkLeft",),
@@ -53,12 +49,10 @@ KNOWN_AS = {
     **{mood: (PREFIX + mood,) for mood in MOODS if mood in VRM_EMOTIONS},
 }
 """Expressions of VRM that are blendshapes of ARKit, or moods."""
-STILL = 0.01
-"""Weights that change by no more than this do not move."""
+STILL = 0.01  # weights that change by no more than this do not move
 _POINTER = re.compile(r"/(nodes|meshes)/(\d{1,9})/(weights|rotation|translation)(/\d{1,9})?", re.ASCII)
 QUATERNION = ("x", "y", "z", "w")
-TURNING = (NECK, HEAD)
-"""The bones whose turns, one after the other, are those of the head."""
+TURNING = (NECK, HEAD)  # the bones whose turns, one after the other, are those of the head
 
 
 @dataclass(frozen=True, eq=False)

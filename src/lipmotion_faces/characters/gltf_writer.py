@@ -56,8 +56,7 @@ def find_named_sound(path: Path) -> tuple[Path, float] | None:
 
 
 FLOAT, UNSIGNED, UNSIGNED_BYTE = 5126, 5125, 5121
-VERTICES, INDICES = 34962, 34963
-"""Uses of buffer views, as viewers want them named."""
+VERTICES, INDICES = 34962, 34963  # uses of buffer views, as viewers want them named
 
 
 class GltfBuffer:

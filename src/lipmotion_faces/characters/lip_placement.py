@@ -21,18 +21,15 @@ Places = NDArray[np.float64]
 
 SLIT_REACH = 0.06
 """The lips meet where vertices closer than this share of the width of the jaw go different ways as the mouth opens."""
-SLIT_STEP = 0.2
-"""How different: this share of how far the jaw goes."""
+SLIT_STEP = 0.2  # how different: this share of how far the jaw goes
 DETOUR_RATIO = 2.0
 """They are on two lips if the way along the surface is this many times as long as the straight one, and more than the
 distance between neighbours."""
 LIP_LINE = 0.1
 """Vertices this close to the line between the corners, in widths of the mouth, are not joined with others at their
 place where no blendshape tells the lips apart."""
-FRONT_SHARE = 0.04
-"""Behind the foremost of such pairs by more than this share are the insides of the mouth."""
-DEPTH_WEIGHT = 0.35
-"""Distances in depth count so much where a point is looked for, for lips protrude differently."""
+FRONT_SHARE = 0.04  # behind the foremost of such pairs by more than this share are the insides of the mouth
+DEPTH_WEIGHT = 0.35  # distances in depth count so much where a point is looked for, for lips protrude differently
 EYE_CORNERS = (33, 263)
 """The outer corners of the eyes, right and left; in a list of named points they give the upright direction."""
 MAX_PAIRS, MAX_DISTANCES = 1_000_000, 1 << 30

@@ -16,22 +16,16 @@ from lipmotion_faces.characters.surface import build_surface, compute_normals, d
 
 Array = NDArray[np.float64]
 
-MIN_TURN = 1e-3
-"""Normals that a blendshape turns by less than this are left out of it."""
+MIN_TURN = 1e-3  # normals that a blendshape turns by less than this are left out of it
 
 
 @dataclass(frozen=True, eq=False)
 class HeadTurn:
-    """The rotation of a head about a place in its neck.
+    """The rotation of a head about a place in its neck."""
 
-    pivot     : the place, in the frame of the mesh [shape=(3,)]
-    share     : how far each vertex turns with the head, 0 (the body) to 1 [shape=(V,)]
-    rotations : unit quaternions x, y, z, w, one a frame of the weights; successive ones are near [shape=(T, 4)]
-    """
-
-    pivot: Array
-    share: Array
-    rotations: Array
+    pivot: Array  # the place, in the frame of the mesh [shape=(3,)]
+    share: Array  # how far each vertex turns with the head, 0 (the body) to 1 [shape=(V,)]
+    rotations: Array  # unit quaternions x, y, z, w, one a frame of the weights; successive ones are near [shape=(T, 4)]
 
 
 @dataclass(frozen=True, eq=False)

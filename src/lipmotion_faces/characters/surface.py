@@ -27,18 +27,12 @@ SAME_SIDE_COSINE = -0.2
 
 @dataclass(frozen=True, eq=False)
 class MeshSurface:
-    """How the vertices of a mesh hang together.
+    """How the vertices of a mesh hang together."""
 
-    places  : the place of every vertex; vertices that files split share one [shape=(V,)]
-    edges   : lengths of the edges between places, a symmetric sparse matrix [shape=(P, P)]
-    pieces  : the piece of the surface that each vertex belongs to [shape=(V,)]
-    normals : unit normals of the vertices [shape=(V, 3)]; 0 where no triangle is
-    """
-
-    places: Rows
-    edges: csr_array
-    pieces: Rows
-    normals: NDArray[np.float64]
+    places: Rows  # the place of every vertex; vertices that files split share one [shape=(V,)]
+    edges: csr_array  # lengths of the edges between places, a symmetric sparse matrix [shape=(P, P)]
+    pieces: Rows  # the piece of the surface that each vertex belongs to [shape=(V,)]
+    normals: NDArray[np.float64]  # unit normals of the vertices [shape=(V, 3)]; 0 where no triangle is
 
     def distances(self, sources: Rows, limit: float) -> NDArray[np.float64]:
         """Return distances along edges from N sources to every vertex [shape=(N, V)]; infinite beyond ``limit``."""

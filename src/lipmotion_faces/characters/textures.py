@@ -14,15 +14,11 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.model.mesh import Texture
 from lipmotion_faces.characters.file_limits import Budget
 
-MAX_BYTES = 400_000_000
-"""Most bytes that decoding a picture may take: a larger one is not looked at."""
-MAX_SCANS = 100
-"""Most passes over a JPEG; each takes as long as a picture."""
-DIRECT = {"RGB", "L"}
-"""Modes of pictures that are reduced as they are; all others get an opacity first."""
+MAX_BYTES = 400_000_000  # most bytes that decoding a picture may take: a larger one is not looked at
+MAX_SCANS = 100  # most passes over a JPEG; each takes as long as a picture
+DIRECT = {"RGB", "L"}  # modes of pictures that are reduced as they are; all others get an opacity first
 PICTURES = ("PNG", "JPEG", "WEBP")
-MAX_COLUMNS = 1024
-"""Textures are reduced to this many pixels across: a head of 720 rows shows no more."""
+MAX_COLUMNS = 1024  # textures are reduced to this many pixels across: a head of 720 rows shows no more
 FULL_SCALE = 65535
 
 
@@ -59,16 +55,11 @@ def read_texture(content: bytes | memoryview, budget: Budget | None = None) -> T
 
 @dataclass(frozen=True, eq=False)
 class TextureTable:
-    """Some textures, each reduced by half again and again, down to one pixel, in one array.
+    """Some textures, each reduced by half again and again, down to one pixel, in one array."""
 
-    texels : reflected light and opacity, 0 to 65535 [shape=(N, 4)]
-    levels : first texel, width and height of every reduction [shape=(L, 3)]
-    first  : the row of ``levels`` that is each texture in full; the following rows are its reductions
-    """
-
-    texels: NDArray[np.uint16]
-    levels: NDArray[np.int64]
-    first: tuple[int, ...]
+    texels: NDArray[np.uint16]  # reflected light and opacity, 0 to 65535 [shape=(N, 4)]
+    levels: NDArray[np.int64]  # first texel, width and height of every reduction [shape=(L, 3)]
+    first: tuple[int, ...]  # the row of ``levels`` that is each texture in full; the following rows are its reductions
 
     def pick(self, texture: int, in_texture: NDArray[np.float64], on_screen: NDArray[np.float64]) -> NDArray[np.int32]:
         """Return the row of ``levels`` that suits triangles, by areas in texture and on screen [each shape=(F,)]."""

@@ -121,8 +121,7 @@ def _format_matrix(values: NDArray[np.floating]) -> str:
 ROOT = "Character"
 SKELETON, ANIMATION, LOOKS, FACE = f"/{ROOT}/Skeleton", f"/{ROOT}/Animation", f"/{ROOT}/Looks", f"/{ROOT}/Face"
 JOINTS = ("body", "body/head")
-USUAL_HZ, FASTEST_HZ = 24.0, 60.0
-"""Time codes a second: the usual ones, and the most that programs show as frames."""
+USUAL_HZ, FASTEST_HZ = 24.0, 60.0  # time codes a second: the usual ones, and the most that programs show as frames
 PER_VERTEX = 'interpolation = "vertex"'
 
 

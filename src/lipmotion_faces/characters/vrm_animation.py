@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import ExportError
 from lipmotion.formats.base import MotionFormat, with_jumps
 from lipmotion.meshes.model.mesh import ANGLES, turn_head
 from lipmotion.meshes.model.shape_names import VRM_EMOTIONS, VRM_VOWELS
-from lipmotion.types import Generation, Motion
+from lipmotion.types import Generation
 from lipmotion_faces.characters.gltf_document import write_container
 from lipmotion_faces.characters.gltf_weights import read_gltf_motion
 from lipmotion_faces.characters.gltf_writer import GltfBuffer, describe_sound
@@ -28,12 +27,6 @@ EXTENSION = "VRMC_vrm_animation"
 BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")
 BONES = {"hips": 1.0, "spine": 0.1, "head": 0.5}
 """The bones, each the parent of the next, and how far above its parent each is, in metres."""
-
-
-def check(motion: Motion) -> None:
-    """Raise ExportError if motion has no vowel, or fewer than two frames."""
-    if not {*VRM_VOWELS} & {*motion.names} or len(motion.values) < 2:
-        raise ExportError("the motion has none of the vowels aa ih ou ee oh, or no two frames; write .json or .csv")
 
 
 def write(path: Path, generation: Generation, source: Mapping[str, str], _model: Mapping[str, str]) -> None:
@@ -89,4 +82,4 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
     write_container(path, document, b"".join(buffer.chunks))
 
 
-MOTION_FORMAT = MotionFormat(write, read_gltf_motion, check, curves="vowels", names_sound=True)
+MOTION_FORMAT = MotionFormat(write, read_gltf_motion, curves="vowels", names_sound=True, needs=VRM_VOWELS, min_frames=2)

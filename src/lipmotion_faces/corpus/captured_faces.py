@@ -40,8 +40,7 @@ at rest: where the lips meet, the edges of their red, their corners, the chin.""
 METRES = "m"
 MAX_HEADER_BYTES = 1 << 14
 MAX_MESH_BYTES = 1 << 26
-MAX_MESHES = 1 << 20
-"""Meshes of four hours."""
+MAX_MESHES = 1 << 20  # meshes of four hours
 NUMBER = re.compile(r"(\d+)$")
 PLY_TYPES = {
     **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
@@ -152,8 +151,7 @@ def read_vertices(path: Path, chosen: Sequence[int]) -> NDArray[np.float64]:
 FACEGOOD = "FACEGOOD blendshape weights"
 NAMES_FILE, VALUES_PREFIX = "*_bs_name.npy", "bs_value_"
 FACEGOOD_HZ = 30.0
-MAX_LICENCE_CHARACTERS = 10_000
-"""A licence file is read so far for its name and its owner."""
+MAX_LICENCE_CHARACTERS = 10_000  # a licence file is read so far for its name and its owner
 
 
 def read_facegood(directory: Path) -> RecordingFolder | None:

@@ -18,13 +18,11 @@ from lipmotion.printable import printable
 from lipmotion.units import PHONES, SILENCE, SIMILAR_PHONES, VISEME_OF, Lexicon, find_similar_lips
 from lipmotion.units.phones import CLASSES
 
-KINDS = ("phones", "diphones", "triphones")
-"""Sequences of one, two and three phones; silence is a neighbour only."""
+KINDS = ("phones", "diphones", "triphones")  # sequences of one, two and three phones; silence is a neighbour only
 OTHER_VISEME_COST, DISSIMILAR_COST = 1.0, 0.5
 """What it costs that a phone has another viseme, and that it is not among the similar phones of ``SIMILAR_PHONES``.
 Different classes of articulation cost up to 1 more."""
-MIDDLE_WEIGHT = 2.0
-"""Weight of the middle phone of a triphone; its neighbours have 1."""
+MIDDLE_WEIGHT = 2.0  # weight of the middle phone of a triphone; its neighbours have 1
 Phones = tuple[str, ...]
 
 
@@ -41,17 +39,12 @@ class MissingUnit:
 
 @dataclass(frozen=True)
 class KindCoverage:
-    """The coverage of the sequences of one length.
-
-    needed  : how many different ones the text needs
-    covered : how many of these the corpus has
-    share   : of the text that these cover, 0 to 1: each counts as often as the text needs it
-    """
+    """The coverage of the sequences of one length."""
 
     kind: str
-    needed: int
-    covered: int
-    share: float
+    needed: int  # how many different ones the text needs
+    covered: int  # how many of these the corpus has
+    share: float  # of the text that these cover, 0 to 1: each counts as often as the text needs it
     missing: tuple[MissingUnit, ...]
 
 

@@ -28,8 +28,7 @@ from lipmotion_faces.corpus.source_recordings import (
 )
 
 VIDEOS, SOUNDS, BOTH = "folder of videos", "folder of sounds with motion", "folder of videos, and of sounds with motion"
-VIDEO_KINDS = (VIDEOS, BOTH)
-"""Kinds of folders whose videos may be longer than a sentence."""
+VIDEO_KINDS = (VIDEOS, BOTH)  # kinds of folders whose videos may be longer than a sentence
 MOTION_SUFFIXES = (".csv", ".json", ".npz", ".livelink.csv", ".c3d", ".fap")
 """Motion files that ``read_motion`` reads, and that may lie beside a sound."""
 CAPTURE_SUFFIXES = (".csv", ".livelink.csv")
@@ -145,11 +144,9 @@ def discover(directory: Path) -> RecordingFolder:
 
 KIND = "GRID corpus"
 RIGHTS = {"licence": "CC BY 4.0", "attribution": "GRID corpus (Cooke, Barker, Cunningham, Shao 2006), CC BY 4.0"}
-SILENCES = frozenset({"sil", "sp"})
-"""Labels of a word-time file that are not words."""
+SILENCES = frozenset({"sil", "sp"})  # labels of a word-time file that are not words
 WORD = re.compile(r"[^\W\d_]+(?:['-][^\W\d_]+)*")
-LARGEST_ALIGNMENT_BYTES = 1 << 16
-"""Most bytes of a word-time file; GRID's have a hundred."""
+LARGEST_ALIGNMENT_BYTES = 1 << 16  # most bytes of a word-time file; GRID's have a hundred
 
 COMMANDS = {"b": "bin", "l": "lay", "p": "place", "s": "set"}
 COLOURS = {"b": "blue", "g": "green", "r": "red", "w": "white"}
@@ -217,8 +214,7 @@ def read_aligned_words(path: Path) -> tuple[str, ...]:
     return words
 
 
-LRS = "LRS"
-"""The kind whose clips may be longer than a sentence."""
+LRS = "LRS"  # the kind whose clips may be longer than a sentence
 Words = tuple[str, ...]
 CREMA_SENTENCES = {
     "DFA": "don't forget a jacket",

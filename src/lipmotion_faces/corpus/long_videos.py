@@ -27,17 +27,12 @@ from lipmotion_faces.tracking.track import VideoScan, scan_video
 
 SHORTEST_S, LONGEST_S = 3.0, 12.0
 """Wanted length of an utterance. Longer ones are divided at their longest pause, shorter ones joined where they can."""
-MIN_S = 0.8
-"""Shorter pieces are left out."""
-LONGEST_PAUSE_S = 1.0
-"""A longer pause always divides, and is left out except for its edges."""
-MARGIN_S = 0.3
-"""Silence kept before and after an utterance, at most half of the pause: lips begin before the sound."""
-ROUNDING_S = 0.05
-"""A cut that is this close to the end of a stretch does not divide it."""
+MIN_S = 0.8  # shorter pieces are left out
+LONGEST_PAUSE_S = 1.0  # a longer pause always divides, and is left out except for its edges
+MARGIN_S = 0.3  # silence kept before and after an utterance, at most half of the pause: lips begin before the sound
+ROUNDING_S = 0.05  # a cut that is this close to the end of a stretch does not divide it
 
-Quietest = Callable[[float, float], float]
-"""Returns the time of the lowest level between two times."""
+Quietest = Callable[[float, float], float]  # returns the time of the lowest level between two times
 
 
 @dataclass(frozen=True)
@@ -168,17 +163,13 @@ def _add_margins(
 LOG = logging.getLogger("lipmotion")
 
 _STAGE = "dividing long videos"
-DIVIDING_SHARE = 0.2
-"""Share of the whole preparation that this takes, for reports of progress."""
+DIVIDING_SHARE = 0.2  # share of the whole preparation that this takes, for reports of progress
 VIDEO = "one video"
 DIVIDED_KINDS = (*VIDEO_KINDS, VIDEO, LRS)
 """Kinds of recordings of which the long ones are divided; GRID's and others hold a sentence each."""
-LONG_S = 30.0
-"""Videos that state a longer duration are divided; a shorter one is one utterance."""
-MIN_SPLIT_UTTERANCES = 10
-"""A single video with fewer utterances is all for training."""
-HELD_OUT_SHARE = 0.1
-"""Share of the utterances, the last ones, that are ``test``; as many before them are ``val``."""
+LONG_S = 30.0  # videos that state a longer duration are divided; a shorter one is one utterance
+MIN_SPLIT_UTTERANCES = 10  # a single video with fewer utterances is all for training
+HELD_OUT_SHARE = 0.1  # share of the utterances, the last ones, that are ``test``; as many before them are ``val``
 
 
 def find_transcript(video: Path) -> TimedTranscript | None:

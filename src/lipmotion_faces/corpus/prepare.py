@@ -38,8 +38,7 @@ from lipmotion_faces.tracking.trackers import MEDIAPIPE, make_tracker
 LOG = logging.getLogger("lipmotion")
 RECIPE = "5"
 """Version of the preparation, increased when the same video gives other values; older utterances are then replaced."""
-NAMED_UTTERANCES = 5
-"""Utterances that a warning names."""
+NAMED_UTTERANCES = 5  # utterances that a warning names
 _STAGE = "preparing recordings"
 
 

@@ -16,16 +16,11 @@ from lipmotion.types import Channel, Timeline, Unit
 
 @dataclass(frozen=True)
 class MotionFile:
-    """A file with the motion that goes with a sound.
+    """A file with the motion that goes with a sound."""
 
-    file     : as ``animate`` writes it (.csv .json .npz), a bare array of numbers (.npy), or the first mesh (.ply)
-    rate_hz  : frame rate of a bare array, or of meshes; None: the file states it
-    channels : of a bare array; empty: the file states them
-    """
-
-    file: Path
-    rate_hz: float | None = None
-    channels: tuple[Channel, ...] = ()
+    file: Path  # as ``animate`` writes it (.csv .json .npz), a bare array of numbers (.npy), or the first mesh (.ply)
+    rate_hz: float | None = None  # frame rate of a bare array, or of meshes; None: the file states it
+    channels: tuple[Channel, ...] = ()  # of a bare array; empty: the file states them
 
 
 @dataclass(frozen=True)
@@ -62,16 +57,11 @@ class SourceRecording:
 
 @dataclass(frozen=True)
 class RecordingFolder:
-    """The recordings in a folder.
+    """The recordings in a folder."""
 
-    kind       : the kind of folder, in words
-    recordings : those that can be used, sorted by name
-    problems   : those that cannot be used, name to reason
-    """
-
-    kind: str
-    recordings: tuple[SourceRecording, ...]
-    problems: dict[str, str] = field(default_factory=dict)
+    kind: str  # the kind of folder, in words
+    recordings: tuple[SourceRecording, ...]  # those that can be used, sorted by name
+    problems: dict[str, str] = field(default_factory=dict)  # those that cannot be used, name to reason
 
 
 def filter_videos(paths: Iterable[Path]) -> list[Path]:
@@ -80,8 +70,7 @@ def filter_videos(paths: Iterable[Path]) -> list[Path]:
 
 
 LISTS = tuple(f"{split}.txt" for split in SPLITS)
-LARGEST_LIST_BYTES = 1 << 24
-"""Most bytes of a list of names."""
+LARGEST_LIST_BYTES = 1 << 24  # most bytes of a list of names
 MAX_MISSING_NAMES = 20_000
 """Names without a recording that are reported one by one; more of them mean a list of another folder."""
 

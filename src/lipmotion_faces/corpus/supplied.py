@@ -28,8 +28,7 @@ DIGESTS = ("sha256", "motion_sha256", "phones_sha256", "recorder_sha256")
 CURVES_MARGIN_S, CURVES_MARGIN_SHARE = 0.5, 0.02
 """Largest difference of duration between curves and sound: seconds, or share of the sound. It is larger where the frame
 rate of the curves is wrong."""
-PHONES_MARGIN_S = 0.1
-"""Seconds by which labels may end after the sound; labelling programs round times."""
+PHONES_MARGIN_S = 0.1  # seconds by which labels may end after the sound; labelling programs round times
 
 
 def digest_sources(recording: SourceRecording) -> dict[str, str]:
@@ -124,14 +123,13 @@ def _contain_speech(spans: Iterable[Span[Unit]]) -> bool:
     return any(not is_silent(span.label.phone) for span in spans)
 
 
-GIVEN = "as given"
-MIN_SHARED_S = 0.5
-"""Shortest time that sound and motion must share."""
+GIVEN, ALIKE = "as given", "found by the sound of both"
+MIN_SHARED_S = 0.5  # shortest time that sound and motion must share
 
 
 @dataclass(frozen=True, eq=False)
 class SeparateSound:
-    """Sound that is ``late_s`` against the motion, and how that is known: ``clap``, ``beep``, ``as given`` ..."""
+    """Sound that is ``late_s`` against the motion, and how that is known: ``GIVEN`` or ``ALIKE``."""
 
     audio: Audio
     late_s: float
@@ -140,8 +138,7 @@ class SeparateSound:
     @property
     def note(self) -> str:
         """What was done, for the user."""
-        description = self.how if self.how == GIVEN else f"found by the {self.how.removeprefix('the ')}"
-        return f"sound {abs(self.late_s) * 1000:.1f} ms {'late' if self.late_s >= 0 else 'early'}, {description}"
+        return f"sound {abs(self.late_s) * 1000:.1f} ms {'late' if self.late_s >= 0 else 'early'}, {self.how}"
 
 
 def separate_sound(recording: SourceRecording) -> SeparateSound | None:
@@ -159,7 +156,7 @@ def separate_sound(recording: SourceRecording) -> SeparateSound | None:
         offset = measure_offset(read_audio(recording.file), audio)
     except InputError as error:
         raise InputError(f"{recording.recorder}: {error}") from error
-    return SeparateSound(audio, offset.late_s, offset.how)
+    return SeparateSound(audio, offset.late_s, ALIKE)
 
 
 def align_sound(sound: SeparateSound, duration_s: float) -> Audio:

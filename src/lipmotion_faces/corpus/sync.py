@@ -18,26 +18,18 @@ from lipmotion.storage.locks import lock_folder
 from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Utterance
 from lipmotion_faces.corpus.sound_offset import measure_opening_speed, predict_opening_speed
 
-REACH_S = 0.4
-"""Largest offset that is considered, in seconds, in both directions."""
+REACH_S = 0.4  # largest offset that is considered, in seconds, in both directions
 OPENING = "opening"
-REMOVED_MS = "offset_removed_ms"
-"""Key in the source of an utterance: milliseconds by which its sound was moved."""
-MIN_MOVE_S = 0.005
-"""Smallest offset in seconds that is removed."""
-MIN_SCORE = 0.5
-"""Least correlation at which the offset of one clip is known."""
-MIN_MARGIN = 0.15
-"""Least difference between the best and the second maximum at which an offset is known."""
+REMOVED_MS = "offset_removed_ms"  # key in the source of an utterance: milliseconds by which its sound was moved
+MIN_MOVE_S = 0.005  # smallest offset in seconds that is removed
+MIN_SCORE = 0.5  # least correlation at which the offset of one clip is known
+MIN_MARGIN = 0.15  # least difference between the best and the second maximum at which an offset is known
 MIN_CLIPS, WIDEST_S = 5, 0.06
 """An offset of so many clips together is known at any correlation if its interval is as narrow: curves of a voice that
 the prediction has not learned correlate less, and agree on the offset all the same (docs/robustness.md)."""
-PEAK_S = 0.12
-"""Maxima further from the best than this, in seconds, are other ones."""
-MIN_SHARE = 0.5
-"""Least share of the frames that can be compared at a shift."""
-OFFSET_DRAWS = 500
-"""Bootstrap samples of an interval."""
+PEAK_S = 0.12  # maxima further from the best than this, in seconds, are other ones
+MIN_SHARE = 0.5  # least share of the frames that can be compared at a shift
+OFFSET_DRAWS = 500  # bootstrap samples of an interval
 
 
 @dataclass(frozen=True)
@@ -145,13 +137,8 @@ def score_shifts(utterance: Utterance) -> NDArray[np.float64]:
     """Return the agreement of sound and motion at every shift of up to ``REACH_S`` seconds [shape=(81,)]."""
     motion = utterance.track.motion
     predicted = predict_opening_speed(utterance.features)
-    opening, valid = resample_to_model(
-        np.asarray(motion[OPENING], float)[:, None],
-        np.asarray(utterance.track.seen),
-        motion.rate_hz,
-        len(predicted),
-        FRAME_RATE_HZ,
-    )
+    curve, seen = np.asarray(motion[OPENING], float)[:, None], np.asarray(utterance.track.seen)
+    opening, valid = resample_to_model(curve, seen, motion.rate_hz, len(predicted))
     return shift_scores(predicted, measure_opening_speed(opening[:, 0]), valid, round(REACH_S * FRAME_RATE_HZ))
 
 

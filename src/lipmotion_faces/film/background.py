@@ -30,26 +30,17 @@ MAX_BACKGROUND_S, MAX_PART_S = 20.0, 10.0
 """Longest background that is kept in the file of a face, and the longest part of it."""
 HEAD_PX = -75.0, -80.0, 75.0, 150.0
 """Left, top, right and bottom of a head, px of the face, from the point between the eyes."""
-CHIN = "y_152"
-"""The tip of the chin."""
-SMOOTHING_FRAMES = 0.7
-"""Standard deviation of the smoothing of its place, frames: the tracker trembles."""
+CHIN = "y_152"  # the tip of the chin
+SMOOTHING_FRAMES = 0.7  # standard deviation of the smoothing of its place, frames: the tracker trembles
 ALIGNED_PX = -125.0, -135.0, 125.0, 155.0
 """The part around a head in which heads are laid upon one another where one frame fades into another."""
-ALIGNED_EDGE_PX = 25.0
-"""Width of the edge of that part."""
-MAX_PARTS = 24
-"""Parts of the footage that are tried as backgrounds."""
-COMPARED_STEP = 3
-"""Only every third frame of the parts is compared."""
-SHOWN_S = 60.0
-"""How long they are shown then."""
-SHORT_S, SHORT_COST = 3.0, 2.0
-"""Shorter parts would repeat too soon: they cost more, in proportion to what is missing."""
-COMPARED_SHARE = 0.9
-"""A part of this share of ``SHORT_S`` is still compared."""
-MAX_TRACKED_S = 120.0
-"""Seconds of a video that are used as a background."""
+ALIGNED_EDGE_PX = 25.0  # width of the edge of that part
+MAX_PARTS = 24  # parts of the footage that are tried as backgrounds
+COMPARED_STEP = 3  # only every third frame of the parts is compared
+SHOWN_S = 60.0  # how long they are shown then
+SHORT_S, SHORT_COST = 3.0, 2.0  # shorter parts would repeat too soon: they cost more, in proportion to what is missing
+COMPARED_SHARE = 0.9  # a part of this share of ``SHORT_S`` is still compared
+MAX_TRACKED_S = 120.0  # seconds of a video that are used as a background
 LONGEST_GAP_S = 0.2
 """Where the face is not seen for so short a time, as where pictures were dropped, its interpolated place will do."""
 

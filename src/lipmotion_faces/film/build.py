@@ -34,29 +34,21 @@ from lipmotion_faces.tracking.track import UNSEEN_LIMIT, Footage, decode_footage
 
 MAX_FOOTAGE_S = 240.0
 """Seconds of footage that are used, spread evenly over all recordings: of 500 candidates few are new after that."""
-LONG_S = 10.0
-"""Shorter recordings are used whole; of longer ones the beginning is used, at least this much."""
-MAX_MEASURED_RECORDINGS = 240
-"""Most recordings whose durations are read."""
-RIGHTS = ("licence", "attribution")
-"""What is kept of the rights of a recording."""
+LONG_S = 10.0  # shorter recordings are used whole; of longer ones the beginning is used, at least this much
+MAX_MEASURED_RECORDINGS = 240  # most recordings whose durations are read
+RIGHTS = ("licence", "attribution")  # what is kept of the rights of a recording
 
 
 @dataclass(frozen=True)
 class Take:
-    """One recording of a person.
-
-    collection : the folder that it is in, by its last two names
-    speaker    : name of the person; empty where it is not known
-    rights     : licence and attribution, where known
-    """
+    """One recording of a person."""
 
     name: str
     file: Path
     span: VideoSpan
-    collection: str
-    speaker: str
-    rights: tuple[tuple[str, str], ...]
+    collection: str  # the folder that it is in, by its last two names
+    speaker: str  # name of the person; empty where it is not known
+    rights: tuple[tuple[str, str], ...]  # licence and attribution, where known
 
 
 def choose_takes(source: Path, recordings: Path | None = None, speaker: str = "") -> list[Take]:
@@ -153,20 +145,13 @@ def _make_take(item: SourceRecording, folder: Path, collection: str | None = Non
 
 LOG = logging.getLogger("lipmotion")
 
-MIN_FOOTAGE_S = 10.0
-"""Shorter footage is refused: of 3 s the pictures are wrong (docs/results/video.md)."""
-GOOD_FOOTAGE_S = 60.0
-"""Shorter footage is warned about."""
-MAX_PICTURES_HZ = 30.0
-"""Every second frame, or fewer, of faster video is learned from."""
-SPOKEN_TAKES_S = 20.0
-"""Seconds of speech that are kept, for motion of other people's models."""
-MIN_SPOKEN_S = 0.5
-"""Shorter parts of a take are not kept for that."""
-JAW_ENDS = ("x_150", "x_379")
-"""The ends of the tracked jaw line, right and left."""
-UNUSED_AXIS = "z_"
-"""Channels of depth are not used: they are guesses of the tracker, and differ most between people."""
+MIN_FOOTAGE_S = 10.0  # shorter footage is refused: of 3 s the pictures are wrong (docs/results/video.md)
+GOOD_FOOTAGE_S = 60.0  # shorter footage is warned about
+MAX_PICTURES_HZ = 30.0  # every second frame, or fewer, of faster video is learned from
+SPOKEN_TAKES_S = 20.0  # seconds of speech that are kept, for motion of other people's models
+MIN_SPOKEN_S = 0.5  # shorter parts of a take are not kept for that
+JAW_ENDS = ("x_150", "x_379")  # the ends of the tracked jaw line, right and left
+UNUSED_AXIS = "z_"  # channels of depth are not used: they are guesses of the tracker, and differ most between people
 
 
 @dataclass(frozen=True, eq=False)

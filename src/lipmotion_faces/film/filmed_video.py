@@ -32,12 +32,9 @@ from lipmotion_faces.video.synthetic_mark import mark_frames, mark_metadata
 
 Frame = NDArray[np.uint8]
 
-WIDTH_SHARE, HEIGHT_SHARE = 0.33, 0.4
-"""Largest width and height of the inset, as shares of the frame's."""
-MARGIN_SHARE = 0.02
-"""Distance from the edges of the frame, as a share of its shorter side."""
-BORDER_SHARE = 0.006
-"""Width of the white border, as a share of the frame's shorter side."""
+WIDTH_SHARE, HEIGHT_SHARE = 0.33, 0.4  # largest width and height of the inset, as shares of the frame's
+MARGIN_SHARE = 0.02  # distance from the edges of the frame, as a share of its shorter side
+BORDER_SHARE = 0.006  # width of the white border, as a share of the frame's shorter side
 WHITE = 245
 
 
@@ -75,10 +72,8 @@ def add_inset(frames: Iterable[Frame], pictures: Iterable[Frame]) -> Iterator[Fr
 Frames = Iterator[NDArray[np.uint8]]
 RENDERING = "rendering the video"
 LOG = logging.getLogger("lipmotion")
-FILM = Outputs()
-"""How a filmed face is shown where nothing is said."""
-ZOOM = 1.3
-"""How much larger than the speaker's own the mouth over it is."""
+FILM = Outputs()  # how a filmed face is shown where nothing is said
+ZOOM = 1.3  # how much larger than the speaker's own the mouth over it is
 
 
 @dataclass(frozen=True, eq=False)

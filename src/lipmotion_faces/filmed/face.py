@@ -22,24 +22,17 @@ Array = NDArray[np.float64]
 
 FORMAT, VERSION = "lipmotion.face", 1
 SUFFIX = ".face"
-FULL_SCALE = 32767
-"""Full scale of the stored sound."""
+FULL_SCALE = 32767  # full scale of the stored sound
 
 
 @dataclass(frozen=True, eq=False)
 class StoredBackground:
-    """A background sequence: footage of the person, with the place of the face in every frame.
+    """A background sequence: footage of the person, with the place of the face in every frame."""
 
-    video         : T frames, of even height and width
-    face_to_frame : affine maps from px of the face to px of the frame [shape=(T, 2, 3)]
-    chin_px       : how far the tip of the chin is below the eyes in each frame, px of the face [shape=(T,)]
-    cuts          : frames at which another part of the footage begins, rising
-    """
-
-    video: StoredVideo
-    face_to_frame: Array
-    chin_px: Array
-    cuts: tuple[int, ...] = ()
+    video: StoredVideo  # T frames, of even height and width
+    face_to_frame: Array  # affine maps from px of the face to px of the frame [shape=(T, 2, 3)]
+    chin_px: Array  # how far the tip of the chin is below the eyes in each frame, px of the face [shape=(T,)]
+    cuts: tuple[int, ...] = ()  # frames at which another part of the footage begins, rising
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,8 +179,7 @@ def _read_background(arrays: schema.Arrays) -> StoredBackground:
     return StoredBackground(video, maps, stored["chin_px"], tuple(cuts.tolist()))
 
 
-MIN_DETERMINANT = 1e-6
-"""A map with a smaller determinant has no inverse."""
+MIN_DETERMINANT = 1e-6  # a map with a smaller determinant has no inverse
 
 
 def _take(arrays: schema.Arrays, channels: tuple[Channel, ...]) -> SpokenTake:

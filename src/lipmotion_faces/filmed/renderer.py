@@ -22,28 +22,20 @@ Floats = NDArray[np.float32]
 Picture = NDArray[np.uint8]
 Pictures = NDArray[np.uint8]
 
-BATCH = 16
-"""Frames in memory at a time, at one sample a pixel; fewer of larger faces."""
-FEATHER_PX = 6.0
-"""Width of the seam, px of the face."""
+BATCH = 16  # frames in memory at a time, at one sample a pixel; fewer of larger faces
+FEATHER_PX = 6.0  # width of the seam, px of the face
 
-LARGEST_DIFFERENCE = 20.0
-"""Differences on the edge of the jaw above this are no difference of light, grey levels."""
+LARGEST_DIFFERENCE = 20.0  # differences on the edge of the jaw above this are no difference of light, grey levels
 
 
 @dataclass(frozen=True)
 class Background:
-    """One frame of footage.
-
-    face_to_frame : affine map from px of the face to px of the frame [shape=(2, 3)]
-    chin_px       : how far the tip of the chin is below the eyes, px of the face
-    has_face      : whether the person is seen; False: the frame stays as it is
-    """
+    """One frame of footage."""
 
     frame: Picture
-    face_to_frame: Array
-    chin_px: float
-    has_face: bool = True
+    face_to_frame: Array  # affine map from px of the face to px of the frame [shape=(2, 3)]
+    chin_px: float  # how far the tip of the chin is below the eyes, px of the face
+    has_face: bool = True  # whether the person is seen; False: the frame stays as it is
 
 
 @dataclass(frozen=True)

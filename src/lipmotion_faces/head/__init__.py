@@ -19,8 +19,7 @@ from lipmotion_faces.head.pose import CharacterPose, list_head_poses
 
 __all__ = ["CharacterPose", "Head", "list_head_poses"]
 
-SIZE = (1280, 720)
-"""Width and height of pictures whose size is not given."""
+SIZE = (1280, 720)  # width and height of pictures whose size is not given
 FRAMES_AHEAD = 2
 
 

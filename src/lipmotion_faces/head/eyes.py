@@ -35,8 +35,7 @@ UPPER_LID, LOWER_LID = (
 WIDE_RISE, SQUINT_RISE, SQUINT_FALL, SLANT = 0.034, 0.044, 0.018, 0.042
 """How far a mood raises the upper lid, raises the lower one and lowers the upper one, and how far lowered brows lower
 the inner half of the upper lid, brows raised at their inner ends the outer half."""
-LOWER_LID_RISE = 0.028
-"""How far the middle of the lower lid rises to meet the upper one."""
+LOWER_LID_RISE = 0.028  # how far the middle of the lower lid rises to meet the upper one
 
 
 class Eyelids:
@@ -90,13 +89,10 @@ class Eyelids:
         return np.stack([x, y, z], axis=1)
 
 
-IRIS, PUPIL = 0.115, 0.055
-"""Radii of iris and pupil, as lengths on the eyeball."""
-CATCHLIGHT = 2.2
-"""Reflections of lamps are brighter than white paint."""
+IRIS, PUPIL = 0.115, 0.055  # radii of iris and pupil, as lengths on the eyeball
+CATCHLIGHT = 2.2  # reflections of lamps are brighter than white paint
 _SIDES = 48
-LASHES = 33
-"""Columns of the lashes: those of the upper lid."""
+LASHES = 33  # columns of the lashes: those of the upper lid
 
 
 def make_eyeball() -> part.Part:

@@ -19,8 +19,7 @@ from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import ACROSS, AT_CORNER, REST, RINGS, VISIBLE_RINGS, Skin, find_closure, move_jaw
 from lipmotion_faces.rendering.lighting import Finish, Lighting, Triple, measure_reach, normalise
 
-BUN = np.array([0.0, 1.40, -0.98])
-"""Middle of the bun."""
+BUN = np.array([0.0, 1.40, -0.98])  # middle of the bun
 _LINE = (
     (0.0, 0.78, 0.0), (0.30, 0.76, -0.04), (0.54, 0.64, -0.14), (0.69, 0.44, -0.26), (0.74, 0.20, -0.40),
     (0.76, -0.02, -0.52), (0.80, -0.10, -0.68), (0.82, 0.02, -0.80), (0.82, -0.12, -0.98), (0.72, -0.50, -1.16),
@@ -192,8 +191,7 @@ def make_collar() -> Part:
     return make_part("collar", places, triangles, palette.CLOTH_RIB, palette.CLOTH_FINISH)
 
 
-CORNER_FADE_SHARE = 0.4
-"""How far the colour of the lips fades to that of the skin towards the corners."""
+CORNER_FADE_SHARE = 0.4  # how far the colour of the lips fades to that of the skin towards the corners
 
 
 def paint_skin(skin: Skin) -> Real:
@@ -232,8 +230,7 @@ def paint_skin(skin: Skin) -> Real:
     return decode_srgb(colour)
 
 
-PIVOT = np.array([0.0, -0.75, -0.9])
-"""The head turns about this place, the top of the neck."""
+PIVOT = np.array([0.0, -0.75, -0.9])  # the head turns about this place, the top of the neck
 TONGUE_LIGHT, UPPER_TEETH_LIGHT, LOWER_TEETH_LIGHT = 1.35, 0.92, 0.52
 """The tongue is wet, and drawn brighter than the rest of the mouth; the lower teeth lie in the shade of the upper."""
 SEAM_LIGHT = (0.88, 0.72, 0.54, 0.42, 0.34)
@@ -242,11 +239,9 @@ RIM_LIGHT = (0.93, 0.78, 0.45, 0.04, 0.02)
 """The same for the rings before the rim of a round hole, the rim, and those behind, which would widen it in grey."""
 LIP_SHADOW, SHADOW_DEPTH = 0.24, 0.09
 """The part of the light that arrives right under the upper lip in the mouth, and how far down its shadow reaches."""
-CORNER_SHADE = 0.6
-"""How far the corners of any mouth are shaded as a seam."""
+CORNER_SHADE = 0.6  # how far the corners of any mouth are shaded as a seam
 _EYES = ((1.0, ""), (-1.0, "right "))
-_UPPER_COLUMN, _LOWER_COLUMN = 20, 60
-"""Columns of the lips in the middle of the upper and of the lower lip."""
+_UPPER_COLUMN, _LOWER_COLUMN = 20, 60  # columns of the lips in the middle of the upper and of the lower lip
 
 
 class Figure:

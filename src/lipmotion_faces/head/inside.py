@@ -19,8 +19,7 @@ _LOWER_EDGES = (0.0, 0.036, 0.074, 0.114, 0.150, 0.183, 0.212, 0.236)
 """Where teeth touch their neighbours: distances from the middle, seen from the front."""
 LOWER_EDGE = TEETH_EDGE + 0.006
 """Height of the edge of the lower incisors, behind the upper ones, when the jaw is closed."""
-PARTED_TEETH = 0.035
-"""Distance of the teeth behind closed lips."""
+PARTED_TEETH = 0.035  # distance of the teeth behind closed lips
 TIP_ON_LIP, TIP_HEIGHTS = 0.02, (TEETH_EDGE - 0.028, TEETH_EDGE - 0.013)
 """How far above the lower lip the middle of the tongue's tip is between the teeth, and the range of its height."""
 _TONGUE_RINGS, _TONGUE_SIDES = 24, 32

@@ -17,21 +17,15 @@ Triangles = NDArray[np.int32]
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A surface that keeps its form.
-
-    places    : of its vertices at rest [shape=(V, 3)];  normals : of length 1 [shape=(V, 3)]
-    triangles : counterclockwise from outside [shape=(F, 3)]
-    colours   : diffuse reflection, linear [shape=(V, 3)]
-    strands   : directions of hair [shape=(V, 3)], or None
-    """
+    """A surface that keeps its form."""
 
     name: str
-    places: Real
-    triangles: Triangles
-    colours: Real
+    places: Real  # of its vertices at rest [shape=(V, 3)];  normals : of length 1 [shape=(V, 3)]
+    triangles: Triangles  # counterclockwise from outside [shape=(F, 3)]
+    colours: Real  # diffuse reflection, linear [shape=(V, 3)]
     finish: Finish
     normals: Real
-    strands: Real | None = None
+    strands: Real | None = None  # directions of hair [shape=(V, 3)], or None
 
     def mirror(self, name: str) -> Part:
         """Return the same part on the other side of the face."""
@@ -97,14 +91,10 @@ def make_tube(path: Real, across: Real, thick: Real, upward: Real, *, sides: int
     return rings.reshape(-1, 3), make_grid(len(path), sides, closed=True), strands
 
 
-EYE = np.array([0.315, 0.0, -0.215])
-"""Centre of the left eyeball; the right one is its mirror image."""
-EYEBALL_RADIUS, LID_RADIUS = 0.225, 0.243
-"""Radii of the eyeball and of the skin upon it."""
-MOUTH_Y = -0.70
-"""Height of the line between the lips."""
-MIDDLE = np.array([0.0, -0.3, -0.75])
-"""A place inside the head from which every place of the skin can be seen."""
+EYE = np.array([0.315, 0.0, -0.215])  # centre of the left eyeball; the right one is its mirror image
+EYEBALL_RADIUS, LID_RADIUS = 0.225, 0.243  # radii of the eyeball and of the skin upon it
+MOUTH_Y = -0.70  # height of the line between the lips
+MIDDLE = np.array([0.0, -0.3, -0.75])  # a place inside the head from which every place of the skin can be seen
 
 
 def to_ellipsoid(p: Real, centre: tuple[float, float, float], radii: tuple[float, float, float]) -> Real:

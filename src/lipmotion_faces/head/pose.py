@@ -15,12 +15,9 @@ from lipmotion_faces.base import Staging, stage_liveliness
 
 SPREAD_RISE = 0.52
 """Part of the gap by which the upper lip rises where lips are spread: the upper teeth show more than the lower ones."""
-BITTEN_GAP = (0.12, 0.2)
-"""Teeth stay together up to the first gap, and part until the second one."""
-BITTEN = (0.72, 0.94)
-"""Teeth are apart up to the first value of ``teeth``, and together from the second on."""
-OO_ROUNDNESS = 0.8
-"""How round the lips of oo are; those of w are a ring."""
+BITTEN_GAP = (0.12, 0.2)  # teeth stay together up to the first gap, and part until the second one
+BITTEN = (0.72, 0.94)  # teeth are apart up to the first value of ``teeth``, and together from the second on
+OO_ROUNDNESS = 0.8  # how round the lips of oo are; those of w are a ring
 MOOD_SMILE, MOOD_FROWN, MOOD_TIGHT, RAISED_LIP = 0.065, 0.07, 0.025, 0.06
 """How far a mood raises the corners, lowers them, lowers those of serious lips, and raises the upper lip."""
 FULL_NARROWING, FULL_WIDENING = 0.16, 0.12

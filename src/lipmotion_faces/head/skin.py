@@ -27,15 +27,11 @@ Real = NDArray[np.float64]
 _UPPER_COLUMNS = 41
 COLUMNS = 2 * _UPPER_COLUMNS - 2
 REST_HALF_WIDTH = 0.268
-TEETH_Z = -0.055
-"""Front of the incisors."""
-TEETH_EDGE = MOUTH_Y - 0.017
-"""Height of the edge of the upper incisors; they belong to the skull."""
-ARCH = 1.15
-"""Curvature of lips and teeth seen from above: how far they lie back, over x squared."""
+TEETH_Z = -0.055  # front of the incisors
+TEETH_EDGE = MOUTH_Y - 0.017  # height of the edge of the upper incisors; they belong to the skull
+ARCH = 1.15  # curvature of lips and teeth seen from above: how far they lie back, over x squared
 _UPPER_LIP, _LOWER_LIP = 0.076, 0.106
-OVAL_SQUEEZE = 0.14
-"""How much nearer to the middle the inner edge of an oval mouth lies than the corners."""
+OVAL_SQUEEZE = 0.14  # how much nearer to the middle the inner edge of an oval mouth lies than the corners
 HOLE_WIDTH = (0.014, 0.6)
 """Half the width of a round hole, round which the lips run as a ring: a length, and a share of the gap."""
 RING_GAP, LINE_SHARE = 0.01, 0.25
@@ -44,21 +40,18 @@ ROUND_BOW = 0.0012
 """How far the middle of a round hole is raised: its middle lies before its sides, and the camera looks down on it."""
 SEAM_GAP, SEAM_FORWARD = 0.03, 0.026
 """Below this gap the seam of the lips comes forward, at most so far: the crease between closed lips is shallow."""
-ROUND_DROP = 0.025
-"""How far the line between round lips sinks: the upper lip hides the teeth."""
+ROUND_DROP = 0.025  # how far the line between round lips sinks: the upper lip hides the teeth
 REST_SMILE, SMILE_GAP = 0.027, 0.05
 """How far the corners rise at rest; parted, pressed and round lips do not smile, from this gap on. Tucked ones do: with
 lower corners, teeth on the lip look like contempt."""
-BITTEN_EDGE_Y = TEETH_EDGE + 0.017
-"""Height of the edge of the lower lip on the upper teeth."""
+BITTEN_EDGE_Y = TEETH_EDGE + 0.017  # height of the edge of the lower lip on the upper teeth
 _KNOTS = np.array([0, 0.22, 0.5, 0.72, 0.88, 0.98, 1.12, 1.4])
 _AT = np.array([0.0, 0.09, 0.2, 0.31, 0.41, 0.5, 0.58, 0.66, 0.74, 0.81, 0.88, 0.94, 1.0, 1.12, 1.4])
 _SECTION: Real = np.asarray(CubicSpline(_KNOTS, np.eye(len(_KNOTS)))(_AT))
 _WALL = ((0.10, -0.16), (0.26, -0.30), (0.7, -0.40), (1.0, -0.42))
 """Rings behind the lips: how far towards the middle of the throat, and how far back."""
 RINGS = len(_AT) + len(_WALL)
-VISIBLE_RINGS = 11
-"""Rings up to this one can be seen as lips; those behind are the wall of the mouth."""
+VISIBLE_RINGS = 11  # rings up to this one can be seen as lips; those behind are the wall of the mouth
 
 
 _UPPER_ACROSS = np.sin(np.linspace(-np.pi / 2, np.pi / 2, _UPPER_COLUMNS))
@@ -194,27 +187,20 @@ def place_lips(points: Real) -> Real:
 
 Index = NDArray[np.intp]
 
-SPACING = 0.033
-"""Distance of the vertices in the middle of the face, in radians about ``MIDDLE``."""
-HINGE = np.array([0.0, -0.32, -0.82])
-"""The axis of the jaw goes through here, from ear to ear."""
+SPACING = 0.033  # distance of the vertices in the middle of the face, in radians about ``MIDDLE``
+HINGE = np.array([0.0, -0.32, -0.82])  # the axis of the jaw goes through here, from ear to ear
 REST = CharacterPose()
-CHEEKS_SPREAD, CHEEKS_ROUND = 0.035, 0.025
-"""How far cheeks come forward beside spread lips, and sink beside round ones."""
-CHEEKS_RAISED, NOSE_LIFT = 0.05, 0.07
-"""How far a mood raises the cheeks, and the wings of a wrinkled nose."""
+CHEEKS_SPREAD, CHEEKS_ROUND = 0.035, 0.025  # how far cheeks come forward beside spread lips, and sink beside round ones
+CHEEKS_RAISED, NOSE_LIFT = 0.05, 0.07  # how far a mood raises the cheeks, and the wings of a wrinkled nose
 _LEFT_CORNER = 40
-_OPPOSITE = -np.arange(COLUMNS) % COLUMNS
-"""For every column of the lips the one of the other lip that it meets."""
-_JOINED = {VISIBLE_RINGS - 1: 0.3}
-"""By rings of the lips: how far the light on both sides of the seam is the same."""
+_OPPOSITE = -np.arange(COLUMNS) % COLUMNS  # for every column of the lips the one of the other lip that it meets
+_JOINED = {VISIBLE_RINGS - 1: 0.3}  # by rings of the lips: how far the light on both sides of the seam is the same
 AT_CORNER = (np.clip((np.abs(ACROSS) - 0.72) / 0.28, 0, 1) ** 2)[:, None]
 """How near each column of the lips is to a corner, 0 to 1 [shape=(COLUMNS, 1)]."""
 _NEAR_CORNER = np.clip((np.abs(ACROSS) - 0.5) / 0.5, 0, 1)[:, None]
 CORNER_LIGHT_SHARE, CORNER_SKIN_SHARE = 0.6, 0.75
 """How far the light at the corners is the same on both lips, and that of the skin before them."""
-CALM_RADIUS = 0.035
-"""Round the corners of the lips, where the surface folds, the shading changes less than the surface."""
+CALM_RADIUS = 0.035  # round the corners of the lips, where the surface folds, the shading changes less than the surface
 
 
 @dataclass(frozen=True)

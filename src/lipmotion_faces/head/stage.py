@@ -54,10 +54,8 @@ SIDED_MOOD_POSES = {
 """The poses of the shapes that moods need, instead of those above and beside them; other files do not have these."""
 _GAZES = {"Out": (FULL_LOOK_RAD, 0.0), "In": (-FULL_LOOK_RAD, 0.0)}
 _GAZES |= {"Up": (0.0, FULL_LOOK_RAD), "Down": (0.0, -FULL_LOOK_RAD)}
-MIN_DISPLACEMENT = 1e-5
-"""Vertices that move less, in eye distances, are left out of a shape."""
-_HALF_WIDTH = 0.12
-"""Half the width of the strip in the middle in which both sides move."""
+MIN_DISPLACEMENT = 1e-5  # vertices that move less, in eye distances, are left out of a shape
+_HALF_WIDTH = 0.12  # half the width of the strip in the middle in which both sides move
 
 
 def build_head_mesh(figure: Figure, *, moods: bool = False) -> Mesh:
@@ -97,8 +95,7 @@ def build_head_mesh(figure: Figure, *, moods: bool = False) -> Mesh:
     return Mesh(rest, figure.triangles, tuple(parts), tuple(shapes), colours=encode_srgb(np.clip(figure.colours, 0, 1)))
 
 
-PICTURE_HEIGHT = 3.35
-"""Height of the picture, in eye distances."""
+PICTURE_HEIGHT = 3.35  # height of the picture, in eye distances
 
 
 @cache
@@ -143,8 +140,7 @@ FROM_POSE = {"tongueOut": "tongue_out", "tongueUp": "tongue_up", "mouthPressLeft
 _NOT_OF_LIPS = ("eye", "brow", "cheek", "nose", *FROM_POSE)
 PARTING = ("jawOpen", "mouthClose", "mouthLowerDown", "mouthUpperUp")
 """Shapes that are changed first so that the lips are apart as in the pose; the others where that is not enough."""
-GAP_WEIGHT = 12.0
-"""How much the distance between the lips counts against the places of their vertices."""
+GAP_WEIGHT = 12.0  # how much the distance between the lips counts against the places of their vertices
 AT_ONCE = 256
 COSTS = CurveCosts(ridge=1e-3, smooth=2e-3)
 

@@ -15,12 +15,10 @@ from lipmotion.kernels.compiler import compiled
 
 Layer = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
-Canvas = NDArray[np.uint16]
-"""Values 0..255 in 16 bits, so that pixels can be mixed as whole numbers."""
+Canvas = NDArray[np.uint16]  # values 0..255 in 16 bits, so that pixels can be mixed as whole numbers
 Floats = NDArray[np.float64]
 Packed = NDArray[np.uint64]
-ONE = 1 << 16
-"""A pixel, in whole numbers."""
+ONE = 1 << 16  # a pixel, in whole numbers
 
 
 def find_source_places(shift: Floats, step: int, shape: tuple[int, ...], axis: int, length: int) -> Floats:

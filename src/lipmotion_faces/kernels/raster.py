@@ -10,10 +10,8 @@ from lipmotion.kernels.compiler import compiled
 Real = NDArray[np.float64]
 Colours = NDArray[np.float32]
 FAR = np.float32(np.inf)
-BAND = 16
-"""Rows of pixels that are drawn at once: their samples fit the processor's cache."""
-GRID = 256.0
-"""Corners are rounded to this part of a sample, so that neighbouring triangles leave no gap between them."""
+BAND = 16  # rows of pixels that are drawn at once: their samples fit the processor's cache
+GRID = 256.0  # corners are rounded to this part of a sample, so that neighbouring triangles leave no gap between them
 
 
 @compiled

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from lipmotion.kernels.compiler import compiled, pays
 
 Real = NDArray[np.float64]
-MIN_FACING_COSINE = -0.35
-"""Vertices that face further away than this (the cosine) are not seen, and stay dark."""
+MIN_FACING_COSINE = -0.35  # vertices that face further away than this (the cosine) are not seen, and stay dark
 
 
 @compiled

@@ -16,14 +16,11 @@ Ints = NDArray[np.int32]
 
 SOLID, CUT, CLEAR = 0, 1, 2
 """Kinds of triangles: without holes; with holes where the texture is clear; blended with what is behind."""
-HIDING_OPACITY = 0.95
-"""From this opacity on, a blended surface hides what is behind it."""
-SEEN_OPACITY = 1 / 512
-"""Below this opacity, it is not seen."""
+HIDING_OPACITY = 0.95  # from this opacity on, a blended surface hides what is behind it
+SEEN_OPACITY = 1 / 512  # below this opacity, it is not seen
 NO_TRIANGLE = -1
 SCALE = 1 / 65535
-WIDE_SAMPLES = 8
-"""In triangles wider than this, in samples, the columns of a row are worked out before they are tried."""
+WIDE_SAMPLES = 8  # in triangles wider than this, in samples, the columns of a row are worked out before they are tried
 PLANES = 27
 """Linear numbers of a triangle: three each of light, highlights, depth, and place in the texture times depth."""
 

@@ -22,10 +22,8 @@ from lipmotion_faces.base import TRANSPARENT, Staging
 
 LOG = logging.getLogger("lipmotion")
 OPAQUE_SUFFIX = ".mp4"
-VIDEO_SUFFIXES = (OPAQUE_SUFFIX, ".webm", ".mov")
-"""Videos with sound; all but the first can be transparent."""
-SOUND_RATE_HZ = 48_000
-"""Sampling rate of the sound track."""
+VIDEO_SUFFIXES = (OPAQUE_SUFFIX, ".webm", ".mov")  # videos with sound; all but the first can be transparent
+SOUND_RATE_HZ = 48_000  # sampling rate of the sound track
 DRAWN_HZ, FASTEST_HZ = 25.0, 240.0
 """Frame rate of videos of drawn faces, and the highest one: each picture is drawn, and no screen shows more."""
 

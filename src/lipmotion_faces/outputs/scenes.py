@@ -14,7 +14,7 @@ from lipmotion.articulation.contact import sample_pictures
 from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.liveliness import CALM
-from lipmotion.articulation.mouth import find_mouth, frame_times, measure_mouth_at_rest
+from lipmotion.articulation.mouth import find_mouth, frame_times
 from lipmotion.articulation.rest import add_rest
 from lipmotion.formats.base import Thinning
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
@@ -36,14 +36,11 @@ from lipmotion_faces.outputs.drawn_video import check_drawable
 
 GLTF, USD, FBX = ".glb", ".usda", ".fbx"
 SCENE_SUFFIXES = (GLTF, USD, FBX)
-FBX_RATE_HZ = 60
-"""Frames a second of ``.fbx``, which are whole numbers; fewer where fewer keys are asked for."""
-ANIMATED_SUFFIXES = (GLTF, ".vrm")
-"""Suffixes of files of characters that are kept as they are, with an animation more."""
+FBX_RATE_HZ = 60  # frames a second of ``.fbx``, which are whole numbers; fewer where fewer keys are asked for
+ANIMATED_SUFFIXES = (GLTF, ".vrm")  # suffixes of files of characters that are kept as they are, with an animation more
 MARGIN, MOUTH_MARGIN = 10, 50
 """Frames before and after those that are wanted alone, within which weights settle, and the mouth."""
-METRES = 0.09
-"""The distance between the outer eye corners of the 3D head, in metres."""
+METRES = 0.09  # the distance between the outer eye corners of the 3D head, in metres
 
 
 class SceneOutput(Output):
@@ -141,9 +138,9 @@ def build_head_scene(
         mouth = find_mouth(motion, units, hertz)
     else:  # made of the frames around those that are wanted
         wider, inner = _select_around(around, MOUTH_MARGIN)
-        part = replace(motion, values=motion.values[wider])
-        there = units.between(wider.start / motion.rate_hz, (wider.start + len(part.values)) / motion.rate_hz)
-        mouth = find_mouth(part, there, at_rest=measure_mouth_at_rest(motion, units)).within(inner)
+        part, phones, there = add_rest(motion, units, wider)
+        stop = min(there.start + inner.stop, there.stop)
+        mouth = find_mouth(part, phones).within(slice(there.start + inner.start, stop))
     moved = stage_liveliness(times_s[around], motion, units, staging, prosody)
     poses = pose_head(mouth, moved)
     has_mood = any(map(is_mood, motion.names)) or any(pose.mood != CALM for pose in poses)

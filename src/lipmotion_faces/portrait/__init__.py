@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Cartoon", "DrawnFace", "Man", "Portrait", "Woman"]
 
-OWN_SIZE = 640
-"""Height of pictures whose size is not given."""
+OWN_SIZE = 640  # height of pictures whose size is not given
 
 
 class DrawnFace(Face):
@@ -69,8 +68,7 @@ class Woman(DrawnFace):
     character = "WOMAN"
 
 
-Portrait = Woman
-"""The best of the characters: what is shown where none is asked for."""
+Portrait = Woman  # the best of the characters: what is shown where none is asked for
 
 
 @final

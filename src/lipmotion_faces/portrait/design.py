@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 Points = NDArray[np.float64]
 Path = str | Sequence[tuple[float, float]]
 
-STEPS = 16
-"""Points drawn for each Bézier curve."""
+STEPS = 16  # points drawn for each Bézier curve
 
 
 def list_path_points(path: Path) -> Points:

@@ -21,18 +21,15 @@ from lipmotion_faces.portrait.layer import Window
 
 Heights = NDArray[np.float64]
 
-TEETH_EDGE = 0.024
-"""The upper incisors end this far below the line of the closed lips; they belong to the skull."""
+TEETH_EDGE = 0.024  # the upper incisors end this far below the line of the closed lips; they belong to the skull
 SPREAD_RISE = (0.5, 0.06)
 """The upper lip of spread lips rises by this part of the gap, at most so far: more of the upper teeth shows."""
 LARGEST_RING_SHARE, LIP_RING_SHARE = 0.9, 0.8
 """Protruded lips are a ring round a hole: its thickness as a part of both lips, and its largest part of their width."""
-ROUND_HOLE = (0.012, 0.85)
-"""Half the width of the hole of protruded lips: a length, and a share of the gap."""
+ROUND_HOLE = (0.012, 0.85)  # half the width of the hole of protruded lips: a length, and a share of the gap
 SMILE_RISE, FROWN_FALL, RAISED_LIP, CHIN_RISE = 0.11, 0.1, 0.055, 0.03
 """How far a mood raises the corners, lowers them, raises the upper lip, and the middle of both lips by the chin."""
-TUCKED_LIP = 0.05
-"""Least thickness of a lower lip under the upper teeth: thin lips are drawn thicker there, to be seen."""
+TUCKED_LIP = 0.05  # least thickness of a lower lip under the upper teeth: thin lips are drawn thicker there, to be seen
 _LINE = [(0, 0.006), (0.16, 0.005), (0.4, -0.005), (0.72, -0.004), (1, 0.004)]
 _CUPIDS_BOW = [(0, 0.82), (0.08, 0.87), (0.22, 1.0), (0.36, 0.94), (0.62, 0.66), (0.85, 0.29), (1, 0)]
 _LOWER = [(0, 1), (0.25, 0.975), (0.5, 0.855), (0.72, 0.61), (0.89, 0.29), (1, 0)]
@@ -210,37 +207,26 @@ def _bend(u: Heights, power: float) -> Heights:
 
 Floats = NDArray[np.float64]
 
-STEP = 8
-"""Shifts are computed at every eighth pixel and interpolated between."""
+STEP = 8  # shifts are computed at every eighth pixel and interpolated between
 JAW_TOP, CHIN = -0.24, 0.4
 """Between these heights, from the line of the lips, skin is stretched when the jaw drops; below, it moves with it."""
-PIVOT_Y = 1.35
-"""The head rolls about this point of the neck."""
-BROW_STEPS = 8
-"""Positions of raised brows in a pixel."""
-MOOD_STEPS = 24
-"""Positions of the brows on the way to a mood."""
+PIVOT_Y = 1.35  # the head rolls about this point of the neck
+BROW_STEPS = 8  # positions of raised brows in a pixel
+MOOD_STEPS = 24  # positions of the brows on the way to a mood
 INNER_RISE, OUTER_RISE, LOWERED, TOGETHER = 0.13, 0.1, (0.115, 0.05), 0.06
 """How far a mood raises inner and outer ends of brows, lowers inner and outer ones, and draws them together."""
-NOSE_LIFT, CHEEK_LIFT = 0.05, 0.06
-"""How far wrinkling lifts the wings of the nose, and a smile the cheeks."""
-NECK_TOP, NECK_END = 1.15, 1.85
-"""Between these heights the movement of the head fades."""
+NOSE_LIFT, CHEEK_LIFT = 0.05, 0.06  # how far wrinkling lifts the wings of the nose, and a smile the cheeks
+NECK_TOP, NECK_END = 1.15, 1.85  # between these heights the movement of the head fades
 
 
 class HeadPlacement(NamedTuple):
-    """Where the head is: shifts in eye distances, to the right and down; angles in radians.
-
-    roll  : to the speaker's left shoulder, clockwise in the picture
-    yaw   : features move to the right against the outline of the head
-    pitch : features move down against it: nodding
-    """
+    """Where the head is: shifts in eye distances, to the right and down; angles in radians."""
 
     x: float = 0.0
     y: float = 0.0
-    roll: float = 0.0
-    yaw: float = 0.0
-    pitch: float = 0.0
+    roll: float = 0.0  # to the speaker's left shoulder, clockwise in the picture
+    yaw: float = 0.0  # features move to the right against the outline of the head
+    pitch: float = 0.0  # features move down against it: nodding
 
 
 class SkinField:

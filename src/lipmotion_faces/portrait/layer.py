@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from lipmotion_faces.portrait.design import Colour, Points
 
 SUPERSAMPLING = 4
-Pixels = NDArray[np.floating[Any]]
-"""Colours 0..255, coverage 0..1, or lengths; float32 unless a caller chose otherwise."""
+Pixels = NDArray[np.floating[Any]]  # colours 0..255, coverage 0..1, or lengths; float32 unless a caller chose otherwise
 
 
 @dataclass(frozen=True)

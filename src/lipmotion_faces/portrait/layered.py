@@ -20,15 +20,13 @@ from lipmotion_faces.portrait.layer import lay_over
 from lipmotion_faces.portrait.portrait_rasteriser import FacePose, list_face_poses
 from lipmotion_faces.portrait.svg_document import Drawing, Shape, read_drawing
 
-Pixels = NDArray[np.float32]
-"""Premultiplied colour 0..255 and cover 0..1 [shape=(H, W, 4)]."""
+Pixels = NDArray[np.float32]  # premultiplied colour 0..255 and cover 0..1 [shape=(H, W, 4)]
 Lines = Sequence[tuple[NDArray[np.float64], bool]]
 """Points in pixels [shape=(N, 2)], and whether each line returns to its beginning."""
 SUPERSAMPLING = 3
 
 
-Placed = tuple[Shape, tuple[float, float]]
-"""A shape, and how far it is moved to the right and down, in pixels."""
+Placed = tuple[Shape, tuple[float, float]]  # a shape, and how far it is moved to the right and down, in pixels
 
 
 def paint_shapes(shapes: Sequence[Placed], to_pixels: NDArray[np.float64], width: int, height: int) -> Pixels:
@@ -120,12 +118,10 @@ OWN_SIZE = 640
 MOUTH = "mouth-"
 CHANGE_COST = 0.007
 """A change of mouths costs as much as this squared distance at 2 frames a second, so that none is shown too shortly."""
-EYE_DISTANCE = 0.285
-"""Height of the picture that stands for an eye distance, in which heads and eyes are moved."""
+EYE_DISTANCE = 0.285  # height of the picture that stands for an eye distance, in which heads and eyes are moved
 
 
-MOOD_RISE, MOOD_FALL = 0.1, 0.08
-"""How far a mood raises and lowers the brows, which are one layer."""
+MOOD_RISE, MOOD_FALL = 0.1, 0.08  # how far a mood raises and lowers the brows, which are one layer
 MOUTHS = {
     "rest": MouthPose(0.0, teeth=0.0),
     "mbp": MouthPose(0.0),

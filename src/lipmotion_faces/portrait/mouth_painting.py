@@ -20,16 +20,13 @@ from lipmotion_faces.portrait.layer import Window
 
 Texture = NDArray[np.float64]
 
-COLUMNS = 4
-"""Places in each column of pixels at which heights are computed."""
+COLUMNS = 4  # places in each column of pixels at which heights are computed
 FOLD, FOLD_TOP = (0.19, 0.1), -0.235
 """Where a fold begins, from the middle, and ends, from the corner; and its top, from the line of the lips."""
-CORNER_REACH = 1.28
-"""The shadows beside the corners are painted up to this multiple of the mouth's half width."""
+CORNER_REACH = 1.28  # the shadows beside the corners are painted up to this multiple of the mouth's half width
 SPAN = 0.26
 UPPER_TOOTH_GAPS = (0.0, 0.047, 0.087, 0.121, 0.15)
-LOWER_TOOTH_GAPS = (0.0, 0.034, 0.068, 0.1, 0.13)
-"""Distances from the middle of the face."""
+LOWER_TOOTH_GAPS = (0.0, 0.034, 0.068, 0.1, 0.13)  # distances from the middle of the face
 
 
 class MouthPainter:

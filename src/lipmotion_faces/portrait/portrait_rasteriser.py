@@ -33,15 +33,12 @@ from lipmotion_faces.portrait.layer import Glow, Layer, Pixels, Rim, View, Windo
 from lipmotion_faces.portrait.mouth_painting import MouthPainter
 
 LID_POSITIONS = 16
-MOOD_LIDS = 8
-"""Positions of the lids on the way to a mood."""
+MOOD_LIDS = 8  # positions of the lids on the way to a mood
 WIDE_RISE, SQUINT_RISE, SQUINT_FALL, LID_SLANT = 0.045, 0.055, 0.025, 0.045
 """How far a mood raises the upper lids, and the lower ones, and how far it then lowers the upper ones; how far lowered
 brows take the inner half of the upper lids with them, and brows raised at their inner ends leave the outer half."""
-CHEEK_SQUINT = 0.8
-"""Raised cheeks narrow the eyes by this part."""
-GAZE_STEPS = 8
-"""Positions of the gaze in a pixel."""
+CHEEK_SQUINT = 0.8  # raised cheeks narrow the eyes by this part
+GAZE_STEPS = 8  # positions of the gaze in a pixel
 
 
 class LidPose(NamedTuple):
@@ -321,12 +318,10 @@ def paint_hair(window: Window, design: Design) -> Layer:
 
 Bytes = NDArray[np.uint8]
 Canvas = NDArray[np.uint16]
-RESTING_LIDS = 0.07
-"""Awake and calm, the upper lids cover a little of the irises."""
+RESTING_LIDS = 0.07  # awake and calm, the upper lids cover a little of the irises
 LOOK, YAW, PITCH = 0.25, 0.3, 0.4
 """How far an iris moves for an angle of the eyes, and features for angles of the head, in eye distances a radian."""
-SWAY_X, SWAY_Y = 0.25, 0.12
-"""How far the head moves to the side and up for the same angles."""
+SWAY_X, SWAY_Y = 0.25, 0.12  # how far the head moves to the side and up for the same angles
 LARGEST_TURN = np.array([0.35, 0.35, 0.13])
 """The furthest that a drawing turns to its left, upwards and to its left shoulder, in radians."""
 

@@ -22,14 +22,10 @@ from lipmotion.errors import InputError, shorten
 from lipmotion.storage.sources import check_regular
 from lipmotion_faces.portrait.design import Colour, Points, make_ellipse
 
-STEPS = 12
-"""Points for each Bézier curve, and for a quarter of an ellipse."""
-MAX_POINTS = 400_000
-"""Most points of all lines of a drawing; a curve has ``STEPS``, an arc four times as many."""
-MAX_TRANSFORMS = 20
-"""Most transforms one after another in one attribute."""
-LARGEST_NUMBER = 1e6
-"""Largest magnitude of a number in a drawing."""
+STEPS = 12  # points for each Bézier curve, and for a quarter of an ellipse
+MAX_POINTS = 400_000  # most points of all lines of a drawing; a curve has ``STEPS``, an arc four times as many
+MAX_TRANSFORMS = 20  # most transforms one after another in one attribute
+LARGEST_NUMBER = 1e6  # largest magnitude of a number in a drawing
 _NUMBER = re.compile(r"[\s,]*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)")
 _FLAG = re.compile(r"[\s,]*([01])")
 _LETTER = re.compile(r"[\s,]*([MmLlHhVvCcSsQqTtAaZz])")
@@ -38,8 +34,7 @@ _COUNTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 
 _POINTS = {"C": STEPS, "S": STEPS, "Q": STEPS, "T": STEPS, "A": 4 * STEPS}
 
 
-Line = tuple[Points, bool]
-"""A flattened subpath: points [shape=(N, 2)], and whether it returns to its beginning."""
+Line = tuple[Points, bool]  # a flattened subpath: points [shape=(N, 2)], and whether it returns to its beginning
 
 
 def flatten_path(text: str, max_count: int = MAX_POINTS) -> list[Line]:
@@ -248,8 +243,7 @@ LARGEST_FILE_BYTES, MAX_ELEMENTS, DEEPEST_NESTING = 8 << 20, 20_000, 60
 """Most bytes of a drawing, elements in it, and elements in one another."""
 MAX_COVERED_PICTURES, LINES_PER_PICTURE = 200.0, 100.0
 """Most that shapes cover, in pictures; lines across the picture that take as long to paint as one picture."""
-LONGEST_VALUE_CHARACTERS = 100
-"""Most letters of a number, a colour or another value of a style."""
+LONGEST_VALUE_CHARACTERS = 100  # most letters of a number, a colour or another value of a style
 _SHAPES = {"path", "rect", "circle", "ellipse", "polygon", "polyline", "line"}
 _PASSED_OVER = {"title", "desc", "metadata", "namedview", "defs", "guide", "grid", "page", "RDF"}
 _INHERITED = ("fill", "fill-opacity", "fill-rule", "stroke", "stroke-width", "stroke-opacity")
@@ -326,17 +320,13 @@ class _Group(NamedTuple):
 
 @dataclass
 class _DrawingReader:
-    """Takes the elements of one drawing as the parser finds them.
-
-    depth   : of elements that are open
-    passed  : depth of the element that is passed over with all in it; 0: none
-    """
+    """Takes the elements of one drawing as the parser finds them."""
 
     box: tuple[float, float, float, float] | None = None
     shapes: list[tuple[tuple[str, ...], Shape]] = field(default_factory=list)
     groups: list[_Group] = field(default_factory=list)
-    depth: int = 0
-    passed: int = 0
+    depth: int = 0  # of elements that are open
+    passed: int = 0  # depth of the element that is passed over with all in it; 0: none
     elements: int = 0
     points: int = 0
     covered: float = 0.0

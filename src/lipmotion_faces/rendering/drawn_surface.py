@@ -195,32 +195,22 @@ class TexturedCanvas:
 
 Rows = NDArray[np.int64]
 
-MIN_OPACITY = 0.5
-"""Parts without texture that are clearer than this are not drawn: shells around eyes."""
-SCATTER = (0.3, 0.2, 0.15)
-"""How far red, green and blue light reach round into the shade, as in skin."""
+MIN_OPACITY = 0.5  # parts without texture that are clearer than this are not drawn: shells around eyes
+SCATTER = (0.3, 0.2, 0.15)  # how far red, green and blue light reach round into the shade, as in skin
 FARTHEST_UV = 1e4
-EMPTY = 3
-"""The kind of triangles whose texture is clear all over: they are left out."""
+EMPTY = 3  # the kind of triangles whose texture is clear all over: they are left out
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnSurface:
-    """What is drawn of a mesh.
+    """What is drawn of a mesh."""
 
-    rows     : the vertex of the mesh that each drawn vertex is [shape=(D,)]
-    sides    : 1, or -1 where the surface is seen from behind [shape=(D,)]
-    kinds    : the finish of each drawn vertex [shape=(D,)];  lighting : for these finishes
-    colours  : diffuse reflection by which that of the texture is multiplied [shape=(D, 3)]
-    triangles : of drawn vertices, with textures
-    """
-
-    rows: Rows
-    sides: Real
-    kinds: Rows
+    rows: Rows  # the vertex of the mesh that each drawn vertex is [shape=(D,)]
+    sides: Real  # 1, or -1 where the surface is seen from behind [shape=(D,)]
+    kinds: Rows  # the finish of each drawn vertex [shape=(D,)];  lighting : for these finishes
     lighting: Lighting
-    colours: Real
-    triangles: TexturedTriangles
+    colours: Real  # diffuse reflection by which that of the texture is multiplied [shape=(D, 3)]
+    triangles: TexturedTriangles  # of drawn vertices, with textures
 
 
 def prepare_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float) -> DrawnSurface:

@@ -14,10 +14,8 @@ from lipmotion_faces.kernels.shading import shade
 Real = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
-LEVELS = 4096
-"""Steps of the table from light to grey levels."""
-WHITE = 1.5
-"""The light that becomes white; the rasteriser takes light as parts of it."""
+LEVELS = 4096  # steps of the table from light to grey levels
+WHITE = 1.5  # the light that becomes white; the rasteriser takes light as parts of it
 
 
 KEY, FILL = ((-0.5, 0.55, 0.8), (1.06, 0.97, 0.87)), ((0.85, 0.15, 0.6), (0.16, 0.19, 0.25))
@@ -97,8 +95,7 @@ def normalise(vectors: Real) -> Real:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
-CELL = 0.045
-"""Size of the cells in which the nearest surface is kept, in the unit of the vertices."""
+CELL = 0.045  # size of the cells in which the nearest surface is kept, in the unit of the vertices
 BIAS_DISTANCE, FADE_DISTANCE = 0.05, 0.10
 """A vertex this far behind another one begins to be hidden, and is hidden this much further behind."""
 

@@ -18,8 +18,7 @@ from lipmotion_faces.tracking.packages import import_opencv
 Pictures = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float32]
-Damage = dict[str, Mask]
-"""Masks of pictures [shape=(T,)] by the kind of damage."""
+Damage = dict[str, Mask]  # masks of pictures [shape=(T,)] by the kind of damage
 
 REPEATED_SHARE = 0.12
 """A picture repeats the one before if it differs less than this share of how much most pictures (75 %) do: decoders add
@@ -31,28 +30,21 @@ FROZEN_S = 0.2
 """Pictures that repeat one another for so long are frozen; single ones are doubled, as by changed frame rates."""
 JUMP = 1.5
 """The picture after frozen ones differs at least this much more than most; people who stand still differ less."""
-MAX_COMPARED = 4000
-"""Mouths of a person that each one is compared with, spread evenly."""
-MIN_COMPARED = 500
-"""With fewer mouths, no one can say what is unlike the others."""
-APART_S = 10.0
-"""A mouth is compared with other clips, and with its own from so far away on: smears last seconds."""
+MAX_COMPARED = 4000  # mouths of a person that each one is compared with, spread evenly
+MIN_COMPARED = 500  # with fewer mouths, no one can say what is unlike the others
+APART_S = 10.0  # a mouth is compared with other clips, and with its own from so far away on: smears last seconds
 SIZE, FINE_PX, COARSE_PX = (24, 18), 1.0, 5.0
 """Size of a compared mouth, and the details in it: between these two standard deviations, px of the mouth region."""
-MIN_CONTRAST = 20.0
-"""Mouths with less contrast than this have none: of noise nothing can be compared."""
+MIN_CONTRAST = 20.0  # mouths with less contrast than this have none: of noise nothing can be compared
 UNLIKE, REPAIR = 2.5, 4.5
 """A mouth is unlike all others at this multiple of the median of one less the best correlation; it is smeared, if the
 next one is not, and is lower by the second multiple (GRID s1: 7 clips of 524, each repaired at a key picture)."""
-MIN_USUAL = 0.01
-"""Smallest median that counts: in footage of a still mouth it is 0."""
-MIN_SMEARED = 2
-"""Pictures that are smeared, at least: a mouth may be unlike others for one."""
+MIN_USUAL = 0.01  # smallest median that counts: in footage of a still mouth it is 0
+MIN_SMEARED = 2  # pictures that are smeared, at least: a mouth may be unlike others for one
 SHARPNESS, BLUR_FRAMES = 0.7, 5
 """Mouths are blurred if the median of so many in a row has less than this share of the person's sharpness (GRID s1:
 0.68 in one damaged clip, at least 0.8 in the others)."""
-DARKNESS = 0.4
-"""Mouths are dark below this share of the person's light (GRID s1: 0.85 and more)."""
+DARKNESS = 0.4  # mouths are dark below this share of the person's light (GRID s1: 0.85 and more)
 
 
 def find_repeated(changes: Sequence[float], rate_hz: float) -> tuple[Mask, Mask]:

@@ -18,10 +18,8 @@ Array = NDArray[np.float64]
 
 REACH = 2.5
 """Side of a window, in sides of the face in it: the mesh's detector finds faces of a third of a picture best."""
-SIZE_PX = 384
-"""Every window is scaled to this side: the mesh then always sees faces of about one size."""
-STEADY_RATIO = 1.25
-"""The window keeps its side until that of the face has changed by this ratio."""
+SIZE_PX = 384  # every window is scaled to this side: the mesh then always sees faces of about one size
+STEADY_RATIO = 1.25  # the window keeps its side until that of the face has changed by this ratio
 
 
 @dataclass(frozen=True)
@@ -82,20 +80,17 @@ class WindowedMesh:
         return faces
 
 
-MAX_FACES = 4
-"""The most faces that are searched for where a scene begins."""
+MAX_FACES = 4  # the most faces that are searched for where a scene begins
 JUMP, GROWTH = 0.6, 1.25
 """Most eye distances that a face moves in a frame (GRID: up to 0.03), and the largest ratio of its sizes (1.06)."""
-LOST_FRAMES = 10
-"""A face that was missing in more frames must be recognised again."""
+LOST_FRAMES = 10  # a face that was missing in more frames must be recognised again
 SAME_PERSON_CORRELATION = 0.9
 """Correlation of the upper faces above which two faces are one person's. GRID: 0.90 to 1 within a clip; two people, 0.2
 to 0.87 in 14 pairs of 15, and 0.94 in one."""
 LARGE_PX = 1280
 """In a picture with a longer side than this, faces are first searched with the full-range detector, as they are likely
 to be small in it, and followed in a window, which takes less time than the mesh of the whole picture."""
-THOROUGH_STEP = 5
-"""Where no face is found, the parts of every such frame are searched too, not only the whole picture."""
+THOROUGH_STEP = 5  # where no face is found, the parts of every such frame are searched too, not only the whole picture
 THUMBNAIL_STEP, MAX_THUMBNAILS = 5, 20
 """Every how many frames of a scene a thumbnail of the face is kept for comparison, and how many at first."""
 NEW_LOOK_CORRELATION, MAX_LOOKS = 0.95, 60

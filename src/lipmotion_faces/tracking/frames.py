@@ -26,17 +26,12 @@ class VideoFrame:
 
 @dataclass(frozen=True, eq=False)
 class OpenVideo:
-    """An open video.
-
-    stated_rates_hz : the frame rates that the container states, the most reliable first
-    stated_s        : the duration that the container states, 0 if none
-    damage          : a reason for every packet or picture that was left out so far
-    """
+    """An open video."""
 
     frames: Iterator[VideoFrame]
-    stated_rates_hz: tuple[float, ...]
-    stated_s: float
-    damage: list[str]
+    stated_rates_hz: tuple[float, ...]  # the frame rates that the container states, the most reliable first
+    stated_s: float  # the duration that the container states, 0 if none
+    damage: list[str]  # a reason for every packet or picture that was left out so far
 
 
 @dataclass(frozen=True)
@@ -51,10 +46,8 @@ WHOLE = VideoSpan()
 SEEK_MARGIN_S = 1.0
 """Decoding starts at the key frame before the span by this much: containers that seek by the time of decoding are late
 by the pictures that wait for others."""
-ROUNDING_S = 1e-4
-"""A picture belongs to a span that begins this much later: times of the container are whole ticks."""
-SHORT_S = 0.5
-"""Pictures that end more than this before the stated duration are reported."""
+ROUNDING_S = 1e-4  # a picture belongs to a span that begins this much later: times of the container are whole ticks
+SHORT_S = 0.5  # pictures that end more than this before the stated duration are reported
 MIN_SIDE_PX, LONGEST_SIDE_PX = 16, 8192
 """Bounds of a picture's width and height, px: a smaller one shows no face, a larger one fills the memory."""
 
@@ -129,7 +122,7 @@ def _decode_frames(
     pixel_shape = float(stream.sample_aspect_ratio or 1)
     last_s = float("-inf")
     for picture in _decode_pictures_from(container, stream, start_s + span.start_s - ROUNDING_S, damage):
-        if picture.time is None or max(picture.time - start_s, span.start_s) <= last_s:
+        if picture.time is None or picture.time - start_s <= last_s:
             continue  # it has no time, or one that another picture has
         last_s = max(picture.time - start_s, span.start_s)
         if last_s >= span.end_s - ROUNDING_S:
@@ -155,13 +148,12 @@ def _decode_pictures_from(container: Any, stream: Any, first_s: float, damage: l
     if first_s <= start_s:
         yield from _decode_pictures(container, stream, damage)
         return
-    container.seek(int(max(first_s - SEEK_MARGIN_S, start_s) / stream.time_base), stream=stream)
-    pictures = _decode_pictures(container, stream, damage)
-    picture = next(pictures, None)
-    if picture is None or picture.time is None or picture.time > first_s:
-        container.seek(int(start_s / stream.time_base), stream=stream)
+    for from_s in (max(first_s - SEEK_MARGIN_S, start_s), start_s):  # where seeking ends too late, from the beginning
+        container.seek(int(from_s / stream.time_base), stream=stream)
         pictures = _decode_pictures(container, stream, damage)
         picture = next(pictures, None)
+        if picture is not None and picture.time is not None and picture.time <= first_s:
+            break
     while picture is not None and (picture.time is None or picture.time < first_s):
         picture = next(pictures, None)
     damage.clear()

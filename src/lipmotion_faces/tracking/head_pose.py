@@ -28,18 +28,12 @@ _LIPS, _RIGID = (
 
 @dataclass(frozen=True, eq=False)
 class HeadPose:
-    """The pose of the head in every frame: point x has head coordinates (scale · rotation · x + translation) / unit.
+    """The pose of the head in every frame: point x has head coordinates (scale · rotation · x + translation) / unit."""
 
-    rotation    : [shape=(T, 3, 3)]
-    scale       : [shape=(T,), > 0]
-    translation : [shape=(T, 3)]
-    unit        : eye distance of the mean face
-    """
-
-    rotation: Array
-    scale: Array
-    translation: Array
-    unit: float
+    rotation: Array  # [shape=(T, 3, 3)]
+    scale: Array  # [shape=(T,), > 0]
+    translation: Array  # [shape=(T, 3)]
+    unit: float  # eye distance of the mean face
 
     def to_head_coordinates(self, points: Array) -> Array:
         """Return points [shape=(T, N, 3)] in head coordinates."""

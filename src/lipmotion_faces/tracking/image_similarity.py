@@ -13,8 +13,7 @@ Array = NDArray[np.float64]
 CUT_LEVELS = 6.0
 """Mean change of the thumbnail between two frames, in grey levels, that begins a new scene (GRID: up to 1.3)."""
 SCENE_SIZE = (32, 24)
-SCENE_SAMPLES = 640
-"""Pictures are thinned to about this number of columns or rows, whichever are more."""
+SCENE_SAMPLES = 640  # pictures are thinned to about this number of columns or rows, whichever are more
 FACE_SIZE = (36, 24)
 FACE_WIDTH, FACE_TOP, FACE_BOTTOM = 0.75, 0.5, 0.5
 """The region of the upper face, which speech does not change: from the point between the eyes to either side, up and
@@ -23,14 +22,10 @@ MOUTH_SIZE = (18, 14)
 OCCLUDED_CORRELATION = 0.2
 """A mouth is occluded when its region correlates less with the median region of the clip (in 262 clips of GRID s1, none
 did)..."""
-OCCLUDED_DIFFERENCE = 20.0
-"""... and differs from it by more grey levels on average (GRID: up to 17 in open mouths)."""
-NOD_ROWS = 4
-"""... and correlates less at every shift by up to so many of its 14 rows than..."""
-SHIFTED_CORRELATION = 0.5
-"""... this: a nod moves the mouth in its region, which is placed by the eyes."""
-FLAT_LEVELS = 1.0
-"""A region with a smaller standard deviation, in grey levels, has no texture to compare."""
+OCCLUDED_DIFFERENCE = 20.0  # ... and differs from it by more grey levels on average (GRID: up to 17 in open mouths)
+NOD_ROWS = 4  # ... and correlates less at every shift by up to so many of its 14 rows than...
+SHIFTED_CORRELATION = 0.5  # ... this: a nod moves the mouth in its region, which is placed by the eyes
+FLAT_LEVELS = 1.0  # a region with a smaller standard deviation, in grey levels, has no texture to compare
 
 
 def reduce_scene(image: Image) -> Array:

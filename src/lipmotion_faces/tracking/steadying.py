@@ -31,27 +31,19 @@ POSITION_S, SHAPE_S = 0.04, 0.32
 TRACKED_NOISE_PX, REGISTERED_NOISE_PX = 0.5, 0.2
 """Motion that smoothing takes away is given back where it is much larger than this, px of the face that looks straight
 ahead: the noise of tracked and of registered maps is smaller, and nods are larger."""
-ENVELOPE_S = 0.04
-"""Over about this time the size of that motion is averaged, s."""
-DRIFT_S = 0.4
-"""Motion that is slower than this is taken from the tracker, and quicker motion from the pictures, s."""
+ENVELOPE_S = 0.04  # over about this time the size of that motion is averaged, s
+DRIFT_S = 0.4  # motion that is slower than this is taken from the tracker, and quicker motion from the pictures, s
 REGION = (-42.0, 2.0, 42.0, 44.0)
 """Left, top, right and bottom of nose and cheeks, which speech hardly moves, px of the face that looks straight ahead,
 from the point between the eyes."""
 MAX_SAMPLES = 1.5
 """Most pixels of the region per px of a face that looks ahead; with fewer in the picture, as many as there."""
-MARGIN = 3
-"""Pixels at the edge of the region that are not compared."""
-BLURS_PX = (3.0, 1.0)
-"""The pictures are registered coarsely and then finely, blurred by Gaussians of these deviations."""
-ROUNDS = 8
-"""Most steps of each registration; three are usual."""
-LONGEST_STEP = 0.2
-"""A registration that finds a longer step, in eye distances, is not believed."""
-FLAT_LEVELS = 0.1
-"""A region with a smaller standard deviation, in grey levels, has no texture to register."""
-MOUTH = np.array([0.0, MOUTH_CORNER[1] + 28.0])
-"""The middle of the mouth region, px."""
+MARGIN = 3  # pixels at the edge of the region that are not compared
+BLURS_PX = (3.0, 1.0)  # the pictures are registered coarsely and then finely, blurred by Gaussians of these deviations
+ROUNDS = 8  # most steps of each registration; three are usual
+LONGEST_STEP = 0.2  # a registration that finds a longer step, in eye distances, is not believed
+FLAT_LEVELS = 0.1  # a region with a smaller standard deviation, in grey levels, has no texture to register
+MOUTH = np.array([0.0, MOUTH_CORNER[1] + 28.0])  # the middle of the mouth region, px
 
 
 def steady_maps(maps: Array, rate_hz: float, cuts: Sequence[int] = (), *, noise_px: float = TRACKED_NOISE_PX) -> Array:

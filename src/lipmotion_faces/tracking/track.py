@@ -33,17 +33,14 @@ from lipmotion_faces.tracking.trackers import DISTANCES, EYE_CORNERS, JAW_POINTS
 
 Array = NDArray[np.float64]
 
-UNSEEN_LIMIT = 0.2
-"""A clip is refused when more than this share of its frames shows no face."""
-USABLE_SHARE = 0.5
-"""A clip is refused when its pictures cover less than this share of the duration that it states."""
+UNSEEN_LIMIT = 0.2  # a clip is refused when more than this share of its frames shows no face
+USABLE_SHARE = 0.5  # a clip is refused when its pictures cover less than this share of the duration that it states
 SMALL_EYES_PX = 35.0
 """A smaller median distance between the eyes is reported. GRID clips made small and tracked have a correlation of the
 opening with the clip as it was of 0.99 at 65 px, 0.98 at 40, 0.90 at 25."""
 COMPARED_PX = 360
 """Pictures are thinned to fewer columns and rows than this before they are compared with the one before."""
-STRETCH_LIMIT = 2.0
-"""A clip is refused when its time stamps span more than this many times the frames that it holds."""
+STRETCH_LIMIT = 2.0  # a clip is refused when its time stamps span more than this many times the frames that it holds
 
 COLUMN = {index: n for n, index in enumerate(TRACKED_POINTS)}
 _EYES = [COLUMN[index] for index in EYE_CORNERS]
@@ -216,12 +213,9 @@ def _check(
         )
 
 
-LOOK_PX = 640
-"""Pictures are reduced to this while they are converted."""
-FACE_STEP_S = 2.0
-"""How often faces are looked for."""
-ALONE_SHARE = 0.9
-"""Somebody whose face is in this share of the pictures with a face is taken to be the only person."""
+LOOK_PX = 640  # pictures are reduced to this while they are converted
+FACE_STEP_S = 2.0  # how often faces are looked for
+ALONE_SHARE = 0.9  # somebody whose face is in this share of the pictures with a face is taken to be the only person
 REPORT_STEP = 250
 
 
@@ -279,11 +273,9 @@ def scan_video(path: Path, reached: Callable[[float], None] = lambda _: None, tr
     )
 
 
-SAME_TIME_S = 1e-4
-"""Times of pictures that differ by less are those of one picture: containers count in whole ticks."""
+SAME_TIME_S = 1e-4  # times of pictures that differ by less are those of one picture: containers count in whole ticks
 
-GROUP = 32
-"""Most frames of a video file that are decoded together."""
+GROUP = 32  # most frames of a video file that are decoded together
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from lipmotion.extensions import Registry
 
-EYE_CORNERS = (33, 263)
-"""Outer corners, right and left: the unit of length and the x axis."""
+EYE_CORNERS = (33, 263)  # outer corners, right and left: the unit of length and the x axis
 
 LIP_POINTS = (
     # outer edge, from the right corner over the lower lip to the left corner and back over the upper lip
@@ -55,13 +54,11 @@ FOREHEAD_SLOPE_DEG = 8.6
 DISTANCES = {"opening": (13, 14), "width": (61, 291), "outer": (0, 17)}
 """The three distances as pairs of points: between the inner lips, the lip corners, the outer lips."""
 
-TRACKED_POINTS = tuple(sorted({*LIP_POINTS, *JAW_POINTS, *RIGID_POINTS}))
-"""Every point that is kept from a frame."""
+TRACKED_POINTS = tuple(sorted({*LIP_POINTS, *JAW_POINTS, *RIGID_POINTS}))  # every point that is kept from a frame
 
 
 Image = NDArray[np.uint8]
-MEDIAPIPE = "mediapipe"
-"""The tracker that is used where no other one is named."""
+MEDIAPIPE = "mediapipe"  # the tracker that is used where no other one is named
 
 
 @dataclass(frozen=True)

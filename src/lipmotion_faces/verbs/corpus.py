@@ -124,12 +124,12 @@ def run_sync(options: argparse.Namespace) -> None:
 
 
 def run_offset(options: argparse.Namespace) -> None:
-    """Call ``measure_offset``; print the offset and how it was found."""
+    """Call ``measure_offset``; print the offset and how alike the sounds are."""
     from lipmotion.speech.sound.audio_files import read_audio
     from lipmotion_faces.corpus.sound_offset import measure_offset
 
     offset = measure_offset(read_audio(options.camera), read_audio(options.recorder))
-    print_line(f"--offset-ms {offset.late_s * 1000:.1f}  (by {offset.how}; levels correlate by {offset.alike:.2f})")
+    print_line(f"--offset-ms {offset.late_s * 1000:.1f}  (levels correlate by {offset.alike:.2f})")
 
 
 def run_prompts(options: argparse.Namespace) -> None:

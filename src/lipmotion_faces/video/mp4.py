@@ -23,8 +23,7 @@ from lipmotion.types import Audio
 
 XMP_UUID = bytes.fromhex("be7acfcb97a942e89c71999491e3afac")
 """What says that a box of type ``uuid`` holds XMP (Adobe, XMP Specification Part 3)."""
-LARGEST_PACKET_BYTES = 1 << 24
-"""Most bytes of a packet, which programs read into the memory as a whole."""
+LARGEST_PACKET_BYTES = 1 << 24  # most bytes of a packet, which programs read into the memory as a whole
 
 
 def append_xmp(path: Path, packet: str) -> None:

@@ -17,8 +17,7 @@ from lipmotion.extensions import find_version
 from lipmotion.printable import printable
 
 Frame = NDArray[np.uint8]
-Box = tuple[float, float, float, float]
-"""Left, top, right and bottom, px from the upper left corner of the frame."""
+Box = tuple[float, float, float, float]  # left, top, right and bottom, px from the upper left corner of the frame
 
 SOURCE_TYPE = "http://cv.iptc.org/newscodes/digitalsourcetype/compositeWithTrainedAlgorithmicMedia"
 """IPTC's digital source type for recorded pictures into which parts were set that a model learned from recordings."""
@@ -30,10 +29,8 @@ STATEMENT = (
 LABEL = "synthetic"
 LETTER_SHARE, SMALLEST_LETTERS_PX = 0.035, 9
 """Height of the label's letters, as a share of the frame's shorter side, and the least that can be read, px."""
-EDGE_DISTANCE = 0.8
-"""Distance of the label from the edges of the frame, relative to the height of its letters."""
-GROUND_OPACITY, LETTER_OPACITY = 0.45, 0.9
-"""Opacity of the label's black ground, and of its white letters."""
+EDGE_DISTANCE = 0.8  # distance of the label from the edges of the frame, relative to the height of its letters
+GROUND_OPACITY, LETTER_OPACITY = 0.45, 0.9  # opacity of the label's black ground, and of its white letters
 
 
 class MarkMetadata(NamedTuple):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.corpora import Corpus, Selection
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.measures import curves
-from lipmotion.measures.closures import clip_closure_counts, measure_closures, measure_phones
+from lipmotion.measures.closures import count_matches, find_closings, measure_closures, measure_phones
 from lipmotion.measures.curves import Clips, compute_interval
 from lipmotion.motion.frame_labels import is_away_from_speech
 from lipmotion.pipeline.model import Model
@@ -24,8 +24,7 @@ from lipmotion.units import VISEMES, Lexicon
 from lipmotion_lab.evaluation import held_out
 
 BILABIAL = VISEMES["bi"]
-SILENCE_MARGIN_S = 0.3
-"""Seconds before and after speech in which the mouth may still close or already open."""
+SILENCE_MARGIN_S = 0.3  # seconds before and after speech in which the mouth may still close or already open
 
 
 class Compared(Protocol):
@@ -191,7 +190,7 @@ def evaluate(
         figures["seen_in_training"] = True
     if model.speakers is not None:  # the others are compared with the mean person
         speakers = {utterance.speaker for utterance in recordings.utterances}
-        figures["strangers"] = sorted(speakers - set(model.speakers.names))
+        figures["strangers"] = sorted(speakers - set(model.speakers))
     return replace_nan(figures)
 
 
@@ -208,8 +207,7 @@ def _was_trained_on(model: Model, utterances: Sequence[Utterance], folder: str) 
 
 
 Array = NDArray[np.float64]
-MIN_DIFFERENCE = 1e-6
-"""A smaller difference of correlations, or of lengths in eye distances, is rounding."""
+MIN_DIFFERENCE = 1e-6  # a smaller difference of correlations, or of lengths in eye distances, is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,8 +268,9 @@ def sum_distances(generated: Clips, original: Clips) -> ClipStatistic:
 
 def sum_closings(generated: Clips, original: Clips, threshold: float) -> ClipStatistic:
     """Return the share, in %, of original closings found in generated openings; NaN where there are none."""
-    hits, count = clip_closure_counts(generated, original, threshold)
-    return ClipStatistic([np.concatenate([100 * hit, of]) for hit, of in zip(hits, count, strict=True)], divide_sums)
+    sides = ((find_closings(side[:, 0], threshold) for side in pair) for pair in zip(generated, original, strict=True))
+    sums = [np.array([100.0 * count_matches(of, made), len(of)]) for made, of in sides]
+    return ClipStatistic(sums, divide_sums)
 
 
 def pair_curves(

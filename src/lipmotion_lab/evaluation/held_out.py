@@ -199,8 +199,7 @@ def generate_compared(
     """Return recorded and generated motion of all utterances for their speech. Raises CorpusError: other channels."""
     clips, channels = [], recordings.channels
     for utterance, spoken, reference in zip(recordings.utterances, speech, recordings.reference, strict=True):
-        speakers = recordings.speakers
-        person = speakers.of(utterance.speaker) if speakers and utterance.speaker in speakers.names else None
+        person = recordings.speakers.get(utterance.speaker) if recordings.speakers else None
         generated = generate_for(person, engine, learned, spoken).motion
         if missing := [name for name in channels if name not in generated.names]:
             names = ", ".join(missing[:6])

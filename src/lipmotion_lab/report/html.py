@@ -1,23 +1,16 @@
-"""Pages of HTML that need no network: elements that escape what they hold, and charts (SVG), light and dark."""
+"""Pages of HTML that need no network: elements that escape what they hold, in light and dark."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from html import escape
-
-import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.pipeline.batch.report import insert_colours
 from lipmotion.printable import printable
 
-VOID = frozenset({"br", "img", "link", "meta"})
-"""Elements that hold nothing and have no end."""
+VOID = frozenset({"br", "img", "link", "meta"})  # elements that hold nothing and have no end
 SIMPLE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9-]*")
-GENERATOR = '<meta name="generator" content="lipmotion">'
-"""What pages of this program hold."""
+GENERATOR = '<meta name="generator" content="lipmotion">'  # what pages of this program hold
 
 
 class Html(str):
@@ -47,14 +40,13 @@ def joined(*content: str) -> Html:
     return Html("".join(text if isinstance(text, Html) else escape(printable(text)) for text in content))
 
 
-def build_page(title: str, style: str, *content: str, script: str = "") -> str:
+def build_page(title: str, style: str, *content: str) -> str:
     """Return a page that loads nothing but the pictures and videos in its own folder.
 
-    style  : CSS, with ``SHARED_COLOURS`` in the place of the colours of all pages
-    Neither may hold the end of its element: both are the caller's own, nothing of a user's.
+    style  : CSS, with ``SHARED_COLOURS`` in the place of the colours of all pages, without the end of its element: the
+             caller's own, nothing of a user's
     """
     policy = "default-src 'none'; style-src 'unsafe-inline'; img-src 'self' file:; media-src 'self' file:"
-    policy += "; script-src 'unsafe-inline'" if script else ""
     head = joined(
         element("meta", charset="utf-8"),
         element("meta", http_equiv="Content-Security-Policy", content_=policy),
@@ -63,8 +55,7 @@ def build_page(title: str, style: str, *content: str, script: str = "") -> str:
         element("title", title),
         Html(f"<style>\n{insert_colours(style)}</style>"),
     )
-    scripts = Html(f"<script>\n{script}</script>" if script else "")
-    body = element("body", *content, scripts)
+    body = element("body", *content)
     return f'<!DOCTYPE html>\n<html lang="en">\n{element("head", head)}\n{body}\n</html>\n'
 
 
@@ -74,150 +65,6 @@ def _simple(name: str) -> str:
     return name
 
 
-WIDTH, LEFT, RIGHT = 360, 8, 12
-"""Width of a drawing, and its margins: on a telephone a unit is about a pixel."""
-ROW, AXIS = 34, 30
-CURVE_HEIGHT, CURVE_LEFT, CURVE_TOP = 120, 34, 14
-STEPS = (1.0, 2.0, 5.0)
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Dot:
-    """A figure with its interval, and the paper's own; None: there is none."""
-
-    name: str
-    value: float | None
-    interval: tuple[float | None, float | None] | None = None
-    paper: float | None = None
-
-
-@dataclass(frozen=True)
-class _Scale:
-    low: float
-    high: float
-    start: float
-    stop: float
-
-    @classmethod
-    def fit(cls, values: Iterable[float], start: float, stop: float) -> _Scale:
-        known = list(values) or [0.0, 1.0]
-        low, high = min(known), max(known)
-        margin = 0.06 * (high - low) or 0.5 * abs(high) or 1.0
-        return cls(low - margin, high + margin, start, stop)
-
-    def __call__(self, value: float) -> float:
-        return self.start + (value - self.low) / (self.high - self.low) * (self.stop - self.start)
-
-    def list_ticks(self, count: int = 5) -> list[float]:
-        """Return up to ``count`` round values on the axis."""
-        smallest = (self.high - self.low) / count
-        power = 10.0 ** np.floor(np.log10(smallest))
-        step = next(power * step for step in (*STEPS, 10.0) if power * step >= smallest)
-        first = int(np.ceil(self.low / step))
-        return [float(step * n) for n in range(first, int(np.floor(self.high / step)) + 1)]
-
-
-def draw_dots(title: str, unit: str, rows: Sequence[Dot]) -> Html:
-    """Return a chart with a line for each row: the figure, its interval, and the paper's own as a diamond."""
-    values = [v for row in rows for v in (row.value, row.paper, *(row.interval or ())) if v is not None]
-    scale, height = _Scale.fit(values, LEFT, WIDTH - RIGHT), ROW * len(rows) + AXIS + 10
-    parts, bottom = [], height - AXIS - 2
-    for tick in scale.list_ticks():
-        parts.append(_draw_line(scale(tick), 0, scale(tick), bottom, "level"))
-        parts.append(_draw_text(scale(tick), bottom + 13, f"{tick:g}", "middle"))
-    parts.append(_draw_text(WIDTH - RIGHT, height - 4, unit, "end"))
-    for number, row in enumerate(rows):
-        y = ROW * number + 26
-        parts.append(_draw_text(LEFT, y - 11, row.name, class_="name"))
-        low, high = row.interval or (None, None)
-        if low is not None and high is not None:
-            parts.append(_draw_line(scale(low), y, scale(high), y, "interval"))
-        if row.value is not None:
-            parts.append(element("circle", cx=f"{scale(row.value):.1f}", cy=str(y), r="4.5", class_="here"))
-        if row.paper is not None:
-            x = scale(row.paper)
-            diamond = f"M{x:.1f} {y - 6}l6 6l-6 6l-6 -6z"
-            parts.append(element("path", d=diamond, class_="paper"))
-    spoken = "; ".join(f"{row.name} {_spell(row.value)}" for row in rows)
-    legend = "Dot and line: here, with its 95 % interval."
-    if any(row.paper is not None for row in rows):
-        legend += " Diamond: the paper's own figure, of another speaker and other recordings."
-    return _frame(title, f"{title}: {spoken}", height, parts, legend)
-
-
-def draw_curve(
-    title: str, time_s: Array, recorded: Array, generated: Array, marked: Sequence[tuple[float, float, str]]
-) -> Html:
-    """Return recorded (dashed) and generated motion [each shape=(N,)] over time; ``marked``: (start, end, name)."""
-    bottom = CURVE_HEIGHT - 18
-    across = _Scale(float(time_s[0]), float(time_s[-1]), CURVE_LEFT, WIDTH - 4)
-    up = _Scale.fit([*recorded, *generated], bottom, CURVE_TOP)
-    parts = []
-    for start_s, end_s, name in marked:
-        left, right = (across(min(max(time, across.low), across.high)) for time in (start_s, end_s))
-        shade = {"x": f"{left:.1f}", "width": f"{max(right - left, 1):.1f}"}
-        parts.append(element("rect", y=str(CURVE_TOP), height=str(bottom - CURVE_TOP), class_="marked", **shade))
-        parts.append(_draw_text((left + right) / 2, CURVE_TOP - 3, name, "middle"))
-    for tick in up.list_ticks(3):
-        parts.append(_draw_line(CURVE_LEFT, up(tick), WIDTH - 4, up(tick), "level"))
-        parts.append(_draw_text(CURVE_LEFT - 4, up(tick) + 4, f"{tick:g}", "end"))
-    parts += [_draw_text(across(tick), CURVE_HEIGHT - 4, f"{tick:g} s", "middle") for tick in across.list_ticks(4)]
-    for values, kind in ((recorded, "recorded"), (generated, "generated")):
-        points = " ".join(f"{across(t):.1f},{up(v):.1f}" for t, v in zip(time_s, values, strict=True))
-        parts.append(element("polyline", points=points, class_=kind))
-    spoken = f"{title}: recorded and generated opening of the mouth over {time_s[-1] - time_s[0]:.1f} s"
-    return _frame(title, spoken, CURVE_HEIGHT, parts, title)
-
-
-def draw_rising(title: str, unit: str, lines: Mapping[str, Sequence[tuple[float, Dot]]]) -> Html:
-    """Return figures with intervals over a number, on a logarithmic axis: a line for each name."""
-    height, bottom = 220, 186
-    points = [point for line in lines.values() for point in line if point[1].value is not None]
-    up = _Scale.fit([v for _, dot in points for v in (dot.value, *(dot.interval or ())) if v is not None], bottom, 10)
-    across = _Scale.fit([float(np.log(n)) for n, _ in points], CURVE_LEFT + 4, WIDTH - RIGHT)
-    parts = []
-    for tick in up.list_ticks():
-        parts.append(_draw_line(CURVE_LEFT, up(tick), WIDTH - RIGHT, up(tick), "level"))
-        parts.append(_draw_text(CURVE_LEFT - 4, up(tick) + 4, f"{tick:g}", "end"))
-    numbers = sorted({number for number, _ in points})
-    parts += [_draw_text(across(float(np.log(n))), bottom + 16, f"{n:g}", "middle") for n in numbers]
-    parts.append(_draw_text(WIDTH - RIGHT, height - 5, unit, "end"))
-    for order, line in enumerate(lines.values()):
-        kind = ("generated", "second")[order % 2]
-        known = [(across(float(np.log(n))), dot) for n, dot in line if dot.value is not None]
-        places = " ".join(f"{x:.1f},{up(dot.value or 0):.1f}" for x, dot in known)
-        parts.append(element("polyline", points=places, class_=kind))
-        for x, dot in known:
-            low, high = dot.interval or (None, None)
-            if low is not None and high is not None:
-                parts.append(_draw_line(x + 2 * order, up(low), x + 2 * order, up(high), kind))
-            parts.append(element("circle", cx=f"{x:.1f}", cy=f"{up(dot.value or 0):.1f}", r="3", class_=kind))
-    looks = ("line", "dashed line")
-    legend = "; ".join(f"{looks[order % 2]}: {name}" for order, name in enumerate(lines))
-    spelt = {name: ", ".join(f"{n:g} {_spell(dot.value)}" for n, dot in line) for name, line in lines.items()}
-    spoken = "; ".join(f"{name}: {text}" for name, text in spelt.items())
-    return _frame(title, f"{title}: {spoken}", height, parts, f"{title}. {legend.capitalize()}. Bars: 95 % intervals.")
-
-
-def _frame(title: str, spoken: str, height: int, parts: Sequence[Html], caption: str) -> Html:
-    about = {"viewBox": f"0 0 {WIDTH} {height}", "role": "img", "aria_label": spoken, "class_": "chart"}
-    return add_caption(element("svg", element("title", title), *parts, **about), caption)
-
-
 def add_caption(content: Html, caption: str) -> Html:
     """Return a figure with its caption."""
     return element("figure", content, element("figcaption", caption))
-
-
-def _draw_line(x1: float, y1: float, x2: float, y2: float, kind: str) -> Html:
-    ends = {"x1": x1, "y1": y1, "x2": x2, "y2": y2}
-    return element("line", class_=kind, **{name: f"{value:.1f}" for name, value in ends.items()})
-
-
-def _draw_text(x: float, y: float, text: str, anchor: str = "start", class_: str | None = None) -> Html:
-    return element("text", text, x=f"{x:.1f}", y=f"{y:.1f}", text_anchor=anchor, class_=class_)
-
-
-def _spell(value: float | None) -> str:
-    return "not defined" if value is None else f"{value:.3g}"

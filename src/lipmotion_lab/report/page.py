@@ -1,4 +1,4 @@
-"""The page of a report: what was found first, then every experiment with its words, charts, tables and videos."""
+"""The page of a report: what was found first, then every experiment with its words, tables, pictures and videos."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from lipmotion.types import Audio, Channel, Monitor, Motion, Span, Timeline, Uni
 from lipmotion_faces import Staging, stage_face
 from lipmotion_faces.video.mp4 import SOUND_HZ, write_mp4
 from lipmotion_lab.evaluation.evaluate import BILABIAL
-from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES, OPENING, ComparedClip, HeldOutRecordings
-from lipmotion_lab.report.html import Html, add_caption, build_page, draw_curve, element, joined
+from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES, ComparedClip, HeldOutRecordings
+from lipmotion_lab.report.html import Html, add_caption, build_page, element, joined
 from lipmotion_lab.report.section import Section, write_text
 
 FPS = 25.0
@@ -123,19 +123,7 @@ def draw_mouths(
     return (picture[LOWER_FACE] for picture in stage_face("woman", STAGING).render(motion, silence, fps=FPS))
 
 
-SCRIPT = """"use strict";
-for (const button of document.querySelectorAll("button.together")) {
-  const videos = button.parentElement.querySelectorAll("video");
-  button.hidden = false;
-  button.addEventListener("click", () => videos.forEach((video, number) => {
-    video.muted = number > 0;
-    video.currentTime = 0;
-    video.play();
-  }));
-}
-"""
-FOLDED = 3
-"""More tables than these are folded together."""
+FOLDED = 3  # more tables than these are folded together
 QUICK_WARNING = (
     "A quick run: few recordings, small models. It shows that everything runs; what it finds about the papers is worth "
     "little. Run it without --quick for figures."
@@ -150,11 +138,10 @@ HOW_TO_READ = (
 
 @dataclass(frozen=True)
 class FinishedPart:
-    """An experiment whose figures are there, and the motion of one clip (``ClipKeeper``)."""
+    """An experiment whose figures are there."""
 
     name: str
     record: Mapping[str, Any]
-    motion: Mapping[str, Any]
     section: Section
 
 
@@ -182,7 +169,7 @@ def write_html(  # noqa: PLR0913
     overview = element("ul", *entries, class_="overview")
     main = element("main", *warning, overview, element("p", how_to_read, class_="quiet"), *map(_write_part, finished))
     footer = element("footer", element("h2", "The corpus and the run"), _list(about))
-    return build_page(title, style, header, main, footer, script=SCRIPT)
+    return build_page(title, style, header, main, footer)
 
 
 def _write_part(part: FinishedPart) -> Html:
@@ -204,6 +191,19 @@ def _write_part(part: FinishedPart) -> Html:
         )
         for each in part.record["pictures"]
     ]
+    videos = [
+        add_caption(
+            element(
+                "video",
+                controls=True,
+                preload="metadata",
+                src=f"{part.name}/{each['file']}",
+                aria_label=each["caption"],
+            ),
+            each["caption"],
+        )
+        for each in part.record.get("videos", ())
+    ]
     made_with = {
         key: ", ".join(f"{name} {value}" for name, value in content.items() if value is not None)
         if isinstance(content, Mapping)
@@ -216,10 +216,10 @@ def _write_part(part: FinishedPart) -> Html:
         element("h2", section.title, id=heading),
         element("p", section.about, class_="quiet"),
         element("p", section.verdict, class_="verdict"),
-        element("div", element("div", *words), element("div", *section.charts), class_="beside"),
+        *words,
         section.table.as_html(part.name),
         *more,
-        *_write_clip(part),
+        *([element("h3", part.record["clip"]), element("div", *videos, class_="videos")] if videos else []),
         *([element("h3", "Pictures"), element("div", *pictures, class_="pictures")] if pictures else []),
         element(
             "details",
@@ -232,41 +232,6 @@ def _write_part(part: FinishedPart) -> Html:
         id=part.name,
         aria_labelledby=heading,
     )
-
-
-def _write_clip(part: FinishedPart) -> list[Html]:
-    """Return the recording that is shown: its videos, and the curves of its opening with its p, b and m."""
-    if not part.motion:
-        return []
-    name, words, systems = part.motion["name"], " ".join(part.motion["words"]), part.motion["systems"]
-    column, time_s = part.motion["channels"].index(OPENING), np.array(part.motion["time_s"])
-    recorded = np.array(part.motion[RECORDED])[:, column]
-    marked = [tuple(span) for span in part.motion["spoken"] if span[2] in BILABIAL]
-    curves = [
-        draw_curve(each, time_s, recorded, np.array(systems[each])[:, column], marked)
-        for each in part.section.shown
-        if each in systems
-    ]
-    videos = []
-    for each in part.record["videos"]:
-        about = {"src": f"{part.name}/{each['file']}", "aria_label": f"{name}: {each['caption']}"}
-        video = element("video", controls=True, preload="metadata", playsinline=True, **about)
-        videos.append(add_caption(video, each["caption"]))
-    together = [element("button", "Play all together", type="button", class_="together", hidden=True)] if videos else []
-    quoted = f", “{words}”" if words else ""
-    return [
-        element("h3", "One recording, seen and heard"),
-        element(
-            "p",
-            f"{name}{quoted}: of the compared recordings the one with most p, b and m, whatever the systems make of it."
-            f"{' Sound alone was given.' if videos else ''}",
-            class_="quiet",
-        ),
-        element("div", *together, element("div", *videos, class_="videos"), class_="clip"),
-        element("h3", "Its opening of the mouth"),
-        element("p", "Dashed: recorded, in eye distances; line: generated; shaded: p, b and m.", class_="quiet"),
-        element("div", *curves, class_="grid"),
-    ]
 
 
 def _list(entries: Mapping[str, str]) -> Html:

@@ -111,8 +111,8 @@ PARTS: dict[str, ReportPart] = {
 """All experiments by name, in the order of the report: the papers' first."""
 
 
-PAGE, FIGURES, MOTION = "index.html", "figures.json", "motion.json"
-"""The page; and in the folder of an experiment its figures with their stamp, and the motion of one clip."""
+PAGE, FIGURES = "index.html", "figures.json"
+"""The page; and in the folder of an experiment its figures with their stamp."""
 KEY_DIGITS = 8
 NOT_YET = "not finished; the same command goes on with it"
 FAILED, AGAIN = "failed: ", "mend that, then give the same command: it goes on with it"
@@ -224,11 +224,11 @@ class _Writer:
         """Return a digest of all that the figures of an experiment depend on."""
         return hashlib.sha256(f"{name} {self.digest}".encode()).hexdigest()
 
-    def record(self, name: str) -> tuple[dict[str, Any], dict[str, Any]] | None:
-        """Return figures and motion of an experiment that is finished; None: it is not, or was another one."""
+    def record(self, name: str) -> dict[str, Any] | None:
+        """Return the figures of an experiment that is finished; None: it is not, or was another one."""
         try:
-            record, motion = (from_json((self.folder / name / file).read_bytes()) for file in (FIGURES, MOTION))
-            return (record, motion) if record["key"] == self.make_key(name) else None
+            record = dict(from_json((self.folder / name / FIGURES).read_bytes()))
+            return record if record["key"] == self.make_key(name) else None
         except (OSError, ValueError, KeyError, TypeError):
             return None
 
@@ -239,7 +239,7 @@ class _Writer:
             record = self.record(name)
             if record is not None:
                 try:
-                    finished.append(FinishedPart(name, *record, part.section(record[0]["figures"])))
+                    finished.append(FinishedPart(name, record, part.section(record["figures"])))
                 except Exception as error:  # what one experiment says must not hide the others
                     self.failed[name] = error
         return finished
@@ -266,23 +266,25 @@ class _Writer:
         part, target, key = PARTS[name], self.folder / name, self.make_key(name)
         models = self.folder / "models" / self.make_key("models")[:KEY_DIGITS]  # of other recordings, other models
         with locks.keep_unfinished(self.folder / f"{name}.json") as work:
-            stamp, keeper = Stamp(), ClipKeeper(work / MOTION, key)
+            stamp, plots = Stamp(), work / "plots" if part.draws and self.can_draw else None
+            keeper = ClipKeeper(work / "motion.json", key)
             running = replace(settings.narrow(0, 0.95), receive=keeper)
-            plots = work / "plots" if part.draws and self.can_draw else None
             figures = part.run(PartRun(self.corpus, self.quick, work, models, plots, running))
             section, motion = part.section(figures), keeper.collect()
             made_with = stamp.collect(self._build_command([name]), self.corpus, settings)
             shutil.rmtree(target, ignore_errors=True)
             with files.replace_folder(target) as made:
-                drawing, captions = sub_monitor(settings.monitor, 0.95, 1), PLOT_CAPTIONS if plots is not None else {}
-                videos = write_videos(motion, section.shown, self.corpus, made, drawing) if motion else []
+                captions = PLOT_CAPTIONS if plots is not None else {}
                 for file in captions:
                     shutil.move(work / "plots" / file, made / file)
                 pictures = [{"file": file, "caption": caption} for file, caption in captions.items()]
-                record = {"experiment": name, "key": key, "stamp": made_with, "figures": figures, "videos": videos}
+                record = {"experiment": name, "key": key, "stamp": made_with, "figures": figures, "pictures": pictures}
+                if motion:
+                    drawing = sub_monitor(settings.monitor, 0.95, 1)
+                    record["clip"] = f"{motion['name']}: {' '.join(motion['words'])}"
+                    record["videos"] = write_videos(motion, section.shown, self.corpus, made, drawing)
                 section.write_tables(made / "tables")
-                for file, content in ((MOTION, motion), (FIGURES, record | {"pictures": pictures})):
-                    write_text(made / file, as_json(content, indent=1) + "\n")
+                write_text(made / FIGURES, as_json(record, indent=1) + "\n")
 
     def _build_command(self, wanted: Sequence[str]) -> list[str]:
         words = ["lipmotion", "experiment", "all", self.corpus.path.resolve().name, "-o", self.folder.resolve().name]

@@ -1,4 +1,4 @@
-"""One experiment in a report: words, charts, tables, and whether the order in the paper held."""
+"""One experiment in a report: words, tables, and whether the order in the paper held."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import Any
 
 from lipmotion.printable import printable
 from lipmotion.storage.files import atomic_file, make_folder
-from lipmotion.storage.json_text import as_json
 from lipmotion.storage.text_table import as_field
 from lipmotion_lab.evaluation.evaluate import find_sign, mark_significance
 from lipmotion_lab.evaluation.table import format_figure
@@ -79,12 +78,6 @@ class Table:
             rows.writerow({key: as_field(value) if isinstance(value, str) else value for key, value in record.items()})
         return text.getvalue()
 
-    def as_content(self) -> dict[str, Any]:
-        """Return the table as content of a JSON file."""
-        columns = {column.key: column.note or column.title for column in self.columns}
-        about = {"caption": self.caption, "reference": self.reference or None, "columns": columns}
-        return about | {"rows": self.list_records()}
-
     @property
     def star(self) -> str:
         """What the star beside a figure says."""
@@ -116,12 +109,11 @@ class Table:
         table = element(
             "table", element("caption", self.caption), element("thead", element("tr", *heads)), element("tbody", *lines)
         )
-        # the star, the files, and what the columns are
-        files = [element("a", kind.upper(), href=f"{folder}/tables/{self.name}.{kind}") for kind in ("csv", "json")]
+        file = element("a", "CSV", href=f"{folder}/tables/{self.name}.csv")
         notes = [joined(element("dt", each.title), element("dd", each.note)) for each in self.columns if each.note]
         about = element(
             "div",
-            element("p", self.star, "This table as ", files[0], " and ", files[1], "."),
+            element("p", self.star, "This table as ", file, "."),
             element("details", element("summary", "What the columns are"), element("dl", *notes)),
             class_="note",
         )
@@ -141,18 +133,16 @@ def _format_cell(column: Column, row: Row) -> tuple[str, str]:
     return format_figure(value, column.form).strip() + mark, interval
 
 
-FEW_CLIPS = 10
-"""Bootstrap intervals over fewer recordings are too narrow to be believed."""
+FEW_CLIPS = 10  # bootstrap intervals over fewer recordings are too narrow to be believed
 
 
 @dataclass(frozen=True)
 class Section:
-    """The words, charts and tables of one experiment.
+    """The words and tables of one experiment.
 
     about    : what was trained and compared, in sentences
     verdict  : what was found, in one sentence
     words    : by heading, sentences on what held and what did not
-    charts   : drawings
     table    : the most important one
     shown    : systems whose motion is shown, by the names that ``ExperimentSettings.receive`` gets
     """
@@ -161,7 +151,6 @@ class Section:
     about: str
     verdict: str
     words: Mapping[str, Sequence[str]]
-    charts: Sequence[Html]
     table: Table
     more: Sequence[Table] = ()
     shown: Sequence[str] = ()
@@ -172,11 +161,10 @@ class Section:
         return [self.table, *self.more]
 
     def write_tables(self, folder: Path) -> None:
-        """Write all tables to a folder, as CSV and as JSON."""
+        """Write all tables to a folder, as CSV."""
         make_folder(folder)
         for table in self.tables:
             write_text(folder / f"{table.name}.csv", table.as_csv())
-            write_text(folder / f"{table.name}.json", as_json(table.as_content(), indent=1) + "\n")
 
     def as_text(self) -> str:
         """Return what a terminal shows: what was compared, the tables, what their columns are, and what was found."""
@@ -205,8 +193,7 @@ def warn_of_few(clips: int) -> dict[str, list[str]]:
     return {"Beware": [warning]} if clips < FEW_CLIPS else {}
 
 
-CHANCE = 0.05
-"""Share of 95 % intervals that leave out 0 where nothing differs."""
+CHANCE = 0.05  # share of 95 % intervals that leave out 0 where nothing differs
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES
 from lipmotion_lab.evaluation.table import format_figure
 from lipmotion_lab.hofer2008 import PAPER_SCORES, PINS, REFERENCE_SET
 from lipmotion_lab.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS
-from lipmotion_lab.report.html import Dot, Html, draw_dots, draw_rising
 from lipmotion_lab.report.section import Column, PaperOrder, PaperPair, Row, Section, Table, warn_of_few
 from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM, SPLIT
 
@@ -64,12 +63,6 @@ def _make_tables(
     ]
 
 
-def _draw_acc(title: str, table: Table) -> Html:
-    """Return a chart of the correlation of every row, and the paper's own where a row has it."""
-    dots = [Dot(name, row["acc"], row["acc_95"], row.get("paper_acc")) for name, row in table.rows.items()]
-    return draw_dots(title, "ACC", dots)
-
-
 def build_hofer_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``run_hofer2008`` say; the case of the paper: audio alone, as printed, most states."""
     blocks = list(figures["tables"])
@@ -78,9 +71,6 @@ def build_hofer_section(figures: Mapping[str, Any]) -> Section:
     main = next(each for each in blocks if (each["states"], each["condition"], each["pins"]) == case)
     table, rows = _build_hofer_table(main), main["rows"]
     order = _build_hofer_order(main)
-    ranked = sorted(table.rows.items(), key=lambda item: -item[1]["paper"])
-    dots = [Dot(name, row["score"], row["score_95"], row["paper"]) for name, row in ranked]
-    charts = [draw_dots("Score of closings", "% of the recording's closings", dots)]
     about = (
         f"Which set of units predicts closings of the mouth best: the system of the paper, trained on "
         f"{figures['trained_on']} recordings with each of {len(rows)} sets, compared on {figures['clips']} of "
@@ -94,9 +84,9 @@ def build_hofer_section(figures: Mapping[str, Any]) -> Section:
             other = _build_hofer_table(block)
             heading = f"{other.caption.removeprefix(SETS)}: {_build_hofer_order(block).judge()}"
             more.append(replace(other, heading=heading))
-    shown = [f"{units}, {states} states" for units in table.rows]
     title = "Hofer, Yamagishi & Shimodaira 2008, Table 1: unit sets"
-    return Section(title, about, order.judge(), words, charts, table, more, shown)
+    shown = [f"{units}, {states} states" for units in table.rows]
+    return Section(title, about, order.judge(), words, table, more, shown)
 
 
 def _build_hofer_order(block: Mapping[str, Any]) -> PaperOrder:
@@ -197,10 +187,9 @@ def build_minnis_section(figures: Mapping[str, Any]) -> Section:
         f"recordings of {split}, sound alone."
         f"{' Quick: few epochs, only to see that it runs.' if figures['quick'] else ''}"
     )
-    charts = [_draw_acc("ACC of the opening", main)]
     more = [table for table in tables.values() if table is not main]
     title, compared = "Minnis & Breen 2000: unit selection", (PRINTED, UNGUIDED, EVERYTHING)
-    return Section(title, about, verdict, words, charts, main, more, compared)
+    return Section(title, about, verdict, words, main, more, compared)
 
 
 def _list_effects(rows: Mapping[str, Row], names: Iterable[str]) -> list[str]:
@@ -277,11 +266,8 @@ def build_xie_liu_section(figures: Mapping[str, Any]) -> Section:
     )
     if changed:
         about += " K on val: with the number of Gaussians that was best there; nothing was chosen on test."
-    charts = [_draw_acc("ACC of every system", main)]
     title = "Xie & Liu 2007, Table 3: structures of chains"
-    return Section(
-        title, about, verdict, words, charts, main, more, [name for name in PAPER_FIGURES if name in main.rows]
-    )
+    return Section(title, about, verdict, words, main, more, [name for name in PAPER_FIGURES if name in main.rows])
 
 
 def _build_systems_table(case: str, rows: Mapping[str, Row], size: Mapping[str, Any]) -> Table:
@@ -352,8 +338,7 @@ def build_engines_section(figures: Mapping[str, Any]) -> Section:
         f"recordings of {figures['split']}, with closed lips forced in p, b and m."
         f"{_describe_closings(figures, main.rows[best])}"
     )
-    charts = [_draw_acc("ACC of the opening", main)]
-    return Section("The engines of this project", about, verdict, words, charts, main, more, list(main.rows))
+    return Section("The engines of this project", about, verdict, words, main, more, list(main.rows))
 
 
 def build_learning_section(figures: Mapping[str, Any]) -> Section:
@@ -384,19 +369,14 @@ def build_learning_section(figures: Mapping[str, Any]) -> Section:
             f"It falls at: {', '.join(steps)}." if steps else "It falls at no step.",
         ]
     }
-    lines = {
-        condition: [(float(size), Dot(size, row["acc"], row["acc_95"])) for size, row in rows.items()]
-        for condition, rows in conditions.items()
-    }
     about = (
         f"The default engine trained on the first recordings of "
         f"{'the list given' if figures['order'] == 'given' else 'the training list, in a random order,'} alone, "
         f"compared on {figures['clips']} of {figures['split']}."
     )
     verdict = f"ACC {low} with {first} recordings, {high} with {last}."
-    charts = [draw_rising("ACC of the opening over recordings", "recordings", lines)] if len(sizes) > 1 else []
     shown = [f"{size} recordings" for size in dict.fromkeys((first, last))]
-    return Section("Learning curve", about, verdict, words, charts, main, more, shown)
+    return Section("Learning curve", about, verdict, words, main, more, shown)
 
 
 def build_folds_section(figures: Mapping[str, Any]) -> Section:
@@ -422,7 +402,7 @@ def build_folds_section(figures: Mapping[str, Any]) -> Section:
         words["Speakers unknown to the model"] = [
             "{} speakers: mean ACC {:.3f}, {:.3f} ({}) to {:.3f} ({}).".format(len(speakers), mean, *lowest, *highest)
         ]
-    return Section("Cross-validation", about, verdict, words, [], table)
+    return Section("Cross-validation", about, verdict, words, table)
 
 
 def build_blocks_section(figures: Mapping[str, Any]) -> Section:
@@ -436,4 +416,4 @@ def build_blocks_section(figures: Mapping[str, Any]) -> Section:
     )
     verdict = f"Highest ACC: {best}, {rows[best]['acc']:.3f}."
     table = Table("blocks", "Small corpus, sound alone", columns, rows, head="system")
-    return Section("Small corpus in blocks", about, verdict, warn_of_few(figures["clips"]), [], table)
+    return Section("Small corpus in blocks", about, verdict, warn_of_few(figures["clips"]), table)

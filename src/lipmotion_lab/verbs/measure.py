@@ -10,8 +10,7 @@ from lipmotion.cli.arguments.declared import add_input, add_options, add_output
 from lipmotion.cli.arguments.options import add_figures_arguments, add_machine_readable, list_or_all, report_figures
 from lipmotion.pipeline.request import Request
 
-ADAPTERS = "LIPMOTION_LEAGUE"
-"""Variable of the environment: the folder of adapters."""
+ADAPTERS = "LIPMOTION_LEAGUE"  # variable of the environment: the folder of adapters
 
 
 def add_compare(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -35,8 +35,7 @@ from lipmotion_lab.evaluation import evaluate
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, OPENING, ComparedClip, HeldOutRecordings, generate_clips
 from lipmotion_lab.xie_liu2007 import systems
 
-CONVERGENCE_RECORDINGS, PREDICTED_RECORDINGS = 8, 6
-"""Recordings that are shown in one picture."""
+CONVERGENCE_RECORDINGS, PREDICTED_RECORDINGS = 8, 6  # recordings that are shown in one picture
 PLOT_FILES = {"start": "conversion.png", "steps": "convergence.png", "clips": "predicted.png"}
 PLOT_CAPTIONS = {
     PLOT_FILES["start"]: "As Fig. 7: conversion by ph-vi-CHMM of one recording, from means along the best path by EM",

@@ -82,30 +82,20 @@ class Own {
   send(path, content = {}) { return this.ask(() => this.studio.server.post(path, content)); }
 
   showJob() {
-    const { job, damage, restorable } = this.training;
-    if (damage) {
-      return replaced(this.job, paragraph(damage, { className: "warning" }),
-        restorable ? textButton(TEXT.restore, () => this.send("training/restore"), { id: "own-restore" }) : null);
-    }
+    const { job } = this.training;
     if (!job) return replaced(this.job);
     const title = make("h3", { textContent: fill(OWN.states[job.state], { what: OWN.kinds[job.kind], name: job.name }) });
     if (job.state === "working") {
       this.bar = make("progress", { max: 1, "aria-label": OWN.progress });
       this.stage = make("p", { className: "hint" });
       replaced(this.job, title, this.bar, this.stage,
-        make("div", { className: "row" }, textButton(OWN.stop, () => this.send("training/stop"), { id: "own-stop" })), this.noted = make("div"), ...this.earlier());
+        make("div", { className: "row" }, textButton(OWN.stop, () => this.send("training/stop"), { id: "own-stop" })), this.noted = make("div"));
       this.notedCount = 0;
       return this.showProgress();
     }
     const again = textButton(OWN.again, () => this.send("training/again"), { id: "own-again", className: "main" });
     return replaced(this.job, title, job.error ? paragraph(job.error, { className: "warning" }) : null,
-      ...(job.report ? this.report(job) : [make("div", { className: "row" }, again)]), ...this.notes(job), ...this.earlier());
-  }
-
-  /** What was made before, and its report. */
-  earlier() {
-    return this.training.earlier.map((job) => make("details", {}, make("summary", { textContent: fill(OWN.states.done, { what: OWN.kinds[job.kind], name: job.name }) }),
-      ...this.report(job).filter(Boolean), ...this.notes(job)));
+      ...(job.report ? this.report(job) : [make("div", { className: "row" }, again)]), ...this.notes(job));
   }
 
   showProgress() {

@@ -22,8 +22,6 @@ export class Store {
     this.time_s = 0;
     this.comparing = false; // whether the other version is shown
     /** @type {"one" | "sides" | "over"} */ this.heads = "one"; // whether both are shown, and how
-    /** @type {{order: boolean[], span: {start_s: number, end_s: number}, place: number, asked: boolean, result: string} | null} */
-    this.blind = null; // comparison: which is the other one, of what stretch, which plays
     /** @type {any} */ this.progress = null; // of the open recording
     /** @type {any} */ this.training = {}; // how far a voice or a face is
     this.tool = "select";

@@ -174,7 +174,7 @@ export class Studio {
     }
     this.player.stop();
     this.weights.forget();
-    this.store.set({ recordingId: id, recording: null, sound: null, motion: null, deviation: null, confidence: null, weights: null, other: null, comparing: false, heads: "one", blind: null, doubts: [], selected: null, span: null, time_s: 0, progress: null });
+    this.store.set({ recordingId: id, recording: null, sound: null, motion: null, deviation: null, confidence: null, weights: null, other: null, comparing: false, heads: "one", doubts: [], selected: null, span: null, time_s: 0, progress: null });
     try {
       const recording = { ...NOTHING, ...(await this.server.read(`lines/${id}`)) };
       if (id !== this.store.recordingId) return;

@@ -14,15 +14,14 @@ from lipmotion.storage.sources import read_text_file
 from lipmotion.storage.text_table import as_field, from_field
 from lipmotion.types.values import parse_number, parse_whole
 
-PAIRED, MOS, RANKING = "paired", "mos", "ranking"
-KINDS = (PAIRED, MOS, RANKING)
+PAIRED, MOS = KINDS = ("paired", "mos")
 FIRST, SECOND = "first", "second"
 """Values of a paired comparison: which of the two videos was preferred."""
 RECORDING = "recording"
 """The condition that is the real recording, hidden among the others."""
 ANCHOR = "anchor"
 """The condition whose lips are out of step with the sound on purpose: who does not see that does not watch."""
-HIGHEST_MOS, HIGHEST_RANK = 5, 100
+HIGHEST_MOS = 5
 
 
 @dataclass(frozen=True)
@@ -30,13 +29,13 @@ class Answer:
     """One judgement of a rater.
 
     rater      : name of the rater in this study, which says nothing of the person
-    kind       : ``paired``, ``mos`` or ``ranking``
+    kind       : ``paired`` or ``mos``
     trial      : number of the trial in the order in which this rater saw them, from 0
     sentence   : what is said in the videos
     question   : what was asked: ``preference``, or a scale such as ``smoothness``
     condition  : what was judged; in a pair, what was shown first
     other      : in a pair, what was shown second; otherwise empty
-    value      : ``first`` or ``second`` of a pair; 1 to 5 for ``mos``; 0 to 100 for ``ranking``
+    value      : ``first`` or ``second`` of a pair; 1 to 5 for ``mos``
     seconds    : from the start of the trial to the answer
     plays      : how often the videos of the trial were played to their ends
     practice   : whether it was a trial for practice, which does not count
@@ -63,19 +62,14 @@ class Answer:
             raise InputError(f"the answer {shorten(self.value)!r}, required {POSSIBLE[self.kind]}")
 
 
-POSSIBLE = {
-    PAIRED: f"{FIRST!r} or {SECOND!r}",
-    MOS: f"a whole number from 1 to {HIGHEST_MOS}",
-    RANKING: f"a whole number from 0 to {HIGHEST_RANK}",
-}
+POSSIBLE = {PAIRED: f"{FIRST!r} or {SECOND!r}", MOS: f"a whole number from 1 to {HIGHEST_MOS}"}
 
 
 def is_possible(kind: str, value: str) -> bool:
     """Return whether a value can be the answer to a question of a kind."""
     if kind == PAIRED:
         return value in (FIRST, SECOND)
-    low, high = (1, HIGHEST_MOS) if kind == MOS else (0, HIGHEST_RANK)
-    return value.isascii() and value.isdecimal() and len(value) <= 3 and low <= int(value) <= high
+    return value.isascii() and value.isdecimal() and len(value) <= 3 and 1 <= int(value) <= HIGHEST_MOS
 
 
 COLUMNS = tuple(field.name for field in fields(Answer))

@@ -21,7 +21,7 @@ from starlette.routing import Route
 
 from lipmotion.errors import InputError
 from lipmotion.types.values import items, members, number, text, whole
-from lipmotion_studio.study.answers import HIGHEST_MOS, HIGHEST_RANK, MOS, PAIRED, POSSIBLE, is_possible
+from lipmotion_studio.study.answers import HIGHEST_MOS, MOS, PAIRED, POSSIBLE, is_possible
 from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial, list_questions, order_trials
 from lipmotion_studio.study.settings import POINTS, QUESTIONS, SCALES
 from lipmotion_studio.study.store import AnswerSheet, StudyStore, name_rater
@@ -214,6 +214,4 @@ class _Replies:
             names = [question for question, _, _ in list_questions(study, trial)]
             page["scales"] = [{"title": name.capitalize(), "asks": SCALES[name]} for name in names]
             page["points"] = POINTS[:HIGHEST_MOS]
-        elif study.kind != PAIRED:
-            page["highest"] = HIGHEST_RANK
         return place | page | {"ahead": ahead}

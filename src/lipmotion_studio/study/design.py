@@ -36,8 +36,8 @@ from lipmotion_faces.tracking.track import read_video_frames
 from lipmotion_faces.video.mp4 import SOUND_HZ, write_mp4
 from lipmotion_faces.video.synthetic_mark import LABEL, SOURCE_TYPE, mark_metadata
 from lipmotion_studio.study import manifest
-from lipmotion_studio.study.answers import ANCHOR, KINDS, MOS, PAIRED, RANKING, RECORDING
-from lipmotion_studio.study.settings import CONSENT, INSTRUCTIONS, Region, StudySettings
+from lipmotion_studio.study.answers import ANCHOR, KINDS, MOS, PAIRED, RECORDING
+from lipmotion_studio.study.settings import CONSENT, INSTRUCTIONS, StudySettings
 
 MODEL_SUFFIX, JOB_SUFFIX = ".lipmotion", ".toml"
 SHIPPED = "shipped"
@@ -158,13 +158,13 @@ def _animate_sentences(job: Job, made: dict[str, str]) -> Condition:
     return condition
 
 
-def encode_video(source: Path, target: Path, sound: Path, region: Region, late_ms: float = 0.0) -> float:
+def encode_video(source: Path, target: Path, sound: Path, late_ms: float = 0.0) -> float:
     """Write a video as raters see it (H.264, AAC), and return how long it lasts, in seconds.
 
     sound   : the recording whose sound a video without sound gets
     late_ms : how much later than it was the sound comes; the video keeps its length
     The mark of a synthetic video stays: raters do not see it, whoever gets the file can.
-    Raises InputError: it cannot be read, or the region is too small. Raises ExportError: it cannot be written.
+    Raises InputError: it cannot be read, or is too short to be late. Raises ExportError: it cannot be written.
     """
     frames, rate_hz = read_video_frames(source)
     with open_media(source) as container:
@@ -178,8 +178,8 @@ def encode_video(source: Path, target: Path, sound: Path, region: Region, late_m
     mark = mark_metadata() if is_marked else None
     marked: dict[str, Any] = {"tags": mark.tags, "xmp": mark.xmp} if mark else {}
     counter = itertools.count()
-    pictures = (region.cut(frame) for frame, _ in zip(frames, counter, strict=False))
-    write_mp4(target, pictures, fps=rate_hz, audio=late, **marked)
+    even = (frame[: len(frame) // 2 * 2, : frame.shape[1] // 2 * 2] for frame, _ in zip(frames, counter, strict=False))
+    write_mp4(target, even, fps=rate_hz, audio=late, **marked)
     return max(next(counter) / rate_hz, played.duration_s)
 
 
@@ -198,7 +198,7 @@ def design_study(
     """Make a study: render, encode and name its videos, plan its trials, and write its folder.
 
     output     : a folder that must not exist
-    kind       : ``paired``, ``mos`` or ``ranking``
+    kind       : ``paired`` or ``mos``
     conditions : texts ``NAME=SOURCE``; the source is a model, a job file, or a folder with a finished video or a motion
                  file for each sentence; ``recording`` alone: the videos of the sentences themselves
     sentences  : recordings, or folders of them, named as the sentences
@@ -216,8 +216,6 @@ def design_study(
     base = RECORDING if RECORDING in sources else next(iter(sources))
     names, seed = [recording.stem for recording in spoken], settings.seed
     late = manifest.shuffle(names, "anchor", seed)[: settings.anchors]  # the sentences that have an anchor
-    if kind == RANKING:  # every page has one, if any has
-        late = names if settings.anchors else []
     texts = {"consent": CONSENT, "instructions": INSTRUCTIONS[kind]}
     for name in texts:
         path = getattr(settings, name)
@@ -231,7 +229,7 @@ def design_study(
             is_anchor = name == base and recording.stem in late
             for shown_as in (name, ANCHOR) if is_anchor else (name,):  # named by their content
                 late_ms, file = settings.anchor_ms if shown_as == ANCHOR else 0.0, folder / manifest.VIDEOS / "made.mp4"
-                seconds = encode_video(video, file, recording, Region.parse(settings.region), late_ms)
+                seconds = encode_video(video, file, recording, late_ms)
                 digest = hash_file(file)
                 file.replace(file.with_name(f"{digest[:32]}.mp4"))
                 about = made | ({"sound_late_ms": f"{late_ms:g}"} if late_ms else {})

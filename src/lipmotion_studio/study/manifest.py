@@ -14,8 +14,8 @@ from lipmotion.errors import InputError
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.storage.sources import hash_file, read_text_file
 from lipmotion.types.values import any_members, as_tuple, items, number, text, truth, value_of, whole
-from lipmotion_studio.study.answers import ANCHOR, FIRST, HIGHEST_RANK, KINDS, MOS, PAIRED, RANKING, SECOND, is_possible
-from lipmotion_studio.study.settings import MATCH, PREFERENCE, SCALES
+from lipmotion_studio.study.answers import ANCHOR, FIRST, KINDS, MOS, PAIRED, SECOND, is_possible
+from lipmotion_studio.study.settings import PREFERENCE, SCALES
 
 FORMAT, VERSION = "lipmotion_studio.study", 1
 MANIFEST, VIDEOS = "study.json", "videos"
@@ -60,7 +60,7 @@ class StudyTrial:
 class Study:
     """A study: what is shown, and what is asked.
 
-    kind         : ``paired``, ``mos`` or ``ranking``
+    kind         : ``paired`` or ``mos``
     consent      : what raters agree to before they begin
     instructions : what raters are asked to do
     scales       : names of the scales of ``mos``
@@ -96,8 +96,7 @@ class Study:
             if not VIDEO_NAME.fullmatch(video.file):
                 raise ValueError(f"a video called {video.file!r}, required 32 hexadecimal digits and .mp4")
         for trial in self.trials:
-            required = {PAIRED: range(2, 3), MOS: range(1, 2)}.get(self.kind, range(2, 100))
-            if len(trial.videos) not in required:
+            if len(trial.videos) != (2 if self.kind == PAIRED else 1):
                 raise ValueError(f"a trial of {len(trial.videos)} videos in a study of the kind {self.kind}")
             if not all(0 <= video < len(self.videos) for video in trial.videos):
                 raise ValueError("a trial shows a video that is not there")
@@ -179,21 +178,18 @@ def make_main_trials(
 ) -> list[StudyTrial]:
     """Return the trials that count.
 
-    conditions : names, without the anchor; a ranking shows it where ``videos`` has one for the sentence
+    conditions : names, without the anchor
     Paired comparison: every pair of conditions in both orders, for every sentence, so that each rater judges each pair
-    twice: 3 conditions and 6 sentences make 36 trials. Mean opinion scores: every video once. Ranking: every sentence
-    once, with all conditions on a page.
-    Source: Hofer 2008, section 7; Xie & Liu 2007, section 7.3; ITU-R BS.1534 (the page of sliders).
+    twice: 3 conditions and 6 sentences make 36 trials. Mean opinion scores: every video once.
+    Source: Hofer 2008, section 7; Xie & Liu 2007, section 7.3.
     """
     trials = []
     for sentence in sentences:
         shown = {name: videos[sentence, name] for name in (*conditions, ANCHOR) if (sentence, name) in videos}
         if kind == PAIRED:
             trials += [StudyTrial((shown[a], shown[b])) for a, b in permutations(conditions, 2)]
-        elif kind == MOS:
-            trials += [StudyTrial((number,)) for number in shown.values()]
         else:
-            trials.append(StudyTrial(tuple(shown.values())))
+            trials += [StudyTrial((number,)) for number in shown.values()]
     return trials
 
 
@@ -209,7 +205,6 @@ def make_anchor_trials(base: str, sentences: Sequence[str], videos: VideoNumbers
 _ANSWERS = {
     PAIRED: ((SECOND, "the second video"), (FIRST, "the first video")),
     MOS: (("2", "2 on every scale"), ("4", "4 on every scale")),
-    RANKING: (("0", "0 for every video"), (str(HIGHEST_RANK), f"{HIGHEST_RANK} for every video")),
 }
 
 
@@ -232,16 +227,10 @@ def order_trials(study: Study, rater: int) -> list[StudyTrial]:
     """Return the trials as a rater sees them: practice first, then all others in an order of the rater's own.
 
     rater : number of the rater in the study
-    On a page of several videos for a ranking, they too have an order of the rater's own.
     """
     practice = [trial for trial in study.trials if trial.practice]
     counted = [trial for trial in study.trials if not trial.practice]
-    ordered = practice + shuffle(counted, study.seed, rater)
-    if study.kind in (PAIRED, MOS):
-        return ordered
-    return [
-        replace(trial, videos=tuple(shuffle(trial.videos, study.seed, rater, n))) for n, trial in enumerate(ordered)
-    ]
+    return practice + shuffle(counted, study.seed, rater)
 
 
 def list_questions(study: Study, trial: StudyTrial) -> list[tuple[str, str, str]]:
@@ -249,6 +238,4 @@ def list_questions(study: Study, trial: StudyTrial) -> list[tuple[str, str, str]
     conditions = [video.condition for video in study.list_shown(trial)]
     if study.kind == PAIRED:
         return [(PREFERENCE, conditions[0], conditions[1])]
-    if study.kind == MOS:
-        return [(scale, conditions[0], "") for scale in study.scales]
-    return [(MATCH, condition, "") for condition in conditions]
+    return [(scale, conditions[0], "") for scale in study.scales]

@@ -4,23 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from lipmotion.errors import InputError
 from lipmotion.types.configuration import Configuration, Rule, option
-from lipmotion_studio.study.answers import MOS, PAIRED, RANKING
+from lipmotion_studio.study.answers import MOS, PAIRED
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Pictures = NDArray[np.uint8]
-
-
-PREFERENCE, MATCH = "preference", "match"
-"""Questions of a paired comparison, and of a ranking."""
-
-
+PREFERENCE = "preference"
+"""The question of a paired comparison."""
 SCALES = {
     "smoothness": "Does the mouth move smoothly, without jumps or trembling?",
     "closure": "Do the lips close where they should, as in m, b and p, and only there?",
@@ -31,11 +21,7 @@ SCALES = {
 """The criteria of Xie & Liu 2007 (section 7.3), which names them without a definition: the questions are ours."""
 POINTS = ("bad", "poor", "fair", "good", "excellent")
 """Words of the points 1 to 5: the ends are the paper's, those between are of ITU-T P.800."""
-QUESTIONS = {
-    PAIRED: "In which video do the lips match the sound better?",
-    MOS: "How good is the mouth in this video?",
-    RANKING: "How well do the lips match the sound? 0 is not at all, 100 is perfectly.",
-}
+QUESTIONS = {PAIRED: "In which video do the lips match the sound better?", MOS: "How good is the mouth in this video?"}
 CONSENT = """You will watch short videos of a person or a drawn face speaking, and judge how the mouth moves. Some of the videos are recordings of people; in others a program makes the mouth move.
 Taking part is voluntary. You may stop at any time by closing the page, without a reason.
 Stored are your judgements, how often you played each video, and how long each judgement took; under a number, without your name, address or anything about your device.
@@ -43,56 +29,8 @@ You may have your judgements deleted later: tell the researcher your number, whi
 INSTRUCTIONS = {
     PAIRED: """You will see pairs of videos in which the same sentence is said. Play both to the end, with sound, as often as you like. Then choose the one in which the lips match the sound better. If you are not sure, guess.""",  # noqa: E501
     MOS: """You will see one video at a time. Play it to the end, with sound, as often as you like. Then judge the mouth on every scale, from 1 (bad) to 5 (excellent).""",  # noqa: E501
-    RANKING: """You will see several videos of one sentence on a page. Play each to the end, with sound, as often as you like. Then set the slider of each between 0 (the lips do not match the sound at all) and 100 (they match it perfectly).""",  # noqa: E501
 }
 """What raters are asked to do, for each kind; paragraphs are lines."""
-
-
-MIN_REGION_PX = 16
-
-
-@dataclass(frozen=True)
-class Region:
-    """A part of pictures, as shares from the upper left. Raises InputError: not inside.
-
-    >>> Region.parse("0.25,0.5,0.5,0.4")
-    Region(left=0.25, top=0.5, width=0.5, height=0.4)
-    """
-
-    left: float = 0.0
-    top: float = 0.0
-    width: float = 1.0
-    height: float = 1.0
-
-    def __post_init__(self) -> None:
-        spans = ((self.left, self.width), (self.top, self.height))
-        if not all(0 <= start < start + size <= 1 + 1e-9 for start, size in spans):
-            raise InputError(
-                f"the region {self.left:g},{self.top:g},{self.width:g},{self.height:g}, required shares of width and "
-                "height inside the picture: LEFT,TOP,WIDTH,HEIGHT"
-            )
-
-    @classmethod
-    def parse(cls, text: str) -> Region:
-        """Return the region of a text, or the whole picture. Raises InputError: not four numbers inside."""
-        if not text:
-            return cls()
-        try:
-            left, top, width, height = map(float, text.split(","))
-        except ValueError as error:
-            raise InputError(f"the region {text!r}, required four numbers: LEFT,TOP,WIDTH,HEIGHT") from error
-        return cls(left, top, width, height)
-
-    def cut(self, picture: Pictures) -> Pictures:
-        """Return the part of a picture [shape=(H, W, 3)], of even height and width. Raises InputError: too small."""
-        full_height, full_width = picture.shape[:2]
-        top, left = round(self.top * full_height), round(self.left * full_width)
-        height, width = (round(self.height * full_height) // 2 * 2, round(self.width * full_width) // 2 * 2)
-        part = picture[top : top + height, left : left + width]
-        part = part[: len(part) // 2 * 2, : part.shape[1] // 2 * 2]
-        if min(part.shape[:2]) < MIN_REGION_PX:
-            raise InputError(f"the region has {part.shape[1]} × {part.shape[0]} pixels; give a larger one")
-        return part
 
 
 # ruff: noqa: RUF009 (``option`` returns the field of a dataclass)
@@ -122,11 +60,6 @@ class StudySettings(Configuration):
         400.0, Rule(50, most=5000), metavar="MS", help="how late the sound is in them (default: 400)"
     )
     checks: int = option(1, Rule(0, most=100), metavar="N", help="pages that tell what to answer (default: 1)")
-    region: str = option(
-        "",
-        metavar="LEFT,TOP,WIDTH,HEIGHT",
-        help="show only this part, as of the mouth, in shares of width and height (default: the whole picture)",
-    )
     face: str = option(
         "portrait", reads="face", metavar="NAME|FILE.face", help="that motion is drawn with (default: portrait)"
     )
@@ -136,7 +69,6 @@ class StudySettings(Configuration):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        Region.parse(self.region)
         unknown = [name for name in self.scales if name not in SCALES]
         if unknown or not self.scales or len(set(self.scales)) < len(self.scales):
             raise InputError(f"the scales {','.join(self.scales)}, required some of {','.join(SCALES)}, each once")

@@ -8,12 +8,11 @@ from lipmotion.cli.arguments.declared import add_input, add_options, add_output,
 from lipmotion.cli.arguments.options import add_figures_arguments, add_machine_readable, report_figures
 from lipmotion.cli.terminal.printing import flush_output, print_line
 from lipmotion.printable import printable
-from lipmotion_studio.study.answers import MOS, PAIRED, RANKING
+from lipmotion_studio.study.answers import MOS, PAIRED
 
 KINDS = {
     PAIRED: "which of two videos is better: every pair of conditions in both orders (Hofer 2008)",
     MOS: "five-point scales: every video alone (Xie & Liu 2007)",
-    RANKING: "sliders from 0 to 100: all conditions of a sentence on one page",
 }
 
 

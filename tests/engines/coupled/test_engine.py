@@ -127,24 +127,6 @@ def test_the_gaussian_is_the_most_responsible_one(name, row):
                 assert value.deviation == pytest.approx(np.sqrt(variance[column]) * visual.deviation[column])
 
 
-def test_shares_of_regressions_are_posteriors_of_the_visual_chain_and_in_silence_the_rest_pose():
-    model, inference = fitted("ph-vi-CHMM")
-    posterior = inference.posteriors.chains[1]
-    inputs, (regression,) = model.regression
-    mean = regression.means(inputs(inference.observations.streams[0], inference.posteriors.chains[0]), posterior)
-    for row in (64, 75, 91):
-        (found,) = explanation("ph-vi-CHMM", row).regressions
-        names = [model.chains.structure.state_name(1, state) for state in range(posterior.shape[1])]
-        for share in found.shares:
-            assert share.probability == pytest.approx(posterior[row, names.index(share.name)], abs=0.02)
-        opening = mean[row, 0] * model.visual[0].deviation[0] + model.visual[0].mean[0]
-        assert found.channels["opening"].value == pytest.approx(opening)
-    assert model.is_away_from_speech(inference.posteriors.chains[0])[5]
-    (found,) = explanation("ph-vi-CHMM", 5).regressions
-    assert found.shares == (types.NamedProbability("rest", 1.0),)
-    assert found.channels["opening"].value == pytest.approx(model.rest_pose[0])
-
-
 @pytest.mark.long
 def test_recordings_of_several_blocks_are_explained_as_one():
     border = generation.BLOCK_FRAMES

@@ -19,8 +19,7 @@ from oracles.statistics import random_mixtures
 
 COUPLED, FACTORIAL, MULTISTREAM, HMM = "coupled", "factorial", "multistream", "hmm"
 """Values of the option ``structure``."""
-SYSTEMS = ("ph-HMM", "ph-MSHMM", "ph-CHMM", "ph-FHMM", "ph-vi-CHMM", "ph-vi-FHMM")
-"""Presets."""
+SYSTEMS = ("ph-HMM", "ph-MSHMM", "ph-CHMM", "ph-FHMM", "ph-vi-CHMM", "ph-vi-FHMM")  # presets
 BILABIAL = ("p", "b", "m", "em")
 SHUT = (*BILABIAL, "sil", "sp")
 THREE = UnitSet(

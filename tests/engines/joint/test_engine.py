@@ -64,13 +64,6 @@ def test_recognised_units_are_units_and_no_phones() -> None:
             assert span.label == types.Unit("", unit, confidence=0.0)
 
 
-@pytest.mark.long
-def test_a_recognised_unit_of_one_phone_is_that_phone() -> None:
-    found = recognised("phone").units
-    assert [span.label.phone for span in found] == [span.label.phone for span in SOUND.units]
-    assert found[2].label.unit == "t-aa+p"
-
-
 def test_recognised_units_may_be_given_and_come_back_as_they_are() -> None:
     first = recognised()
     again = generated(replace(SOUND, units=first.units))
@@ -86,13 +79,6 @@ def test_lips_meet_in_recognised_units_of_p_b_m_alone() -> None:
     for span in lips:
         assert closed[span].min() <= closure.closed + 1e-9
     assert any(free[span].min() > closure.closed for span in lips)
-
-
-@pytest.mark.long
-def test_a_closed_unit_that_silence_shares_closes_nothing_by_itself() -> None:
-    pinned, free = recognised("2vis"), recognised("2vis", closures=False)
-    assert "closed" in {span.label.unit for span in pinned.units}
-    assert pinned.motion.values == pytest.approx(free.motion.values, abs=1e-9)
 
 
 def late(units: types.Timeline[types.Unit], by_s: float) -> types.Timeline[types.Unit]:
@@ -111,12 +97,6 @@ def test_own_alignment_gives_the_times_of_the_sound_to_the_phones_of_words() -> 
     assert np.abs(own.motion["opening"] - kept.motion["opening"]).max() > 0.05
     times_given = generated(replace(mistimed, times_given=True), own_alignment=True)
     assert times_given.motion.values == pytest.approx(kept.motion.values, abs=1e-9)
-
-
-def test_units_without_room_for_their_states_keep_their_times() -> None:
-    crowded = timeline(("t", "aa") * 40, 0.02)
-    hasty = replace(SOUND, units=types.Timeline(tuple(span for span in crowded if span.end_s < 2.0)))
-    assert spans(generated(hasty, own_alignment=True).units) == spans(hasty.units)
 
 
 def test_a_flat_start_is_that_of_units_of_equal_length() -> None:

@@ -16,7 +16,6 @@ from lipmotion.engines.selection.inventory import (
     SILENT,
     TABLE_1,
     RecordedUnits,
-    cover_recording,
     find_substitutes,
     index_units,
     list_windows,
@@ -29,18 +28,6 @@ from lipmotion.testing import timeline as spoken
 from lipmotion.types import Span, Timeline, Unit, silent_monitor
 from lipmotion.units import PHONES
 from oracles.biases import longest, matches
-
-
-def test_motion_that_is_not_stored_is_a_line_between_its_edges() -> None:
-    units = recorded(timeline("s aa"), timeline("iy s"))
-    assert len(units.values) == 82
-    motion = np.arange(20.0)[:, None]
-    cut = replace(units, stored_ranges=np.array([[5, 15], [31, 36], [60, 65]]), motion=motion)
-    assert cut.values[:6, 0] == pytest.approx([0] * 6)
-    assert cut.values[14:32, 0] == pytest.approx(np.linspace(9, 10, 18))
-    assert cut.values[35:41, 0] == pytest.approx([14] * 6)
-    assert cut.values[41:60, 0] == pytest.approx([15] * 19)
-    assert cut.values[64:, 0] == pytest.approx([19] * 18)
 
 
 def phones_of(text: str, word: str = "") -> Timeline[Unit]:
@@ -63,13 +50,6 @@ def test_words_begin_and_end_where_the_word_changes_and_suppressed_phones_are_on
     assert symbols.tolist() == [INVISIBLE_SYMBOL, INVISIBLE_SYMBOL, PHONE_NUMBER["k"], SILENT]
     with pytest.raises(InputError, match="unknown phone 'xx' at 0"):
         list_windows([phones_of("xx")])
-
-
-def test_gaps_are_silence() -> None:
-    filled = cover_recording(Timeline((Span(0.2, 0.3, Unit("b")), Span(0.5, 0.6, Unit("aa")))), 1.0)
-    edges_s, phones = [0.0, 0.2, 0.3, 0.5, 0.6, 1.0], "sil b sil aa sil".split()
-    found = [(span.start_s, span.end_s, span.label.phone) for span in filled]
-    assert found == list(zip(edges_s, edges_s[1:], phones, strict=False))
 
 
 AROUND = (("s", "f"), ("iy", "uw"), ("aa",), ("m", "n"), ("uw", "s"))
@@ -203,16 +183,6 @@ def test_a_suppressed_phone_is_an_invisible_neighbour_in_table_1() -> None:
         target = costs.target(costs.shown(list_windows([timeline(text)])), None, None)
         shared = [PHONES[phone] for phone in target.windows.phones].index("aa")
         assert costs.forward_share(target, shared) == TABLE_1[before, after], text
-
-
-def test_the_preset_needs_nothing_but_phones() -> None:
-    engine = PRESET
-    needs = engine.inputs()
-    assert (needs.prior, needs.posteriors, needs.conditions) == (False, False, 0)
-    assert (engine.config.candidates, engine.config.beam) == (0, 0)
-    assert engine.without_closures() == engine
-    changed = engines.create_engine(preset="minnis2000", settings=["candidates=300"])
-    assert changed.config == replace(engine.config, candidates=300)  # type: ignore[attr-defined]
 
 
 def test_a_model_of_the_preset_knows_no_stand_ins_of_suppressed_phones_and_names_what_it_plays(model) -> None:

@@ -9,16 +9,7 @@ from lipmotion.errors import ExportError, ModelFormatError
 from lipmotion.storage.archive import read_archive, read_archive_header, write_archive
 from lipmotion_faces.appearance.person import APPEARANCE, PARTS
 from lipmotion_faces.coded_video import STORED_VIDEO
-from lipmotion_faces.filmed.face import (
-    BACKGROUND,
-    MAX_TAKES,
-    TAKE,
-    VERSION,
-    FilmedFace,
-    load_face,
-    read_face_header,
-    save_face,
-)
+from lipmotion_faces.filmed.face import BACKGROUND, MAX_TAKES, TAKE, VERSION, FilmedFace, load_face, save_face
 from pipeline.damage import DAMAGES, UNREADABLE, damaged
 
 CODED = ("appearance/mouths", "appearance/jaws", "background/data")
@@ -92,13 +83,6 @@ def test_the_same_face_is_the_same_file(small: FilmedFace, arrays: dict[str, np.
     assert load_face(tmp_path / "mute.face").takes == ()
 
 
-def test_the_summary_says_what_it_is(filmed_face: FilmedFace, filmed_face_file: Path) -> None:
-    assert filmed_face.summary["background"] == "2.0 s of 224 × 288 px at 25 frames a second"
-    header = read_face_header(filmed_face_file)  # without the pictures
-    assert header["takes"] == 2
-    assert [channel["name"] for channel in header["channels"]] == ["opening", "width", "outer"]
-
-
 def test_nothing_is_left_where_it_cannot_be_written(small: FilmedFace, tmp_path: Path) -> None:
     with pytest.raises(ExportError):
         save_face(small, tmp_path / "missing" / "a.face")
@@ -108,16 +92,6 @@ def test_nothing_is_left_where_it_cannot_be_written(small: FilmedFace, tmp_path:
         save_face(broken, tmp_path / "a.face")
     assert [path.name for path in tmp_path.iterdir()] == ["a.face"]
     assert (tmp_path / "a.face").read_text() == "older"
-
-
-@pytest.mark.long
-def test_every_array_is_needed(arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path) -> None:
-    def without(name: str) -> str:
-        return refusal(tmp_path / "a.face", header, {key: arrays[key] for key in arrays if key != name})
-
-    assert refusal(tmp_path / "a.face", header, arrays) == ""
-    read = [name for name in arrays if "missing" not in without(name)]
-    assert read == ["appearance/mouth_distances", "background/cuts"]  # which older faces have not
 
 
 def test_every_array_is_declared(arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path) -> None:

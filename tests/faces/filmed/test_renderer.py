@@ -6,15 +6,14 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.types import Motion
-from lipmotion_faces.appearance import candidates, lower_face, placing
+from lipmotion_faces.appearance import lower_face, placing
 from lipmotion_faces.appearance.person import Appearance, FaceCodes
 from lipmotion_faces.filmed import face, renderer
 from lipmotion_faces.filmed.renderer import BATCH, Background, Stitcher, StitchingOptions
 from testing.toy import toy_motion, toy_sentences
 from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, toy_chin_px, toy_frames, toy_places
 
-FRAMES = 24
-"""More than one batch."""
+FRAMES = 24  # more than one batch
 MOUTH_ALONE = StitchingOptions(jaw=False)
 
 
@@ -132,15 +131,6 @@ def test_a_silent_mouth_onto_a_talking_one(
     assert dark[0].sum(axis=(1, 2)).max() < 60
 
 
-@pytest.mark.long
-def test_a_talking_mouth_onto_a_silent_one(appearance: Appearance, spoken: Motion) -> None:
-    backgrounds = footage_of(closed(spoken))
-    made = stitched(appearance, appearance.predict_codes(spoken), backgrounds)
-    inside = np.stack([part_in_frame(lower_face.mark_mouth(1), each.face_to_frame) for each in backgrounds])
-    dark = ((made < 90).all(axis=3) & inside).sum(axis=(1, 2))
-    assert np.corrcoef(dark, spoken["opening"])[0, 1] > 0.85
-
-
 def test_the_light_is_that_of_the_footage(appearance: Appearance, backgrounds: list[Background]) -> None:
     """Under another lamp the same frames are made, under that lamp."""
     lamp = np.array([(1.1, 0.9, 0.7)])
@@ -193,16 +183,3 @@ def test_too_few_frames_of_background(appearance: Appearance, backgrounds: list[
     nothing = FaceCodes(np.zeros((0, 90), np.float32), np.zeros((0, 36), np.float32), np.zeros(0, np.float32))
     assert list(Stitcher(appearance).stitch(nothing, [])) == []
     assert list(Stitcher(appearance).draw_mouths(nothing)) == []
-
-
-def test_mouths_of_chosen_codes(appearance: Appearance) -> None:
-    """The eigenlips of recorded mouths, far apart from one another, are these mouths."""
-    options = StitchingOptions(mouth=replace(candidates.STEADY, steadiness=0.0, neighbours=1), noise=False)
-    chosen = np.arange(0, len(appearance.mouths), 6)
-    zeros = np.zeros((len(chosen), appearance.jaw_codes.shape[1]), np.float32)
-    codes = FaceCodes(appearance.mouth_codes[chosen], zeros, zeros[:, 0])
-    assert len(chosen) > BATCH
-    made = np.stack(list(Stitcher(appearance, options).draw_mouths(codes))).astype("i4")
-    assert np.abs(made - appearance.mouths[chosen]).max() <= 1
-    blurred = np.stack(list(Stitcher(appearance, StitchingOptions(mouth=None, noise=False)).draw_mouths(codes)))
-    assert np.array_equal(blurred, appearance.mouth.restore(codes.mouth))

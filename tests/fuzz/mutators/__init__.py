@@ -5,20 +5,16 @@ from pathlib import PurePosixPath
 from random import Random
 
 from fuzz.inputs import Files
-from fuzz.mutators import arrays, documents, json_text, raw, riff, text, xml_text, zips
+from fuzz.mutators import arrays, documents, json_text, raw, text, zips
 
 Mutate = Callable[[Random, bytes], bytes]
-
-TEXTS = ".obj .mtl .csv .toml .txt .align .lab .TextGrid .dict".split()
+TEXTS = ".svg .obj .mtl .csv .toml .txt .align .lab .TextGrid .dict".split()
 FORMS: dict[str, tuple[Mutate, ...]] = {
     **dict.fromkeys(TEXTS, (text.change,) * 3),
     **dict.fromkeys((".json", ".gltf"), (json_text.change, json_text.change, text.change)),
     **dict.fromkeys((".glb", ".vrm"), (documents.change,) * 3),
     **dict.fromkeys((".binding", ".npz", ".lipmotion", ".face"), (zips.change,) * 2),
     ".npy": (arrays.change,) * 2,
-    ".wav": (riff.change,) * 2,
-    ".avi": (riff.change,),
-    ".svg": (xml_text.change, xml_text.change, text.change),
 }
 """By suffix; the bytes of any file are changed as well."""
 

@@ -21,8 +21,7 @@ HOSTILE = (
     *("[{}]", "[[[0, 0], 1e308]]"),
 )
 """Values as JSON spells them, and some that it does not."""
-OTHER_PARTS = 3
-"""Values of the same document that are put in each place."""
+OTHER_PARTS = 3  # values of the same document that are put in each place
 MARK = "a place in a document"
 _JSON, _ARCHIVES = {".json", ".gltf"}, {".npz", ".lipmotion", ".face", ".binding"}
 

@@ -12,8 +12,7 @@ NUMBERS = (
     0, -1, 1, 2, -0.0, 0.5, 1e-320, 1e12, 1e300, -1e300, 10**400, 2**53, 2**63, float("nan"), float("inf"), -1e-9,
 )  # fmt: skip
 VALUES: tuple[Any, ...] = (*NUMBERS, *NUMBERS, None, True, False, "", "0", "é\ud800", [], {}, [[]], [None], {"": None})
-NESTING = 100_000
-"""Nested brackets; Python's own limit is far lower."""
+NESTING = 100_000  # nested brackets; Python's own limit is far lower
 
 
 def change(chance: Random, content: bytes) -> bytes:

@@ -3,8 +3,7 @@
 import struct
 from random import Random
 
-LARGEST_BYTES = 1 << 23
-"""Bytes of one file: larger ones are not made."""
+LARGEST_BYTES = 1 << 23  # bytes of one file: larger ones are not made
 PIECES = (b"\0", b"\xff", b"-", b"nan", b"1e999", b"9" * 40, b'"', b"{", b"[", b"]", b",", b"\n", b"\t", b" ", b"null")
 EDGES = (0, 1, -1, 2, 127, 128, 255, 256, 32_767, 32_768, 65_535, 65_536, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1, 2**63)
 """Numbers at the limits of integer types."""

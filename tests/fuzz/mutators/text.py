@@ -17,8 +17,7 @@ WORDS = (
         "=1+1",
     ),
 )  # fmt: skip
-POWERS = (2,) * 4 + (3,) * 4 + (4, 4, 5, 6)
-"""Numbers of repetitions, as powers of ten."""
+POWERS = (2,) * 4 + (3,) * 4 + (4, 4, 5, 6)  # numbers of repetitions, as powers of ten
 BREAKS = ("\r\n", "\r", "\n\n", "\x0b", "\u2028", "\t", ",", ";", " ", "")
 
 

@@ -38,7 +38,7 @@ from lipmotion_faces.mesh import MeshStage
 from lipmotion_faces.rendering.drawn_surface import prepare_surface
 from lipmotion_faces.tracking.frames import find_nominal_rate, open_video
 from meshes import flame, gltf
-from meshes.gltf import data_uri, document, glb, packed_attributes, textured_document, with_colours
+from meshes.gltf import data_uri, document, glb, textured_document, with_colours
 from meshes.heads import head, lip_points, write_glb, write_obj
 from meshes.live_link_app import write_take
 from meshes.speech import motion, units
@@ -58,8 +58,7 @@ CODECS = {
     **{"ts": ("mpeg2video", "yuv420p"), "y4m": ("rawvideo", "yuv420p")},
 }
 VIDEO_FRAMES = 6
-MAX_PIXELS = 1 << 26
-"""Twice those of the largest video that anybody records."""
+MAX_PIXELS = 1 << 26  # twice those of the largest video that anybody records
 
 
 def seed_video(_: Good) -> list[Files]:
@@ -96,7 +95,7 @@ def check_video(folder: Path, _: Good) -> None:
             height, width, colours = frame.image.shape
             require(colours == 3 and min(height, width) > 0, "a picture of another shape")
             require(height * width <= MAX_PIXELS, "a picture that is too large")
-            require(math.isfinite(frame.time_s), "a picture without a time")
+            require(0 <= frame.time_s < math.inf, "a picture without a time, or before the beginning")
             times_s.append(frame.time_s)
         rate_hz = find_nominal_rate(np.array(times_s), video.stated_rates_hz)
     require(bool((np.diff(times_s) > 0).all()), "times that do not rise")
@@ -104,10 +103,8 @@ def check_video(folder: Path, _: Good) -> None:
 
 
 FACE_FRAMES = 3
-FEW = slice(6)
-"""Candidates of the good face: a small file is changed in more places."""
-CODES = 1e6
-"""Largest plausible coefficient of a picture, grey levels."""
+FEW = slice(6)  # candidates of the good face: a small file is changed in more places
+CODES = 1e6  # largest plausible coefficient of a picture, grey levels
 
 
 def seed_face(_: Good) -> list[Files]:
@@ -217,9 +214,6 @@ def _whole() -> list[Files]:
     colours = np.linspace(0, 255, 16).reshape(4, 4).astype(np.uint8)
     moved = {"KHR_texture_transform": {"offset": [0.5, 0.25], "scale": [2, 2], "rotation": 0.3}}
     content, binary = with_colours(*textured_document(_picture(), extension=moved), colours, normalised=True)
-    packed = packed_attributes(np.frombuffer(binary[:48], np.uint8).reshape(4, 12))
-    place = {"buffer": 0, "byteOffset": len(binary), "byteLength": len(packed), "byteStride": 12, "count": 4}
-    content["bufferViews"][0]["extensions"] = {"KHR_meshopt_compression": place | {"mode": "ATTRIBUTES"}}
     content["bufferViews"].append({"buffer": 0, "byteOffset": 0, "byteLength": 16})
     rows = {"bufferView": len(content["bufferViews"]) - 1, "componentType": 5121}
     content["accessors"][2] |= {"sparse": {"count": 1, "indices": rows, "values": {"bufferView": 0}}}
@@ -239,8 +233,8 @@ def _whole() -> list[Files]:
     content["animations"] = [{"channels": [], "samplers": []}]
     linked = content | {"buffers": [{"uri": "head.bin", "byteLength": len(binary)}]}
     linked["images"] = [{"uri": "skin.png"}]
-    files = {"head.gltf": json.dumps(linked).encode(), "head.bin": binary + packed, "skin.png": _picture()}
-    return [{"head.vrm": glb(content, binary + packed)}, files]
+    files = {"head.gltf": json.dumps(linked).encode(), "head.bin": binary, "skin.png": _picture()}
+    return [{"head.vrm": glb(content, binary)}, files]
 
 
 def _picture() -> bytes:
@@ -253,23 +247,11 @@ def _skinned() -> tuple[dict, bytes]:
     """The square on a neck, a head and a jaw."""
     content, binary = document()
     joints, weights = np.tile(np.array([0, 1, 2, 0], np.uint8), (4, 1)), np.full((4, 4), 0.25, "<f4")
-    content["nodes"] = [
-        {"mesh": 0, "skin": 0},
-        {"name": "Neck", "children": [2]},
-        {"name": "Head", "children": [3]},
-        {"name": "JawBone"},
-    ]
+    names = [{"name": "Neck", "children": [2]}, {"name": "Head", "children": [3]}, {"name": "JawBone"}]
+    content["nodes"] = [{"mesh": 0, "skin": 0}, *names]
     content["scenes"], content["skins"] = [{"nodes": [0, 1]}], [{"joints": [1, 2, 3]}]
-    views: list[dict] = [{"buffer": 0, "byteOffset": len(binary), "byteLength": 16}]
-    views.append({"buffer": 0, "byteOffset": len(binary) + 16, "byteLength": 64})
-    content["bufferViews"] += views
-    content["accessors"] += [
-        {"bufferView": 4, "componentType": 5121, "count": 4, "type": "VEC4"},
-        {"bufferView": 5, "componentType": 5126, "count": 4, "type": "VEC4"},
-    ]
-    content["meshes"][0]["primitives"][0]["attributes"] |= {"JOINTS_0": 4, "WEIGHTS_0": 5}
     del content["meshes"][0]["extras"]
-    return content, binary + joints.tobytes() + weights.tobytes()
+    return content, gltf.with_skin(content, binary, joints, weights)
 
 
 def check_character(folder: Path, _: Good) -> None:
@@ -295,8 +277,7 @@ def check_character(folder: Path, _: Good) -> None:
 
 
 NAMES, VALUES = "x_bs_name.npy", "bs_value_a.npy"
-CURVES_FRAMES, RATE_HZ = 23, 30.0
-"""As long as the short speech."""
+CURVES_FRAMES, RATE_HZ = 23, 30.0  # as long as the short speech
 
 
 def seed_curves(_: Good) -> list[Files]:

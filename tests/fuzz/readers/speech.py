@@ -8,10 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from formats.examples import LABEL_CASES
 from formats.test_labels import TIERS, long_form
-from formats.test_reported_cases import LINES, OTHERS, SERVICES, SPEAKERS
-from formats.test_transcripts import OF_LINES, OF_WORDS
-from formats.timing_samples import SAMPLES
 from fuzz import inputs
 from lipmotion import Corpus, Request, animate, load_model, read_motion, write
 from lipmotion.formats.label_files import read_labels
@@ -114,32 +112,14 @@ def check_corpus(folder: Path, _: inputs.Good) -> None:
 
 LABELS_TEXTS = {
     "long.TextGrid": long_form(TIERS),
-    "short.TextGrid": '"ooTextFile"\n"TextGrid"\n0\n2\n<exists>\n1\n"IntervalTier"\n"words"\n0\n2\n1\n0\n2\n"hi you"\n',
-    "htk.lab": "0 1000000 sil\n1000000 2000000 p\n2000000 3500000 aa\n",
-    "states.lab": "0 1000000 x^sil-p+aa=t[2]\n1000000 2000000 x^sil-p+aa=t[3]\n2000000 3500000 p-aa+t[2] -61.2 baby\n",
-    "starts.lab": "0 sil\n1000000 p\n2000000 aa\n",
-    "audacity.txt": "0.0\t0.5\tp\n0.5\t1.25\taa\n\\\t100\t200\n",
-    "lrs.txt": "Text:  HI {LG} YOU\nConf:  4\n\nWORD START END ASDSCORE\nHI 0.5 0.7 8.1\nYOU 0.7 1.2 7\n",
     "words.txt": "Hello, you 42 people.\n",
-    "said.srt": "1\n00:00:00,500 --> 00:00:01,500\n<i>Hi</i> (laughs)\n\n2\n00:00:02,000 --> 00:00:03,000\nANNA: you\n",
-    "said.vtt": "WEBVTT\n\nNOTE a\n\n00:00.500 --> 00:01.500 line:0\nHi<00:01.000><c> you</c>\n\n"
-    "00:01.500 --> 00:01.510\nHi you\n",
-    "whisper.json": '{"text": "Hi", "segments": [{"start": 0.5, "end": 1.5, "text": " Hi 2 you", "words": '
-    '[{"word": " Hi", "start": 0.5, "end": 0.75}, {"word": "2"}, {"word": " you", "start": 1, "end": 1.5}]}]}',
-    "cpp.json": '{"transcription": [{"offsets": {"from": 500, "to": 1500}, "text": " Hi"}]}',
-    "vosk.json": '{"result": [{"conf": 1.0, "end": 1.5, "start": 0.5, "word": "hi"}], "text": "hi"}\n{"text": ""}\n',
-    "words.ctm": ";; a\na 1 0.50 0.25 hi 0.9\na 1 0.75 0.5 <eps>\na 1 1.25 0.5 you\n",
-    "table.tsv": "start\tend\ttext\n500\t1500\tHi you\n",
     "grid.align": "0 23750 sil\n23750 29500 bin\n29500 34000 blue\n",
 }
-OTHER_FORMS = {**LINES, **OTHERS, **SERVICES, **OF_LINES, **OF_WORDS}
-SAMPLED = {f"{name}.json": sample for name, sample in SAMPLES.items()} | SPEAKERS
-SAMPLED |= {f"{n}.{'srt' if isinstance(form, str) else 'json'}": form for n, form in enumerate(OTHER_FORMS.values())}
-LABELS_TEXTS |= {
-    name: sample if isinstance(sample, str) else json.dumps(sample, ensure_ascii=False)
-    for name, sample in SAMPLED.items()
-    if not isinstance(sample, bytes)
-}
+for _number, _case in enumerate(LABEL_CASES.values()):
+    _content = _case["content"]
+    LABELS_TEXTS[f"{_number}.json"] = (
+        _content if isinstance(_content, str) else json.dumps(_content, ensure_ascii=False)
+    )
 SPLITS = {"train.txt": b"a\nb\n", "val.txt": b"c\n", "test.txt": b"d\n"}
 LENGTH_S = 4.0
 

@@ -1,6 +1,5 @@
 """Readers of what people and programs send: lists, jobs, edits, projects, studies, requests, live sound and replies."""
 
-import asyncio
 import copy
 import json
 import math
@@ -8,34 +7,31 @@ import os
 import shutil
 import socket
 import tempfile
-from collections.abc import Callable, Generator
-from contextlib import ExitStack, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from shutil import copyfile
 from tempfile import TemporaryDirectory
-from types import SimpleNamespace
 from typing import Any
-from unittest import mock
 
 import numpy as np
 from websockets.sync.client import connect
 
-from fuzz.inputs import Files, Good, Reader, good_model, refuse_constant, require, short_speech
+from fuzz.inputs import Files, Good, Reader, require, short_speech
 from lipmotion import Edits, Job, LiveFrame, Request, Stream
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.pipeline.batch import BatchLine, read_lines
 from lipmotion.pipeline.batch.ledger import LEDGER, Place, open_ledger, write_receipt
-from lipmotion.pipeline.batch.report import write_reports
+from lipmotion.pipeline.batch.report import MARKS, read_marks, write_marks, write_reports
 from lipmotion.pipeline.edit_files import EditFile, read_edits, write_edits
 from lipmotion.pipeline.job import check_outputs, open_face
 from lipmotion.storage.archive import take_array
 from lipmotion.storage.json_text import from_json
 from lipmotion.types import Outlook, Span, Timeline, Unit
-from lipmotion_studio.application import TOKEN_HEADER
-from lipmotion_studio.folder import PROJECT, VOTES, ProjectFolder
-from lipmotion_studio.live import servers, vtube
+from lipmotion_studio.folder import PROJECT, ProjectFolder
+from lipmotion_studio.live import servers
 from lipmotion_studio.project import (
     EditVersion,
     ExportRecord,
@@ -45,15 +41,9 @@ from lipmotion_studio.project import (
     parse_project,
 )
 from lipmotion_studio.study.answers import COLUMNS, read_answers
-from lipmotion_studio.study.application import create_application
-from lipmotion_studio.study.manifest import MANIFEST, check_videos, read_study
-from lipmotion_studio.study.store import StudyStore
+from lipmotion_studio.study.manifest import MANIFEST, read_study
 from lipmotion_studio.trainer import Trainer
-from lipmotion_studio.votes import read_votes
-from pipeline.made import write_sound
 from pipeline.session.test_session import SENTENCES
-from studio.open_studio import HOST, TOKEN, open_studio
-from study.asgi import Application, ask
 from study.small_study import small_study
 
 TEXTS = {
@@ -77,16 +67,22 @@ def seed_lines(_: Good) -> list[Files]:
     rows = [ROW, ROW | FAILED, ROW, ROW | {"name": "two", "outputs": {"two.json": "0c"}}]
     whole = "".join(json.dumps(row) + "\n" for row in rows).encode()
     lists = [{name: text.encode()} for name, text in TEXTS.items()]
+    lists.append({"list.txt": b"one.wav\n", MARKS: b"name,mark,when\none,redo,12:30\n'=two,approve,\n"})
     return [*lists, *({"list.txt": b"one.wav\ntwo.wav\n", LEDGER: ledger} for ledger in (whole, whole[:700]))]
 
 
 def check_lines(folder: Path, _: Good) -> None:
     """Read a list; every output has a name of its own inside the folder of the outputs. Go on from a ledger."""
-    ledger, listed = folder / LEDGER, [path for path in folder.iterdir() if path.name != LEDGER]
+    ledger, listed = folder / LEDGER, [path for path in folder.iterdir() if path.name not in (LEDGER, MARKS)]
     lines = read_lines(listed[0], KINDS) if listed else [BatchLine("one", "/sounds/one.wav")]
     names = [line.name.casefold() for line in lines]
     require(len(set(names)) == len(names), "two lines with one name")
     require(not any(name.startswith("/") or ".." in name.split("/") for name in names), "an output outside its folder")
+    if (folder / MARKS).is_file():
+        marks = read_marks(folder / MARKS)
+        with TemporaryDirectory() as out:
+            write_marks(Path(out) / MARKS, marks)
+            require(read_marks(Path(out) / MARKS) == marks, "marks that are not read as they were written")
     if ledger.is_file():
         with TemporaryDirectory() as out:
             shutil.copy(ledger, Path(out) / LEDGER)
@@ -134,13 +130,10 @@ def seed_settings(_: Good) -> list[Files]:
     recording = replace(recording, versions=(EditVersion(1, SENTENCES),))
     project = Project(model="voices/a.lipmotion", characters={"a": "b.glb"}, recordings="r")
     project = project.with_recordings([recording])
-    side = {"name": "a", "model": DIGEST, "edits": DIGEST}
-    votes = [{"line": "a", "shown": [side, side | {"name": "b", "model": ""}], "better": 1}]
-    votes.append({"line": "a", "shown": ["x", "y"], "better": "x", "edits": DIGEST})
     answers = "r1,mos,0,hi,natural,a,,4,3.5,1,0,\n"
-    found = {"job.json": json.dumps(JOB), PROJECT: json.dumps(describe_project(project)), VOTES: json.dumps(votes)}
+    found = {"job.json": json.dumps(JOB), PROJECT: json.dumps(describe_project(project))}
     found |= {"job.toml": "".join(f"[{name}]\n{_toml(table)}" for name, table in JOB.items())}
-    found |= {TRAINING: json.dumps({"format": "lipmotion.training", "version": 1, "made": [TRAINED], **TRAINED})}
+    found |= {TRAINING: json.dumps({"format": "lipmotion.training", "version": 1, **TRAINED})}
     found |= {"answers.csv": ",".join(COLUMNS) + "\n" + answers}
     with TemporaryDirectory() as made:
         folder = Path(made) / "study"
@@ -164,10 +157,8 @@ def check_settings(folder: Path, _: Good) -> None:
 def _read_one(path: Path, name: str, folder: Path) -> None:
     if name == MANIFEST:
         read_study(folder)
-    elif name == VOTES:
-        read_votes(path)
     elif name == TRAINING:
-        with TemporaryDirectory() as own:  # a good copy is put beside the file
+        with TemporaryDirectory() as own:  # a damaged file gets another name
             (Path(own) / TRAINING).parent.mkdir()
             copyfile(path, Path(own) / TRAINING)
             Trainer(ProjectFolder(Path(own))).describe()
@@ -195,79 +186,6 @@ def _read_one(path: Path, name: str, folder: Path) -> None:
             file.edits.staging()
 
 
-LINE = "/api/lines/1"
-SIDES = [{"by": ""}, {"by": "version-1"}]
-REQUESTS: dict[str, tuple[str, Any]] = {
-    "edits": (f"{LINE}/edits", {"revision": 0, "steps": ["set intensity 1.2", "hold from 0.1 to 0.2"], "instead": 0}),
-    "undo": (f"{LINE}/undo", {"revision": 0, "count": 1}),
-    "transcript": (f"{LINE}/transcript", {"revision": 0, "text": "baby", "start_s": 0.1, "end_s": 0.6}),
-    "versions": (f"{LINE}/versions", {"revision": 0}),
-    "back": (f"{LINE}/versions/back", {"revision": 0, "version": "version-1", "name": "version-1"}),
-    "mark": (f"{LINE}/mark", {"revision": 0, "mark": "redo"}),
-    "votes": (f"{LINE}/votes", {"revision": 0, "shown": SIDES, "better": 1}),
-    "understand": ("/api/understand", {"lines": [2, 3]}),
-    "export": ("/api/export", {"only": "approved", "files": [".json"], "preset": "", "face": ""}),
-    "lexicon": ("/api/lexicon", {"word": "zoe", "phones": ["z", "ow", "iy"]}),
-    "training": ("/api/training", {"kind": "voice", "name": "a", "lines": [7], "options": {"unknown": 1}}),
-    "voice": ("/api/voice", {"voice": "a"}),
-    "answers": ("/api/answers", {"trial": 0, "values": ["first"], "plays": [1, 1], "seconds": 2.5}),
-    "raters": ("/api/raters", {"agrees": True}),
-    "motion": (f"{LINE}/motion", {"query": {"of": "motion", "start_s": "0.1", "end_s": "0.3", "names": "opening"}}),
-    "why": (f"{LINE}/why", {"query": {"time": "0.2"}}),
-    "project": ("/api/project", {"query": {"from": "0", "count": "20", "order": "name", "status": "", "mark": ""}}),
-}
-
-
-def seed_requests(_: Good) -> list[Files]:
-    """Return a body of every request."""
-    return [{f"{name}.json": json.dumps(content).encode()} for name, (_, content) in REQUESTS.items()]
-
-
-def check_requests(folder: Path, good: Good) -> None:
-    """Send the body, or the query in it; no reply is that of a bug, and every one of JSON is JSON."""
-    (path,) = folder.iterdir()
-    address, usual = REQUESTS[path.stem]
-    body: Any = path.read_bytes()
-    if "query" in usual:
-        try:
-            query = json.loads(body)["query"].items()
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-            return
-        address, body = address + "?" + "&".join(f"{name}={value}" for name, value in query), None
-        address = address.encode("utf-8", "replace").decode()
-    studio, study, token = _applications(good)
-    headers = {"host": HOST, TOKEN_HEADER: TOKEN} if path.stem not in ("answers", "raters") else {}
-    application = studio if headers else study
-    reply = ask(application, address, body, headers=headers, token="" if headers else token)
-    require(reply.status < 500 or reply.status == 503, f"the status {reply.status}")
-    if reply.headers.get("content-type", "").startswith("application/json"):
-        json.loads(reply.body.decode("utf-8"), parse_constant=refuse_constant)
-
-
-@cache
-def _applications(good: Good) -> tuple[Application, Application, str]:
-    """Return a studio with a line that is understood, a study, and the token of a rater, for this process."""
-    usual, tempfile.tempdir = tempfile.tempdir, str(good.corpus.parent)
-    try:
-        place = Path(tempfile.mkdtemp(prefix="requests-"))
-        write_sound(place / "line.wav", short_speech(good))
-        opened = ExitStack().enter_context(open_studio(place / "line.wav", "baby", good_model(good), place / "work"))
-    finally:
-        tempfile.tempdir = usual
-    opened.ready()
-    study = small_study(place / "study")
-    store = StudyStore(place / "study", create=True)
-    application = create_application(study, check_videos(study, place / "study"), store)
-    return opened.application, application, ask(application, "/api/raters", {"agrees": True}).content["token"]
-
-
-REPLIES: dict[str, dict[str, Any]] = {
-    "AuthenticationRequest": {"data": {"authenticated": True}},
-    "AuthenticationTokenRequest": {"data": {"authenticationToken": "token"}},
-    "InputParameterListRequest": {"data": {"defaultParameters": [{"name": "MouthOpen"}], "customParameters": []}},
-    "ParameterCreationRequest": {"data": {"parameterName": "JawOpen"}},
-    "InjectParameterDataRequest": {"data": {}},
-}
 WORDS = [["baby", 0.1, 0.4], ["", 0.4, 0.5], ["<b>two</b>", 0.5, 0.9]]
 UPGRADE = "upgrade: websocket\r\nconnection: Upgrade\r\nsec-websocket-version: 13\r\n"
 REQUEST = f"GET / HTTP/1.1\r\nhost: localhost\r\n{UPGRADE}sec-websocket-key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
@@ -281,8 +199,7 @@ def seed_live(good: Good) -> list[Files]:
             np.save(Path(folder) / f"{name}.npy", samples)
         arrays = [{path.name: path.read_bytes()} for path in sorted(Path(folder).iterdir())]
     raw = (sound * 32767).astype("<i2").tobytes()
-    replies = {kind: {"requestID": "ID", "messageType": kind} | reply for kind, reply in REPLIES.items()}
-    texts = {"words.json": WORDS, "phones.json": [["b", 0.1, 0.2], ["ey1", 0.2, 0.4]], "replies.json": replies}
+    texts = {"words.json": WORDS, "phones.json": [["b", 0.1, 0.2], ["ey1", 0.2, 0.4]]}
     found = [{name: json.dumps(content).encode()} for name, content in texts.items()]
     return [*found, *arrays, {"sound.raw": raw}, {"client.http": REQUEST.encode() + FRAME}]
 
@@ -293,8 +210,6 @@ def check_live(folder: Path, good: Good) -> None:
     content = path.read_bytes()
     if path.suffix == ".http":
         _send(content)
-    elif path.name == "replies.json":
-        asyncio.run(_converse(_decoded(from_json, content)))
     else:
         stream, frames = copy.deepcopy(_stream()), list[LiveFrame]()
         if path.suffix == ".json":
@@ -339,47 +254,8 @@ def _send(content: bytes) -> None:
             require(other.recv(timeout=10) == "hello", "a server that no longer greets")
 
 
-class _Studio:
-    """A connection to a VTube Studio whose replies are given; the second connection ends the conversation."""
-
-    def __init__(self, replies: Any) -> None:
-        self._replies, self._asked, self._connections = replies, list[dict[str, Any]](), 0
-
-    def __await__(self) -> Generator[None, None, "_Studio"]:
-        self._connections += 1
-        if self._connections > 1:
-            raise asyncio.CancelledError
-        return self
-        yield
-
-    async def close(self) -> None:
-        self.transport = SimpleNamespace(abort=self._asked.clear)
-
-    async def send(self, text: str) -> None:
-        self._asked.append(json.loads(text))
-
-    async def recv(self) -> str:
-        if not self._asked or len(self._asked) > 20:
-            raise OSError("it has ended")
-        question = self._asked.pop()
-        kind = question["messageType"]
-        reply = self._replies.get(kind) if isinstance(self._replies, dict) else self._replies
-        return json.dumps(reply).replace('"ID"', json.dumps(question["requestID"]))
-
-
-async def _converse(replies: Any) -> None:
-    with tempfile.TemporaryDirectory() as folder, ExitStack() as patches:
-        studio, connection = vtube.VTubeStudio("ws://nowhere", Path(folder) / "token"), _Studio(replies)
-        patches.enter_context(mock.patch("websockets.asyncio.client.connect", return_value=connection))
-        patches.enter_context(mock.patch("lipmotion_studio.live.vtube.AGAIN_S", 0.0))
-        studio(copy.deepcopy(_stream()).push(np.zeros(8000, np.float32))[-1])
-        with suppress(asyncio.CancelledError, TimeoutError):
-            await asyncio.wait_for(studio.work(), 0.05)
-
-
 READERS = {
     "lines": Reader("lines", seed_lines, check_lines),
     "settings": Reader("settings", seed_settings, check_settings),
-    "requests": Reader("requests", seed_requests, check_requests),
     "live": Reader("live", seed_live, check_live),
 }

@@ -9,8 +9,7 @@ from lipmotion.stats import bigram
 from oracles.statistics import random_mixtures
 
 UNITS = ("a", "b", "c", "d")
-NAMES = ("sil", "sp", *UNITS, "x")
-"""``x`` never occurs in utterances."""
+NAMES = ("sil", "sp", *UNITS, "x")  # ``x`` never occurs in utterances
 CLASSES = {"early": frozenset("ab"), "late": frozenset("cdx"), "silence": frozenset({"sil", "sp"})}
 DIMENSIONS = {densities.SPEECH: 3, **dict.fromkeys(densities.F0_STREAMS, 1), densities.MOTION: 6}
 

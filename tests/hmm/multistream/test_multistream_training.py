@@ -12,13 +12,7 @@ from lipmotion import errors, types
 from lipmotion.errors import InputError
 from lipmotion.hmm.multistream import densities, model, multistream_training, recognise
 from lipmotion.hmm.multistream.densities import F0_STREAMS, STREAMS, ObservedStream, StreamObservations, StreamWeights
-from lipmotion.hmm.multistream.unit_states import (
-    Inventory,
-    RecognisedUnit,
-    expand_triphones,
-    frames_to_units,
-    units_to_frames,
-)
+from lipmotion.hmm.multistream.unit_states import RecognisedUnit, expand_triphones, frames_to_units, units_to_frames
 from meshes.speech import said
 from oracles import joint as slow
 from oracles import paths
@@ -82,18 +76,6 @@ def test_posteriors_are_those_of_all_paths():
         assert found.states.sum(axis=1) == pytest.approx(np.ones(7), abs=1e-9)
         assert found.stay == pytest.approx(stay, abs=1e-4)
         assert found.log_likelihood == pytest.approx(log_likelihood, abs=1e-3)
-
-
-def test_a_stream_without_weight_is_as_good_as_absent():
-    off = StreamWeights(motion=0, f0=0)
-    hmm, events = trained(TRAIN[:12], training=off)
-    rest = [name for name in STREAMS if name not in ("motion", "f0")]
-    alone, same = trained([replace(u, observed=only(u.observed, *rest)) for u in TRAIN[:12]], training=off)
-    found, wanted = ([e.figure for e in each if e.stage in stages(same)] for each in (events, same))
-    assert found == pytest.approx(wanted, abs=1e-9)
-    assert np.array_equal(hmm.models["speech"].tied.mixtures.means, alone.models["speech"].tied.mixtures.means)
-    assert "motion" in hmm.models
-    assert "motion" not in alone.models
 
 
 def test_what_was_learned_is_recognised(usual):
@@ -183,7 +165,6 @@ def test_units_and_contexts_that_were_never_seen_resolve_by_class():
     assert forest.leaf((("x", "a", "a"), 1)) == forest.leaf((("d", "a", "a"), 1)) != forest.leaf((("b", "a", "a"), 1))
     leaf = forest.leaf((("x", "x", "x"), 0))
     assert forest.name(leaf) == "state 0: left is late, unit is not early"
-    assert "left is late?" in forest.text()
 
 
 @pytest.mark.parametrize(
@@ -215,30 +196,12 @@ def test_the_grid_of_leaves_is_the_leaf_beside_each_pair_of_neighbours():
         assert grid.tolist() == expected
 
 
-def test_an_even_count_has_no_middle():
-    known = inventory(4)
-    assert [model.choose_positions("f0", known, "a", state) for state in range(4)] == [(0, 1), (0, 1), (1, 2), (1, 2)]
-
-
 def test_silence_stands_for_pauses_beside_other_units():
     contexts = list(dict.fromkeys(context for context, _ in expand_triphones(KNOWN, ("sil", "a", "sp", "b")).triphones))
     assert contexts == [("sil", "sil", "a"), ("sil", "a", "sil"), ("a", "sp", "b"), ("sil", "b", "sil")]
     states = expand_triphones(KNOWN, ("a", "sp"))
     assert states.positions.tolist() == [0, 0, 0, 1]
     assert [KNOWN.monophones[context[1], state] for context, state in states.triphones] == states.monophones.tolist()
-
-
-def test_an_inventory_that_is_none_and_an_unknown_unit_are_refused():
-    for names, free in (("a", ""), ("a", "b"), ("aa", "a"), (["a b"], ["a b"])):
-        with pytest.raises(InputError):
-            Inventory(tuple(names), tuple(free), 3)
-    with pytest.raises(InputError, match="unknown unit 'q'"):
-        expand_triphones(KNOWN, ("a", "q"))
-
-
-def test_classes_of_other_units_are_left_out():
-    names = {question.name for question in model.list_context_questions(KNOWN, {"other": frozenset({"q"}), **CLASSES})}
-    assert names == {*CLASSES, *NAMES}
 
 
 def test_every_frame_has_a_unit():
@@ -250,12 +213,6 @@ def test_every_frame_has_a_unit():
     assert units_to_frames(said(), 3, "sil")[0] == ("sil",)
     with pytest.raises(InputError):
         units_to_frames(spoken, 0, "sil")
-
-
-def test_a_unit_without_a_frame_is_left_out():
-    units, bounds = units_to_frames(said((0, 0.031, "a"), (0.031, 0.038, "t"), (0.038, 0.06, "b")), 6, "sil")
-    assert units == ("a", "b")
-    assert bounds.tolist() == [0, 4, 6]
 
 
 def test_a_unit_begins_half_a_frame_before_its_first_frame():

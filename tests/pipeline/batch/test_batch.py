@@ -1,5 +1,6 @@
 """Whole batches: outputs as of ``animate``, failures among them, kept lines, processes that die, a cluster."""
 
+import csv
 import json
 import os
 import shutil
@@ -86,6 +87,31 @@ def test_what_was_done_is_kept(sounds, settings, tmp_path):
     assert changed == {"one.json", "three.json"}
     assert Counter(row["name"] for row in ledger_rows(out)) == {"one": 2, "three": 2, "deep/two": 1}
     assert batch(sounds, out, replace(settings, outputs=Outputs(kinds=("csv",))), jobs=1).done == 3
+
+
+@pytest.mark.long
+def test_marks_hold_in_every_run(sounds, settings, tmp_path, caplog):
+    out, marks = tmp_path / "out", tmp_path / "marked.csv"
+    batch(sounds, out, settings, jobs=1)
+    for name in ("one", "three"):
+        (out / f"{name}.json").write_text("by hand")
+    marks.write_text("name;mark\none;approve\nthree;redo\nnobody;redo\n")
+    assert batch(sounds, out, settings, jobs=1, marks=marks).text == "3 lines: 1 done, 2 kept, 0 failed"
+    assert "1 marks of lines that are not in this batch: nobody" in caplog.text
+    assert (out / "one.json").read_text() == "by hand"
+    assert (out / "three.json").read_text() != "by hand"
+    assert batch(sounds, out, settings, jobs=1).kept == 3
+    (sounds / "one.txt").write_text("see mama")
+    other = replace(settings, outputs=Outputs(rate_hz=50.0))
+    assert batch(sounds, out, other, jobs=1).text == "3 lines: 2 done, 1 kept, 0 failed"
+    assert (out / "one.json").read_text() == "by hand"
+    assert "1 approved lines have another recording or other words now" in caplog.text
+    with (out / "report.csv").open() as file:
+        assert {row["name"]: row["mark"] for row in csv.DictReader(file)} == {
+            "one": "approve", "three": "", "deep/two": "",
+        }  # fmt: skip
+    marks.write_text("name,mark\none,\n")
+    assert batch(sounds, out, other, jobs=1, marks=marks).done == 1
 
 
 def test_inputs_are_never_outputs(sounds, settings):

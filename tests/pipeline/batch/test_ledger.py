@@ -267,8 +267,8 @@ def test_both_reports_hold_all_lines(tmp_path):
     assert read[2]["outputs"] == "a.json"
     rows = rows_of(text)
     assert [row[report.COLUMNS.index("error")] for row in rows] == [printable(hostile), None, None]
-    assert rows[2][len(report.COLUMNS)] == ["a.json"]
-    sound = unquote(rows[2][len(report.COLUMNS) + 1])
+    assert rows[2][report.COLUMNS.index("mark") + 1] == ["a.json"]
+    sound = unquote(rows[2][report.COLUMNS.index("mark") + 2])
     assert (tmp_path / sound).resolve() == Path("/x/a.wav")
     assert text.count("</script>") == 2
     assert "default-src 'none'" in text
@@ -286,7 +286,39 @@ def test_no_text_is_a_formula(tmp_path, name):
 @pytest.mark.parametrize("recording", ["", "/\ud800.wav"])
 def test_a_recording_without_an_address_is_not_played(tmp_path, recording):
     _, page = reported(tmp_path, ["a"], {"recording": recording})
-    assert rows_of(page)[0][len(report.COLUMNS) + 1] is None
+    assert rows_of(page)[0][report.COLUMNS.index("mark") + 2] is None
+
+
+def test_they_are_read_as_they_were_written(tmp_path):
+    names = ("a", "=1+1", 'b, "c"', "'d", "'=e ")
+    kinds, times = ("approve", "redo", "redo", "", ""), ("2026-01-01", "", "-2", "", "")
+    marks = dict(zip(names, map(report.Mark, kinds, times), strict=True))
+    report.write_marks(tmp_path / "marks.csv", marks)
+    assert "'=1+1," in (tmp_path / "marks.csv").read_text()
+    assert report.read_marks(tmp_path / "marks.csv") == marks
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("name\na\n", "no column 'mark'"),
+        ("name,mark\na,again\n", "row 2: the mark is 'again', required approve or redo"),
+        ("name,mark\na,redo\na,approve\n", "row 3: 'a' is marked twice"),
+        ("", "no column 'name'"),
+    ],
+)
+def test_what_is_refused(tmp_path, text, said):
+    (tmp_path / "marks.csv").write_text(text)
+    with pytest.raises(InputError, match=said):
+        report.read_marks(tmp_path / "marks.csv")
+
+
+def test_a_line_is_due_once_for_each_mark():
+    assert report.is_due(report.Mark("redo"), None)
+    assert report.is_due(report.Mark("redo"), {})
+    assert not report.is_due(report.Mark("redo"), {"redone": ""})
+    assert report.is_due(report.Mark("redo", "2"), {"redone": ""})
+    assert not report.is_due(report.Mark("approve"), {})
 
 
 def listed(folder: Path, text: str, name: str = "list.txt", kinds: tuple[str, ...] = ("json",)) -> list[BatchLine]:

@@ -8,7 +8,7 @@ import pytest
 from children import wait_until
 from lipmotion.pipeline.batch import BatchLine
 from lipmotion.pipeline.batch.ledger import Place, open_ledger
-from lipmotion.pipeline.batch.report import write_reports
+from lipmotion.pipeline.batch.report import Mark, read_marks, write_reports
 from lipmotion.types import Audio
 from lipmotion_faces.video.mp4 import write_mp4
 from study.browser import BROWSER, DRIVER, MISSING, SPACE, Browser, browser, check_screens
@@ -49,7 +49,7 @@ def report(folder: Path, speech: Path, count: int, *, film: bool) -> Path:
             record = FOUND | {"name": line.name, "recording": line.recording, "outputs": {f"{line.name}.{kind}": "0"}}
             warnings = {"warnings": [f"word {n} is not said"] * (3 - n)} if n < 3 else {}
             ledger.append(record | warnings)
-        return write_reports(lines, ledger, out)[1]
+        return write_reports(lines, ledger, out, {"act/line00001": Mark("approve", "before")})[1]
 
 
 def chosen(window: Browser) -> str:
@@ -60,19 +60,28 @@ def until(window: Browser, script: str) -> None:
     wait_until(lambda: window.run(f"return {script}"), LIMIT_S)
 
 
-def test_ten_thousand_lines_are_heard(window, toy_speech, tmp_path):
+def test_ten_thousand_lines_are_heard_and_marked(window, toy_speech, tmp_path):
     page = report(tmp_path, toy_speech, LINES, film=False)
     window.open(page.as_uri())
-    assert "10000 of 10000 lines, 0 failed" in window.text("#count")
+    assert "10000 of 10000 lines, 0 failed, 1 approved, 0 to redo" in window.text("#count")
     assert window.run("return document.querySelectorAll('#rows .row').length") < 100
     assert chosen(window) == "act/line00000"
     window.press(SPACE)
     until(window, "player.ended || player.currentTime > 0")
-    window.press("j", "j", "j", "j", "k")
+    window.press("a", "j", "a", "j", "r", "j", "j", "k")
     assert chosen(window) == "act/line00003"
+    assert "1 approved, 1 to redo" in window.text("#count")
     check_screens(window, "lines", SCREENS)
     window.run("view.scrollTop = body.offsetHeight")
     until(window, "[...list.children].some(row => row.textContent.includes('line09999'))")
+    window.open(page.as_uri())  # what is not saved is kept in the browser
+    assert "1 approved, 1 to redo" in window.text("#count")
+    window.click("#save")
+    wait_until((tmp_path / "marks.csv").is_file, LIMIT_S)
+    marks = read_marks(tmp_path / "marks.csv")
+    assert {name: mark.kind for name, mark in marks.items()} == {
+        "act/line00000": "approve", "act/line00001": "", "act/line00002": "redo",
+    }  # fmt: skip
     assert window.problems() == []
 
 

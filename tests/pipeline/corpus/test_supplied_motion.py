@@ -200,9 +200,9 @@ def test_the_recorders_sound_is_used_from_the_right_moment(recorded_twice_folder
     (recorded_twice_folder / "take.lab").write_text("10000000 20000000 aa\n")
     report = prepare(recorded_twice_folder, tmp_path / "corpus", workers=1)
     assert (report.prepared, report.failed) == (("take",), {})
-    assert report.notes["take"] == ("sound 1071.6 ms late, found by the clap",)
+    assert report.notes["take"] == ("sound 1071.6 ms late, found by the sound of both",)
     found = Corpus.open(tmp_path / "corpus").utterance("take")
-    assert (found.source["recorder_file"], found.source["sound_found_by"]) == ("take.recorder.wav", "clap")
+    assert (found.source["recorder_file"], found.source["sound_found_by"]) == ("take.recorder.wav", supplied.ALIKE)
     assert float(found.source["sound_late_ms"]) == pytest.approx(1000 * (CUT + BEFORE) / RATE_HZ, abs=0.1)
     assert found.track.motion.values[0, 0] == pytest.approx(0)
     assert found.audio.duration_s == pytest.approx(len(found.track.seen) / RATE, abs=0.02)
@@ -268,7 +268,7 @@ def test_sounds_that_share_nothing_are_refused():
     ramp = Audio(np.zeros(RATE_HZ, np.float32), RATE_HZ)
     for late_s in (-20.0, 20.0, 0.9):
         with pytest.raises(ValueError, match=r"share 0\.\d\d s, required 0.5"):
-            supplied.trim_to_shared(supplied.SeparateSound(ramp, late_s, "clap"), ramp_track(300))
+            supplied.trim_to_shared(supplied.SeparateSound(ramp, late_s, supplied.GIVEN), ramp_track(300))
 
 
 MESH_HZ, MESHES = 60.0, 30

@@ -2,7 +2,6 @@ import sys
 
 import numpy as np
 import pytest
-from pocketsphinx import Decoder
 
 from lipmotion import errors, types
 from lipmotion.speech.features.mfcc import general_features
@@ -10,7 +9,6 @@ from lipmotion.speech.recognition import general as acoustic
 from lipmotion.speech.recognition.general import PHONES, STATES, STREAMS, find_density, load_bigram, load_general
 from lipmotion.units import PHONES as OURS
 from testing.formant_synthesiser import synthesise
-from testing.toy import ToySentence
 
 
 def vowels() -> types.Audio:
@@ -77,29 +75,6 @@ def test_another_pocketsphinx_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path
         (data / name).write_bytes(b"s3\nendhdr\n" + bytes(64))
     with pytest.raises(errors.MissingDependencyError, match="unexpected header"):
         load_general()
-
-
-def test_pocketsphinx_s_own_alignment_agrees(toy_sentence: ToySentence) -> None:
-    """Its decoder, with its own features and search, puts the phones of a sentence where our densities do."""
-    from lipmotion import load_model
-    from lipmotion.hmm.align import align_units
-    from lipmotion.speech.recognition.general import combine_likelihoods, combine_phones
-
-    sample = (toy_sentence.audio.samples * 32767).astype("<i2").tobytes()
-    decoder = Decoder(lm=None, loglevel="FATAL", beam=1e-80, wbeam=1e-60, pbeam=1e-80)
-    decoder.set_align_text(" ".join(toy_sentence.words))
-    for again in (True, False):
-        decoder.start_utt()
-        decoder.process_raw(sample, full_utt=True)
-        decoder.end_utt()
-        if again:
-            decoder.set_alignment()
-    theirs = [(p.name.lower(), p.start / 100) for word in decoder.get_alignment() for p in word if p.name != "SIL"]
-    joint = combine_phones(load_model().phones)
-    general = general_features(toy_sentence.audio)
-    units = ["sil", *(name for name, _ in theirs), "sil"]
-    bounds = align_units(joint.hmm, combine_likelihoods(joint, general, 0.0, general), units)[1:-2] / 100
-    assert np.median(np.abs(bounds - [start_s for _, start_s in theirs])) <= 0.03
 
 
 def test_the_densities_of_its_streams_are_mixtures() -> None:

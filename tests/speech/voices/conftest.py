@@ -30,6 +30,7 @@ def faked(bare: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     if os.name != "posix":
         pytest.skip("the fakes are scripts")
     fakes.install(bare)
-    espeak._find_system_data.cache_clear()
+    monkeypatch.delitem(sys.modules, espeak.WHEEL)
+    monkeypatch.syspath_prepend(bare.parent / "packages")
     monkeypatch.setattr(espeak, "PROGRAM", [str(bare / "espeak-events")])
     return bare.parent / "temporary"

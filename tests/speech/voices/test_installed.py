@@ -1,6 +1,7 @@
 """Which voices there are, and what they say: with fakes everywhere, with the synthesisers where they are."""
 
 import os
+import shutil
 import time
 from contextlib import closing
 from itertools import pairwise
@@ -97,7 +98,7 @@ def test_voices_by_name() -> None:
 def test_without_synthesisers_it_says_what_to_install() -> None:
     assert installed.list_installed() == ()
     for voice in EACH:
-        with pytest.raises(errors.MissingDependencyError, match=f"apt install {voice.synthesiser}"):
+        with pytest.raises(errors.MissingDependencyError, match=f"apt install {voice.synthesiser}|pip install"):
             next(installed.speak_sentences(["Hello"], voice))
     for find in (installed.choose_voice, lambda: installed.find_voice("slt")):
         with pytest.raises(errors.MissingDependencyError, match=r'pip install ".*\[text\]", or: apt install flite'):
@@ -108,7 +109,7 @@ def test_without_synthesisers_it_says_what_to_install() -> None:
 
 def test_the_default_voice_is_the_first_that_there_is(faked: Path) -> None:
     assert installed.choose_voice().full_name == "espeak-ng:en-us+f2"
-    (faked.parent / "programs" / "espeak-ng").unlink()
+    shutil.rmtree(faked.parent / "packages" / "espeakng_loader" / "espeak-ng-data")
     assert installed.choose_voice().full_name == "flite:slt"
     (faked.parent / "programs" / "flite").unlink()
     assert installed.choose_voice().full_name == "festival:cmu_us_slt_arctic_hts"
@@ -183,50 +184,28 @@ def test_the_times_of_real_voices_are_those_of_the_aligner(real: synthesiser.Syn
 needs_scripts = pytest.mark.skipif(os.name != "posix", reason="the programs are scripts")
 
 
-@pytest.fixture
-def small(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Small bounds."""
-    bounds = {"LARGEST_OUTPUT_BYTES": 1000, "LARGEST_SOUND_BYTES": 1000, "POLL_S": 0.01}
-    bounds |= {"STILL_S": 0.15} if "sleep" in request.node.name else {}
-    for name, value in bounds.items():
-        monkeypatch.setattr(synthesiser, name, value)
-
-
 @needs_scripts
-@pytest.mark.usefixtures("small")
 @pytest.mark.parametrize(
     ("script", "message"),
     [
-        ("exec yes", "prints more than 1000 bytes"),
-        ("exec yes >&2", "prints more than 1000 bytes"),
-        ("echo; printf '%2000s' x", "prints more than 1000 bytes"),
-        ("exec yes > $0.d/endless", "writes more than 1000 bytes"),
-        ("truncate -s 20G $0.d/sparse", "writes more than 1000 bytes"),
         ("sleep 30 & wait", "did not end within 0 s"),
         ("kill -9 $$", "failed with -9"),
         ("printf '\\377'", "cannot be run .*utf-8"),
     ],
 )
-def test_a_program_is_stopped(script: str, message: str, tmp_path: Path) -> None:
-    program = _program(tmp_path, script)
+def test_a_program_that_fails_is_refused(
+    script: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(synthesiser, "START_S", -4.6)
     with pytest.raises(errors.InputError, match=message):
-        synthesiser.run_program([str(program)], "a-package", folder=tmp_path / "say.d")
-
-
-@needs_scripts
-def test_a_program_reads_what_it_is_given(tmp_path: Path) -> None:
-    assert synthesiser.run_program([str(_program(tmp_path, "exec cat"))], "a-package", stdin="Helló\n") == "Helló\n"
+        synthesiser.run_program([str(_program(tmp_path, script))], "a-package")
 
 
 @needs_scripts
 def test_what_a_program_started_ends_with_it(tmp_path: Path) -> None:
-    child = int(synthesiser.run_program([str(_program(tmp_path, "sleep 30 & echo $!"))], "a-package"))
-    for _ in range(100):
-        if not _is_running(child):
-            return
-        time.sleep(0.01)
-    os.kill(child, 9)
-    pytest.fail("it is still running")
+    synthesiser.run_program([str(_program(tmp_path, "(sleep 0.3; touch $0.d/late) &"))], "a-package")
+    time.sleep(0.6)
+    assert not list((tmp_path / "say.d").iterdir())
 
 
 def _program(folder: Path, script: str) -> Path:
@@ -235,13 +214,3 @@ def _program(folder: Path, script: str) -> Path:
     path.chmod(0o755)
     path.with_name("say.d").mkdir()
     return path
-
-
-def _is_running(process: int) -> bool:
-    """Return whether a process is there and no zombie."""
-    try:
-        os.kill(process, 0)
-        status = Path(f"/proc/{process}/stat")
-        return not status.exists() or status.read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False

@@ -1,12 +1,9 @@
-from itertools import product
-
 import numpy as np
 import pytest
 from scipy import stats
 
 from lipmotion_studio.study.analysis import crossed
 from lipmotion_studio.study.analysis.analyse import compute_power, count_raters, plan_study
-from lipmotion_studio.study.answers import MOS
 from study.simulated import Effects, expected_rating, rated_answers, rating, ratings
 
 MEANS = np.array([3.1, 3.9, 4.7])
@@ -24,7 +21,7 @@ def simulated(size: tuple[int, int], seed: int = 1, means: np.ndarray = MEANS) -
 
 def test_improvement_is_that_of_the_paper():
     values = np.tile(np.array(list(XIE_LIU.values()))[:, None, None], (1, 4, 3))
-    table = crossed.RatingTable(tuple(XIE_LIU), values, np.ones(values.shape, np.intp), crossed.SCALES[MOS])
+    table = crossed.RatingTable(tuple(XIE_LIU), values, np.ones(values.shape, np.intp))
     for name, percent in IMPROVEMENT.items():
         assert round(crossed.measure_improvement(table, name, "ph-HMM")["percent"], 2) == percent
 
@@ -43,8 +40,6 @@ def test_answers_survive_the_table():
     again = crossed.tabulate_ratings(rated_answers(simulated((3, 4))))
     assert again.conditions == simulated((3, 4)).conditions
     assert np.array_equal(again.values, simulated((3, 4)).values)
-    ranked = ratings(np.random.default_rng(1), MEANS, (2, 2), Effects(), crossed.RANKS)
-    assert crossed.tabulate_ratings(rated_answers(ranked)).scale == crossed.RANKS
 
 
 def test_known_means_are_found():
@@ -69,25 +64,19 @@ def test_what_raters_add_to_all_conditions_leaves_differences():
     """Nothing is normalised: a rater who is strict throughout changes no difference."""
     table = simulated((10, 6), means=np.array([2.5, 3.0]))
     strict = table.values + np.linspace(-1, 1, 10)[:, None]
-    moved = crossed.RatingTable(table.conditions, strict, table.count, table.scale)
+    moved = crossed.RatingTable(table.conditions, strict, table.count)
     assert moved.compare("c1", "c0").interval == pytest.approx(table.compare("c1", "c0").interval)
 
 
 def test_the_anchor_is_shown_but_not_tested():
     table = simulated((8, 6))
     figures = crossed.analyse_ratings(
-        crossed.RatingTable(("a", "anchor", "recording"), table.values, table.count, table.scale), None
+        crossed.RatingTable(("a", "anchor", "recording"), table.values, table.count), None
     )
     assert len(figures["conditions"]) == 3
     assert [(row["condition"], row["other"]) for row in figures["pairs"]] == [("a", "recording")]
     assert figures["baseline"] == "a"
     assert [row["condition"] for row in figures["relative_improvement"]] == ["recording"]
-
-
-def test_a_baseline_of_nothing_has_no_improvement_over_it():
-    ranks = [rating((r, s), name, 50 * (name == "b"), kind="ranking") for r, s, name in product("xy", "xy", "ab")]
-    (row,) = crossed.analyse_ratings(crossed.tabulate_ratings(ranks), "a")["relative_improvement"]
-    assert np.isnan(row["percent"])
 
 
 def test_conditions_never_compared_by_one_rater_have_no_difference():
@@ -128,12 +117,6 @@ def test_power_is_that_of_simulated_studies(components):
     assert compute_power(components, 0.5, 12, 6) == pytest.approx(detected(components, 0.5, 12, 6, 800), abs=0.04)
 
 
-def test_where_raters_alone_differ_power_is_that_of_the_t_test():
-    critical, shift = stats.t.ppf(0.975, 15), 0.5 / np.sqrt(0.5 / 16)
-    usual = 1 - stats.nct.cdf(critical, 15, shift) + stats.nct.cdf(-critical, 15, shift)
-    assert compute_power(crossed.Components(0.5, 0, 1e-9), 0.5, 16, 6) == pytest.approx(usual, abs=0.01)
-
-
 def test_the_number_of_raters_is_the_smallest():
     for difference in (0.3, 0.5, 1.0):
         raters = count_raters(USUAL, difference, 12)
@@ -159,7 +142,6 @@ def test_judgements_that_never_vary():
 def test_tables_of_raters():
     rows = plan_study(USUAL, "mos", 12, 0.8)
     assert [row["difference"] for row in rows] == [0.1, 0.2, 0.3, 0.5, 1.0]
-    assert [row["difference"] for row in plan_study(USUAL, "ranking", 12, 0.8)] == [2, 5, 10, 20]
     shares = plan_study(crossed.Components(0.05, 0.02, 0.6), "paired", 12, 0.8)
     assert [row["share"] for row in shares] == [0.55, 0.6, 0.65, 0.7, 0.75]
     needed = [row["raters"] for row in shares if row["raters"]]
@@ -274,26 +256,9 @@ def test_intervals_within_a_scale_stay_there():
     assert np.isnan(crossed.estimate_mean(np.full((2, 2), 5.0), 4.0).compute_interval_within(1, 5)).all()
 
 
-def test_a_scale_of_any_place_and_size_has_the_same_interval():
-    share = crossed.estimate_mean((TABLE - TABLE.min() + 1) / 10, 1.0)
-    moved = crossed.estimate_mean((TABLE - TABLE.min() + 1) / 10 * 100 - 20, 100.0)
-    expected = np.array(share.compute_interval_within(0, 1)) * 100 - 20
-    assert moved.compute_interval_within(-20, 80) == pytest.approx(tuple(expected))
-
-
 def test_the_correction_of_holm():
     assert crossed.correct_p_values([0.01, 0.04, 0.03, float("nan")]) == pytest.approx(
         [0.03, 0.06, 0.06, np.nan], nan_ok=True
     )
     assert crossed.correct_p_values([0.5, 0.9]) == [1.0, 1.0]
     assert crossed.correct_p_values([]) == []
-
-
-@pytest.mark.long
-def test_intervals_cover_the_truth():
-    draw, hits = np.random.default_rng(1), 0
-    for _ in range(2000):
-        table = 0.5 * draw.normal(size=(12, 1)) + 0.3 * draw.normal(size=(1, 6)) + 0.8 * draw.normal(size=(12, 6))
-        low, high = crossed.estimate_mean(table, 4.0).interval
-        hits += low <= 0 <= high
-    assert 0.93 < hits / 2000 < 0.97

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lipmotion.cli.arguments.declared import add_options, add_output
-from lipmotion.cli.terminal.printing import print_line
-from lipmotion.cli.terminal.progress import report_progress
+from lipmotion.cli.arguments.declared import add_options, add_output, is_pipe
+from lipmotion.cli.terminal.printing import print_line, print_lines
+from lipmotion.cli.terminal.progress import Report, describe_outcome, report_progress
+from lipmotion.errors import InputError, LipMotionError
 from lipmotion.extensions import find_version
+from lipmotion.pipeline.job import Job, check_outputs, is_for_several, list_recordings, open_face, plan_outputs, run
 from lipmotion.pipeline.request import Request
-from lipmotion.storage.files import atomic_file, check_target
+from lipmotion.printable import printable
+from lipmotion.storage.files import atomic_file, check_target, create_folders
 from lipmotion.storage.json_text import as_json, replace_nan
-from lipmotion.types.progress import Monitor
+from lipmotion.types.progress import Item, Monitor, sub_monitor
 
 if TYPE_CHECKING:
     from lipmotion.units import Lexicon
@@ -90,3 +94,65 @@ def report_figures(
             with atomic_file(options.output) as unfinished:
                 unfinished.write_text(as_json(replace_nan(figures), indent=1) + "\n", encoding="utf-8")
         report.finish(table(figures), figures=figures)
+
+
+def animate_one_by_one(job: Job, paths: Sequence[Path], options: argparse.Namespace, report: Report) -> bool:
+    """Run a job for each of several recordings, or for all of a folder, or where the output is a folder.
+
+    Each recording is reported; at the end the paths that were written are printed. The words and phones in files beside
+    the recordings are used, as a corpus and a batch use them. Faces and characters are opened once.
+    Returns False, and does nothing, where there is one recording and its outputs are files.
+    Raises ExportError: outputs that are not for several recordings, or that clash.
+    Raises InputError: a transcript, units or edits, which belong to one recording; or a pipe.
+    Raises the error of the highest exit code among those that occurred, with the number of recordings that failed.
+    """
+    from lipmotion.pipeline.model import load_model
+
+    if len(paths) == 1 and not (paths[0].is_dir() or any(map(is_for_several, job.outputs.files))):
+        return False
+    _check_named(paths)
+    recordings = list_recordings(paths)
+    alone = {name: getattr(job.request, name) for name in ("transcript", "units", "edits")}
+    for name, value in alone.items():
+        if value is not None and len(recordings) > 1:
+            raise InputError(f"--{name} belongs to one recording, and there are {len(recordings)}; animate each alone")
+    planned = plan_outputs(recordings, job.outputs.files, job.outputs.kinds)
+    face = open_face(job.outputs)
+    jobs = [job.of(recording, tuple(files)) for recording, files in zip(recordings, planned, strict=True)]
+    with create_folders({Path(file).parent for files in planned for file in files}):
+        for one, recording in zip(jobs, recordings, strict=True):
+            check_outputs(one, face, recording)
+    model = load_model(job.request.model)
+    written: list[str] = []
+    failures: list[tuple[int, str, Exception]] = []
+    for number, each in enumerate(jobs):
+        name = str(each.request.recording)
+        part = sub_monitor(report.receive, number / len(jobs), (number + 1) / len(jobs))
+        try:
+            run(each, face=face, model=model, words_beside=True, workers=count_workers(options), monitor=part)
+            written += each.outputs.files
+            report.receive(Item(name, "animated"))
+        except Exception as error:
+            known = describe_outcome(error)
+            if known is None:
+                raise
+            failures.append((known[0], name, error))
+            report.receive(Item(name, "skipped", known[1]))
+    if not failures:
+        report.finish("\n".join(map(printable, written)), files=written)
+        return True
+    if written and not options.machine_readable:
+        print_lines("\n".join(map(printable, written)))
+    _, speech, worst = max(failures, key=lambda failure: failure[0])
+    kind = type(worst) if isinstance(worst, LipMotionError) else LipMotionError
+    raise kind(f"{len(failures)} of {len(jobs)} recordings were not animated, {speech} for one") from worst
+
+
+def _check_named(recordings: Sequence[Path]) -> None:
+    """Raise InputError where a recording has no name for a file in a folder."""
+    for recording in recordings:
+        if is_pipe(recording):
+            raise InputError(
+                f"{recording}: what comes through a pipe has no name for a file in a folder; give it alone, with "
+                "the name of a file: -o FILE.json"
+            )

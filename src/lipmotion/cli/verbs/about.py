@@ -165,15 +165,15 @@ def _run_doctor(options: argparse.Namespace) -> None:
 
 
 def add_info(verbs: Verbs) -> None:
-    """Add the verb that prints the header of a model, or its decision trees or chains."""
+    """Add the verb that prints the header of a model, or its decision trees."""
     parser = verbs.add_parser("info", help="print what a model is, and whose recordings it was trained on")
     add_input(parser, "model", what="model", nargs="?", help="default: the model that ships with the package")
-    parser.add_argument("--structure", action="store_true", help="print only its decision trees, or its chains")
+    parser.add_argument("--structure", action="store_true", help="print only its decision trees")
     parser.set_defaults(run=run_info)
 
 
 def run_info(options: argparse.Namespace) -> None:
-    """Print the header of the model, or its structure."""
+    """Print the header of the model, or its trees."""
     from lipmotion.pipeline.model import find_shipped, load_model, read_header
 
     path = options.model or find_shipped()
@@ -181,7 +181,7 @@ def run_info(options: argparse.Namespace) -> None:
         model = load_model(path)
         text = model.engine.describe(model.learned)
         if not text:
-            raise InputError(f"models of the engine {model.engine.name!r} cannot be printed; leave --structure out")
+            raise InputError(f"models of the engine {model.engine.name!r} have no trees; leave --structure out")
         print_lines(text)
         return
     header = read_header(path)

@@ -12,6 +12,7 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.printable import printable
 from lipmotion.types.delivery import Delivery, Staging
+from lipmotion.types.progress import Item
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -19,9 +20,13 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = verbs.add_parser("batch", help="turn thousands of recordings into lip motion, with a report")
     listed = "a folder of recordings, or a list: a path a line, or a table with columns file,transcript,output,speaker"
     add_input(parser, "source", what="list or folder of recordings", metavar="LIST|DIR", help=listed)
-    add_output(parser, "--out", is_folder=True, required=True, metavar="DIR", help="folder of the outputs")
+    add_output(parser, "--out", is_folder=True, metavar="DIR", help="folder of the outputs")
+    checked = "only compare the recordings with their script: missing, silent, of the wrong length, twice there ..."
+    parser.add_argument("--check", action="store_true", help=checked)
     kinds = "what animate writes (json csv glb mp4 ...) and cues.tsv .xml .json .dat .pgo .spine.json (default: json)"
     add_options(parser, Outputs, "kinds", kinds={"help": kinds})
+    marked = "approved lines and those to be done again, as the report saves them (default: DIR/marks.csv)"
+    add_input(parser, "--marks", what="file of marks (no option needed there)", metavar="FILE.csv", help=marked)
     parser.add_argument("--jobs", type=int, metavar="N", help="number of processes (default: one per core)")
     parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler, as tcp://HOST:8786")
     add_options(parser, Request, "recogniser", "model", "lexicon", "language", "speaker", "pauses", "asymmetry")
@@ -42,13 +47,25 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Call ``batch``; print what was done. Raises InputError: some lines failed."""
-    from lipmotion.pipeline.batch import batch
+    """Call ``batch`` or, with ``--check``, ``check``; print what was done. Raises InputError: some lines failed."""
+    from lipmotion.pipeline.batch import batch, check
 
     with report_progress(options) as report:
-        job = pick_part(options, options.start)
-        how = {"jobs": options.jobs, "cluster": options.cluster, "monitor": report.receive}
-        done = batch(options.source, options.out, job, **how)
+        job, monitor = pick_part(options, options.start), report.receive
+        if options.check:
+            checked = check(options.source, job, jobs=options.jobs, monitor=monitor)
+            if not checked.findings:
+                report.finish(printable(checked.text), lines=checked.lines)
+                return
+            if not options.machine_readable:
+                report.finish(checked.table)
+            for each in checked.findings if options.machine_readable else ():
+                report.receive(Item(each.name, each.kind, each.text))
+            raise InputError(checked.text)
+        if options.out is None:
+            raise InputError("no folder of the outputs is given; add --out DIR, or --check to write nothing")
+        how = {"jobs": options.jobs, "cluster": options.cluster, "marks": options.marks}
+        done = batch(options.source, options.out, job, monitor=monitor, **how)
         if done.failed:
             raise InputError(f"{done.text}; the reasons are in {done.csv}; mend them and run the same command again")
         figures = {"done": done.done, "kept": done.kept, "report": [str(done.csv), str(done.html)]}

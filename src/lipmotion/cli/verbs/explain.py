@@ -1,12 +1,15 @@
-"""``lipmotion explain``: print the states, probabilities and Gaussians behind a frame, or the states of all."""
+"""``explain``: states, probabilities, Gaussians behind a frame, or the states of all; ``words``: what is said, when."""
 
 from __future__ import annotations
 
 import argparse
 from dataclasses import asdict
+from typing import Any
 
-from lipmotion.cli.arguments.declared import add_options, pick_part
+from lipmotion.cli.arguments.declared import add_input, add_options, add_output, pick_part
+from lipmotion.cli.arguments.options import add_execution, count_workers
 from lipmotion.cli.terminal.printing import print_json, print_lines
+from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.pipeline.request import Request
 
 RUNS = 2000
@@ -43,3 +46,37 @@ def run(options: argparse.Namespace) -> None:
         return
     for document in documents:
         print_json(document)
+
+
+def add_words(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb to the parser of the command line."""
+    parser = verbs.add_parser("words", help="recognise the English words of a recording, as a transcript to edit")
+    add_input(parser, "speech", what="recording", help="audio or video file")
+    outputs: dict[str, Any] = {"type": str, "nargs": "+", "action": "extend", "default": []}
+    written = "FILE.txt, or FILE.json with times and confidences (default: text on standard output)"
+    add_output(parser, "-o", "--output", force=True, help=written, **outputs)
+    add_options(parser, Request, "recogniser", "model")
+    add_execution(parser)
+    parser.set_defaults(run=run_words)
+
+
+def run_words(options: argparse.Namespace) -> None:
+    """Recognise words; print them, or the paths of the files that were written."""
+    from lipmotion.pipeline.analysis.language import (
+        check_word_outputs,
+        describe_words,
+        format_words,
+        recognise_words,
+        write_words,
+    )
+
+    with report_progress(options) as report:
+        paths = check_word_outputs(options.output, options.speech)
+        request = Request(options.speech, recogniser=options.recogniser)
+        recognition = recognise_words(request, model=options.model, workers=count_workers(options))
+        write_words(recognition.words, paths)
+        report.finish(
+            "\n".join(map(str, options.output)) or format_words(recognition.words).removesuffix("\n"),
+            words=describe_words(recognition.words),
+            confidence=round(recognition.confidence or 0.0, 3),
+        )

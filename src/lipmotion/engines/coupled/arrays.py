@@ -17,7 +17,6 @@ from lipmotion.engines.coupled.model import CoupledConfig, CoupledModel
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion.arrays import MOTION_ARRAYS, PHONE_SET, motion_from_arrays, motion_to_arrays
 from lipmotion.motion.context_window import FEATURES, WINDOW, acoustic_context_from_arrays
-from lipmotion.motion.modulation_filter import MODULATION, filter_from_arrays, filter_to_arrays
 from lipmotion.motion.predictors import list_predictor_arrays, predictor_from_arrays, predictor_to_arrays
 from lipmotion.motion.space import check_poses, check_rest
 from lipmotion.stats.bigram import check_sums_to_one
@@ -84,7 +83,7 @@ def coupled_to_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
                 f"following_{number}/coefficients": regression.coefficients.astype(np.float16),
                 f"following_{number}/variances": regression.variances,
             }
-    return arrays | filter_to_arrays(model.modulation) | predictor_to_arrays(model.encoding)
+    return arrays | predictor_to_arrays(model.encoding)
 
 
 def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
@@ -103,7 +102,6 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
             arrays,
             MOTION_ARRAYS,
             POSES,
-            MODULATION,
             list_predictor_arrays(arrays),
             PAIRS,
             (f"chain_{number}/{key}" for number in range(len(sets)) for key in UNITS | CHAIN | ROWS),
@@ -123,11 +121,9 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
         )
         chains = Chains(streams, transitions, _groups(arrays, transitions.product.chain_states.shape[1], visual))
         regression = _regression(arrays, structure, visual) if config.dynamic and config.acoustic_regression else None
-        modulation = filter_from_arrays(arrays, space.dimensions, needed=config.filtered)
         encoding = predictor_from_arrays(arrays, space.dimensions)
-        model = CoupledModel(
-            chains, space, visual, regression, poses["gain"], poses["rest"], closure, prior, modulation, encoding
-        )
+        scaling, rest = poses["gain"], poses["rest"]
+        model = CoupledModel(chains, space, visual, regression, scaling, rest, closure, prior, encoding)
         check_rest(model.rest_pose, model.pose_limits)
         check_poses(model.pose_limits, space, closure)
         return model

@@ -28,8 +28,7 @@ SOFT, VITERBI = "soft", "viterbi"
 STARTS = (SOFT, VITERBI)
 EXACT, PRINTED = "exact", "printed"
 UPDATES = (EXACT, PRINTED)
-CONVERGENCE_GAIN = 1e-4
-"""EM ends when the log likelihood per frame gains less."""
+CONVERGENCE_GAIN = 1e-4  # EM ends when the log likelihood per frame gains less
 
 
 def convert(
@@ -116,22 +115,15 @@ def path_to_means(chains: Chains, path: NDArray[np.intp], stream: int) -> Array:
 Single = NDArray[np.float32]
 OFFSETS = (-28, -20, -14, -9, -5, -2, 0, 2, 5, 9, 14, 20, 28)
 """Frames whose posteriors are regression inputs, relative to the predicted frame; the farther, the more smoothed."""
-REACH = 2
-"""Frames to both sides over which the posteriors of the frame itself are smoothed."""
+REACH = 2  # frames to both sides over which the posteriors of the frame itself are smoothed
 ACOUSTIC_AXES, POSTERIOR_AXES, INPUT_AXES = 150, 80, 400
 """Greatest number of principal axes: of the acoustic context, of posteriors, and of both together."""
-ACOUSTIC_WEIGHT = 0.1
-"""Scale of the acoustic context beside the posteriors."""
-CONSTANT = 1.0
-"""The last regression input."""
-SHARED_RIDGE = 1e-4
-"""Strength of the ridge towards 0, a frame."""
-OWN_RIDGE = 5.0
-"""Strength of the ridges towards the regression of the viseme, and towards that of all."""
-MIN_WEIGHT = 0.01
-"""A regression with less weight in a frame is left out there."""
-MIN_FRAMES = 20.0
-"""The variance of all states counts as so many frames in that of each."""
+ACOUSTIC_WEIGHT = 0.1  # scale of the acoustic context beside the posteriors
+CONSTANT = 1.0  # the last regression input
+SHARED_RIDGE = 1e-4  # strength of the ridge towards 0, a frame
+OWN_RIDGE = 5.0  # strength of the ridges towards the regression of the viseme, and towards that of all
+MIN_WEIGHT = 0.01  # a regression with less weight in a frame is left out there
+MIN_FRAMES = 20.0  # the variance of all states counts as so many frames in that of each
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,6 @@ import math
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from textwrap import wrap
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -17,15 +16,14 @@ from lipmotion.engines.coupled.arrays import coupled_from_arrays, coupled_to_arr
 from lipmotion.engines.coupled.chains.densities import Single, infer_components
 from lipmotion.engines.coupled.chains.lattice import Lattice, LatticePosteriors
 from lipmotion.engines.coupled.chains.model import Chains, Inference, VisualStream, speech_observations
-from lipmotion.engines.coupled.chains.product import COUPLED, FACTORIAL, HMM, MULTISTREAM, Product
-from lipmotion.engines.coupled.conversion import convert, group_index, path_to_means, weigh_regressions
+from lipmotion.engines.coupled.chains.product import Product
+from lipmotion.engines.coupled.conversion import convert, group_index, path_to_means
 from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.chain_training import mark_allowed_units
 from lipmotion.engines.coupled.training.coupled_training import THREADS, grow_models
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import Statistics, count_unseen, slice_dynamics
 from lipmotion.motion.generation import split_into_blocks
-from lipmotion.printable import printable
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.types import (
     ChainPosteriors,
@@ -39,34 +37,20 @@ from lipmotion.types import (
     Generation,
     Monitor,
     NamedProbability,
-    RegressedMean,
     Speech,
     StateTrace,
     Timeline,
 )
-from lipmotion.units import VISEME_OF
-
-KINDS = {
-    HMM: "one chain, one mixture over all streams",
-    MULTISTREAM: "one chain, a mixture for each stream",
-    FACTORIAL: "chains with independent transitions, densities of their joint states",
-    COUPLED: "chains whose transitions depend on all chains, densities of their own states",
-}
-LINE = 110
-
 
 Array = NDArray[np.float64]
-MAX_STATES = 3
-"""Greatest number of states of a chain that an explanation names."""
-REST = "rest"
-MIN_PROBABILITY = 0.005
-"""States and regressions with less probability are not named."""
+MAX_STATES = 3  # greatest number of states of a chain that an explanation names
+MIN_PROBABILITY = 0.005  # states with less probability are not named
 
 
 def explain_frames(
     frames: Sequence[Explanation], model: CoupledModel, inference: Inference, rows: Sequence[int]
 ) -> list[Explanation]:
-    """Return explanations with chains, Gaussians and regressions; unchanged where no path leads through the chains."""
+    """Return explanations with chains and Gaussians; unchanged where no path leads through the chains."""
     if not np.isfinite(inference.posteriors.log_likelihood):
         return list(frames)
     streams = range(len(model.chains.streams))
@@ -76,9 +60,8 @@ def explain_frames(
             chains=list_chain_states(model.chains, inference.posteriors, row),
             joint=find_joint_state(model.chains, inference.posteriors, row),
             gaussians=tuple(_find_dominant_gaussian(model, inference, row, stream) for stream in streams),
-            regressions=regressions,
         )
-        for frame, row, regressions in zip(frames, rows, _list_means(model, inference, rows), strict=True)
+        for frame, row in zip(frames, rows, strict=True)
     ]
 
 
@@ -185,52 +168,17 @@ def _find_dominant_gaussian(model: CoupledModel, inference: Inference, row: int,
     )
 
 
-def _list_means(model: CoupledModel, inference: Inference, rows: Sequence[int]) -> list[tuple[RegressedMean, ...]]:
-    """Return, for each frame, expected means of visual streams and their regressions; empty without dynamics."""
-    if not all(stream.dynamic for stream in model.visual):
-        return [() for _ in rows]
-    means, precisions = model.motion_statistics(inference)
-    away, result = model.is_away_from_speech(inference.posteriors.chains[0]), []
-    rest: list[tuple[NamedProbability, ...]] = [(NamedProbability(REST, 1.0),)] * len(model.visual)
-    for row in rows:
-        shares = rest if away[row] else _list_regression_shares(model, inference, row)
-        regressed = []
-        for stream, weights in zip(model.visual, shares, strict=False):
-            mean, variance = means[row, 0, stream.columns], 1 / precisions[row, 0, stream.columns]
-            regressed.append(RegressedMean(stream.name, weights, _list_channel_values(model, stream, mean, variance)))
-        result.append(tuple(regressed))
-    return result
-
-
-def _list_regression_shares(model: CoupledModel, inference: Inference, row: int) -> list[tuple[NamedProbability, ...]]:
-    """Return the weights of the most important regressions of every visual stream in a frame; empty without any."""
-    structure, result = model.chains.structure, []
-    for number, regression in enumerate(model.regression[1] if model.regression is not None else ()):
-        chain, regression_of_state = structure.chain_of(number + 1), regression.regression_of_state
-        posterior = inference.posteriors.chains[chain][row : row + 1]
-        weights = weigh_regressions(posterior, regression_of_state, len(regression.coefficients))[0]
-        names = []  # the viseme of the states that share a regression, with their position if it is the same: ``bi.2``
-        for k in range(len(weights)):
-            units, positions = np.divmod(np.flatnonzero(regression_of_state == k), structure.states)
-            phones = {structure.chains[chain].phones(structure.units[chain][unit])[0] for unit in units}
-            viseme = "/".join(sorted({VISEME_OF[phone] for phone in phones}))
-            names.append(f"{viseme}.{positions[0] + 1}" if len(set(positions.tolist())) == 1 else viseme)
-        result.append(_rank_by_probability(names, weights))
-    return result
-
-
 def _list_channel_values(
     model: CoupledModel, stream: VisualStream, means: Array, variances: Array
 ) -> Mapping[str, ChannelValue]:
     """Return values and standard deviations of the channels of a stream, by name, from means and variances."""
     space = model.space
-    values, variance = np.zeros((1, space.dimensions)), np.full((1, space.dimensions), np.nan)
+    values, variance = (np.zeros((1, space.dimensions)) for _ in range(2))
     values[:, stream.columns], variance[:, stream.columns] = means, variances
-    motion, variance_of_motion = space.restore(values, variance)
-    channels = zip(space.channels, motion[0].tolist(), np.sqrt(variance_of_motion[0]).tolist(), strict=True)
-    return {
-        channel.name: ChannelValue(value, deviation) for channel, value, deviation in channels if np.isfinite(deviation)
-    }
+    motion, deviations = space.restore(values)[0].tolist(), np.sqrt(variance @ space.mixing)[0].tolist()
+    missing = np.asarray(np.delete(space.mixing, stream.columns, axis=0).max(axis=0, initial=0) > 0)  # of other streams
+    channels = zip(space.channels, motion, deviations, missing.tolist(), strict=True)
+    return {channel.name: ChannelValue(value, deviation) for channel, value, deviation, gone in channels if not gone}
 
 
 ENCODING_SHARE = 0.8
@@ -267,7 +215,6 @@ class CoupledEngine(Engine[CoupledModel]):
             return motion_statistics
 
         learned = model.motion if self.config.variance_scaling else replace(model.motion, scaling=None)
-        learned = learned.for_voice(speech.voice)
         motion, variance = learned.generate(
             statistics,
             frames,
@@ -349,31 +296,6 @@ class CoupledEngine(Engine[CoupledModel]):
             )
             for parts in zip(*blocks, strict=True)
         )
-
-    def describe(self, model: CoupledModel) -> str:  # noqa: D102
-        chains, structure, product = model.chains, model.chains.structure, model.chains.transitions.product
-        lines = [f"{structure.kind}: {KINDS[structure.kind]}"]
-        if len(structure.chains) > 1:
-            apart = "any number of states" if structure.limit is None else f"up to {structure.limit} state(s)"
-            together = "" if structure.cross_units or structure.limit is None else ", units left together"
-            lines.append(f"  asynchrony: {apart} apart{together}")
-        lines.append(f"  joint states: {product.chain_states.shape[1]}")
-        for number, (chain, units) in enumerate(zip(structure.chains, structure.units, strict=True), start=1):
-            lines.append(f"chain {number}: {chain.name}, {len(units)} units of {structure.states} states")
-            lines += [f"  {line}" for line in wrap(" ".join(units), LINE)]
-        for stream, name in enumerate(chains.streams):
-            densities, components, size = chains.groups[group_index(chains, stream)].stream_mixtures(stream).size
-            lines.append(
-                f"stream {name}: {size} dimensions on chain {structure.chain_of(stream) + 1}, "
-                f"{densities} densities of {components} Gaussian(s)"
-            )
-        regressions = model.regression[1] if model.regression is not None else ()
-        for visual, regression in zip(model.visual, regressions, strict=False):
-            count, inputs, _ = regression.coefficients.shape
-            lines.append(
-                f"means of {visual.name}: {count} regressions on {inputs} inputs, from features and posteriors around"
-            )
-        return "\n".join(map(printable, lines))
 
     def to_arrays(self, model: CoupledModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         return coupled_to_arrays(model)

@@ -26,7 +26,6 @@ from lipmotion.engines.coupled.conversion import (
 from lipmotion.motion.articulation import ArticulationPrior
 from lipmotion.motion.closure import Closure
 from lipmotion.motion.generation import LearnedMotion, VarianceScaling
-from lipmotion.motion.modulation_filter import STRENGTH, ModulationFilter
 from lipmotion.motion.predictors import Predictor
 from lipmotion.motion.space import MotionLimits, MotionSpace, measure_limits
 from lipmotion.types import FRAME_RATE_HZ, Configuration, Rule, option
@@ -67,8 +66,6 @@ class CoupledConfig(Configuration):
     closures   : make the lips meet in every p, b and m
     articulation : lean on the table of English articulation in contexts that training saw little of; less where the
                  phones are recognised, words do not confirm them, and training knows the voice
-    modulation_filter : how far generated motion is given the modulation spectrum of recorded motion: as of the
-                 trajectory engine (``trajectory`` conversion only; docs/results/jerk.md)
     """
 
     structure: str = option("coupled", Rule(choices=STRUCTURES))
@@ -96,7 +93,6 @@ class CoupledConfig(Configuration):
     start_asynchrony: int = option(1, Rule(least=0), omit_default=True)
     unseen_loss: float = option(UNSEEN_LOSS, Rule(least=0), omit_default=True)
     moves_together: bool = option(default=False, omit_default=True)
-    modulation_filter: float = option(0.0, STRENGTH, omit_default=True)
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
     preset_visual: ClassVar[Mapping[str, str]] = dict.fromkeys(PRESETS, EIGENLIPS)
@@ -127,11 +123,6 @@ class CoupledConfig(Configuration):
         return self.conversion == TRAJECTORY
 
     @property
-    def filtered(self) -> bool:
-        """Whether the modulation filter is learned."""
-        return self.dynamic and self.modulation_filter > 0
-
-    @property
     def uses_encoding(self) -> bool:
         """Whether voices that training does not know follow their encoding."""
         return self.dynamic and self.acoustic_regression
@@ -140,10 +131,8 @@ class CoupledConfig(Configuration):
 Array = NDArray[np.float64]
 AWAY_FROM_SPEECH_S = 0.45
 """In silence this far from speech the mouth is in the rest pose; nearer, it is still closing or gets ready."""
-LARGEST_SPEECH_POSTERIOR = 0.05
-"""Greatest posterior of speech in a frame that counts as silent."""
-REST_PRECISION_FACTOR = 100.0
-"""How many times more precise the rest pose is than the means that it replaces."""
+LARGEST_SPEECH_POSTERIOR = 0.05  # greatest posterior of speech in a frame that counts as silent
+REST_PRECISION_FACTOR = 100.0  # how many times more precise the rest pose is than the means that it replaces
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +147,6 @@ class CoupledModel:
     rest_pose  : the pose in silence away from speech [shape=(Q,)]
     closure    : how the lips close; None: the motion has no opening
     prior      : the table of articulation in the speaker's range (None: there is none)
-    modulation : restores fast movement (None: the motion stays as it is)
     encoding   : of voices that training does not know, the motion by their encoding (None: there was none)
     """
 
@@ -170,7 +158,6 @@ class CoupledModel:
     rest_pose: Array
     closure: Closure | None
     prior: ArticulationPrior | None = None
-    modulation: ModulationFilter | None = None
     encoding: Predictor | None = None
 
     def __repr__(self) -> str:
@@ -188,9 +175,9 @@ class CoupledModel:
 
     @cached_property
     def motion(self) -> LearnedMotion:
-        """What turns means and precisions into motion: space, closure, limits, variance scaling, modulation filter."""
+        """What turns means and precisions into motion: space, closure, limits, variance scaling."""
         scaling = VarianceScaling(self.scaling, self.rest_pose)
-        return LearnedMotion(self.space, self.closure, self.limits, scaling, self.prior, self.modulation)
+        return LearnedMotion(self.space, self.closure, self.limits, scaling, self.prior)
 
     @property
     def pose_limits(self) -> MotionLimits:

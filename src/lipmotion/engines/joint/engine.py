@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, final
@@ -18,28 +18,11 @@ from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_ar
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, grow_joint
 from lipmotion.hmm.multistream.recognise import StatePath, align, merge_gaussians, recognise_units, select_densities
 from lipmotion.hmm.multistream.unit_states import Inventory, RecognisedUnit, frames_to_units, units_to_frames
-from lipmotion.kernels.banded import solve_mlpg
-from lipmotion.motion.arrays import (
-    MOTION_ARRAYS,
-    SCALING,
-    motion_from_arrays,
-    motion_to_arrays,
-    scaling_from_arrays,
-    scaling_to_arrays,
-)
+from lipmotion.motion.arrays import MOTION_ARRAYS, motion_from_arrays, motion_to_arrays
 from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import Closure, fit_closure
 from lipmotion.motion.frame_labels import with_unit_names
-from lipmotion.motion.generation import LearnedMotion, VarianceScaling, fit_scaling_factors
-from lipmotion.motion.modulation_filter import (
-    MODULATION,
-    STRENGTH,
-    ModulationFilter,
-    filter_from_arrays,
-    filter_to_arrays,
-    learn_filter,
-    select_resting_motion,
-)
+from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.space import MotionLimits, MotionSpace, check_poses, fit_reduced_motion, measure_limits
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.schema import format_errors, refuse_undeclared, select_arrays
@@ -97,8 +80,6 @@ class JointEngineConfig(Configuration):
                  aligner). Times that are given with the units stay as they are
     closures   : make the lips meet in every p, b and m, and in every recognised unit that has no other phones
     articulation : lean on the table of English articulation in contexts that training saw little of
-    modulation_filter : how far generated motion is given the modulation spectrum of recorded motion: as of the
-                 trajectory engine; movements are then scaled to the recorded variance, too (docs/results/jerk.md)
     """
 
     units: str = "phone"
@@ -121,7 +102,6 @@ class JointEngineConfig(Configuration):
     insertion: float = option(-4.0, omit_default=True)
     both_neighbours: bool = option(False, omit_default=True)
     flat_start: bool = option(False, omit_default=True)
-    modulation_filter: float = option(0.0, STRENGTH, omit_default=True)
     channels: str = option("", omit_default=True)
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"hofer2008": HOFER_2008}
@@ -164,8 +144,6 @@ class JointModel:
 
     closure : of the lips in p, b and m (None: the motion has no channel ``opening``)
     prior   : the table of articulation in the speaker's range (None: there is none)
-    scaling : variance scaling about the rest pose (None: movements are not scaled)
-    modulation : restores fast movement (None: the motion stays as it is)
     """
 
     units: UnitSet
@@ -173,8 +151,6 @@ class JointModel:
     hmm: JointHmm
     closure: Closure | None
     prior: ArticulationPrior | None
-    scaling: VarianceScaling | None = None
-    modulation: ModulationFilter | None = None
 
     def __repr__(self) -> str:
         return (
@@ -189,7 +165,7 @@ class JointModel:
     @cached_property
     def motion(self) -> LearnedMotion:
         """What turns predicted means into motion."""
-        return LearnedMotion(self.space, self.closure, self.limits, self.scaling, self.prior, self.modulation)
+        return LearnedMotion(self.space, self.closure, self.limits, prior=self.prior)
 
     @property
     def poses(self) -> MotionLimits:
@@ -222,55 +198,32 @@ class JointEngine(Engine[JointModel]):
         *_, model = self.growing_models(examples, monitor, checkpoint)
         figures = {f"leaves_{name}": float(stream.forest.size) for name, stream in model.hmm.models.items()}
         frames = sum(int(example.valid.sum()) for example in examples)
-        return Fit(self._with_filter(model, self._with_channels(examples)), {"frames": frames, **figures})
+        return Fit(model, {"frames": frames, **figures})
 
     def growing_models(
         self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
     ) -> Iterator[JointModel]:
-        """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``."""
-        utterances, inventory, classes, make_model = self._prepare(self._with_channels(examples))
-        yield from map(make_model, grow_joint(utterances, inventory, classes, self.config.hmm, monitor, checkpoint))
+        """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``.
 
-    def _with_channels(self, examples: Sequence[Example]) -> Sequence[Example]:
-        """Return examples with the channels that are modelled. Raises InputError: there is no such channel."""
-        names = self.config.channels.split()
-        return [replace(each, motion=each.motion.selected(names)) for each in examples] if names else examples
-
-    def _prepare(self, examples: Sequence[Example]) -> tuple[
-        list[TrainingUtterance], Inventory, Mapping[str, frozenset[str]], Callable[[JointHmm], JointModel]
-    ]:  # fmt: skip
-        """Return what ``grow_joint`` takes, and what makes a model of its result. Raises CorpusError: no speech."""
+        Raises InputError: no such channel. Raises CorpusError: no speech.
+        """
+        if names := self.config.channels.split():
+            examples = [replace(each, motion=each.motion.selected(names)) for each in examples]
         units = load_unit_set(self.config.units)
         space, values = fit_reduced_motion(examples, self.config.components)
         utterances = []
         for example, x in zip(examples, values, strict=True):
             observed = self._observations(example.speech, x, example.valid)
-            names, bounds = units_to_frames(example.speech.units, observed.frames, units.silence[0], units.unit_of)
-            utterances.append(TrainingUtterance(observed, names, None if self.config.flat_start else bounds))
+            spoken, bounds = units_to_frames(example.speech.units, observed.frames, units.silence[0], units.unit_of)
+            utterances.append(TrainingUtterance(observed, spoken, None if self.config.flat_start else bounds))
         if all(set(utterance.units) <= set(units.silence) for utterance in utterances):
             raise CorpusError(f"no speech in {len(examples)} examples; train on speech")
         silence = units.silence[:1] + tuple(unit for unit in units.silence[1:] if units.silent(unit))  # only silence
         inventory = Inventory(units.units, silence, self.config.states)
         closure = fit_closure(space.direct_names, values, examples)
         prior = fit_articulation_prior(space, values, examples) if self.config.articulation else None
-        return utterances, inventory, units.classes(), lambda hmm: JointModel(units, space, hmm, closure, prior)
-
-    def _with_filter(self, model: JointModel, examples: Sequence[Example]) -> JointModel:
-        """Return a model with the modulation filter, and the variance scaling before it, if the filter is wanted."""
-        if not self.config.modulation_filter:
-            return model
-        examples = [example for example in examples if example.valid.any()]
-        values = [model.space.reduce(example.motion.values.astype(float)) for example in examples]
-        recorded = [x[example.valid] for x, example in zip(values, examples, strict=True)]
-        generated = []
-        for example in examples:
-            path = _align(model, self._observations(example.speech), example.speech.units)
-            generated.append(solve_mlpg(*merge_gaussians(select_densities(model.hmm, path)))[0][example.valid])
-        factors = fit_scaling_factors(recorded, generated)
-        rest = np.median(np.concatenate(select_resting_motion(examples, values) or recorded), axis=0)
-        compared = ((x, factors * made) for x, made in zip(recorded, generated, strict=True))
-        modulation = learn_filter(self.config.modulation_filter, compared, examples, values)
-        return replace(model, scaling=VarianceScaling(factors, rest), modulation=modulation)
+        for hmm in grow_joint(utterances, inventory, units.classes(), self.config.hmm, monitor, checkpoint):
+            yield JointModel(units, space, hmm, closure, prior)
 
     def generate(self, model: JointModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         observations, duration_s = self._observations(speech), speech.features.duration_s
@@ -289,7 +242,7 @@ class JointEngine(Engine[JointModel]):
                 units = _align_times(model, observations, units, duration_s)
             path = _align(model, observations, units)
         means, precisions = merge_gaussians(select_densities(model.hmm, path))
-        motion, variance = model.motion.for_voice(speech.voice).generate(
+        motion, variance = model.motion.generate(
             lambda frames: (means[frames], precisions[frames]),
             len(speech.features.values),
             units,
@@ -309,22 +262,19 @@ class JointEngine(Engine[JointModel]):
 
     def to_arrays(self, model: JointModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         joint = {f"{PREFIX}{name}": array for name, array in joint_to_arrays(model.hmm).items()}
-        restoring = scaling_to_arrays(model.scaling) | filter_to_arrays(model.modulation)
-        return motion_to_arrays(model.units, model.space, model.closure, model.prior) | restoring | joint
+        return motion_to_arrays(model.units, model.space, model.closure, model.prior) | joint
 
     def from_arrays(self, arrays: Arrays) -> JointModel:  # noqa: D102
         with format_errors("the joint model"):
             joint = (name for name in arrays if name.startswith(PREFIX))
-            refuse_undeclared(arrays, MOTION_ARRAYS, SCALING, MODULATION, joint)
+            refuse_undeclared(arrays, MOTION_ARRAYS, joint)
             units, space, closure, prior = motion_from_arrays(arrays, self.config.units)
             hmm = joint_from_arrays(select_arrays(arrays, PREFIX), self.config.hmm)
             if set(hmm.inventory.names) != set(units.units):
                 raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(units.units)}")
             if MOTION not in hmm.models or len(hmm.models[MOTION].scale.mean) != 3 * space.dimensions:
                 raise ValueError(f"motion that is not of {space.dimensions} dimensions")
-            scaling = scaling_from_arrays(arrays, space.dimensions)
-            modulation = filter_from_arrays(arrays, space.dimensions, needed=self.config.modulation_filter > 0)
-            model = JointModel(units, space, hmm, closure, prior, scaling, modulation)
+            model = JointModel(units, space, hmm, closure, prior)
             check_poses(model.poses, space, closure)
             return model
 

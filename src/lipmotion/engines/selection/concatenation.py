@@ -28,8 +28,7 @@ MIN_OVERLAP_S, MAX_OVERLAP_S = 0.02, 0.15
 """Pieces overlap from at least so much, two frames, to at most so much before and after a soft join."""
 MIN_WEIGHT = 1e-9
 ROUNDING_S = 1e-6
-SHORTEST_S = 1e-3
-"""Two joins are never closer."""
+SHORTEST_S = 1e-3  # two joins are never closer
 
 
 @dataclass(frozen=True)
@@ -187,48 +186,38 @@ def _smooth(
         motion[near] += (share if side == 0 else -share) * bend[:, None] * jump
 
 
-SETTLED_S = 0.06
-"""Half of the rest pose is left so long before the first phone, and reached so long after the last one."""
-
-
-@dataclass(frozen=True, eq=False)
-class Chosen:
-    """The unit of each phone of a target [shape=(U,)], and the pieces that they make."""
-
-    target: Target
-    units: UnitNumbers
-    pieces: list[Piece]
+SETTLED_S = 0.06  # half of the rest pose is left so long before the first phone, and reached so long after the last one
 
 
 def join_motion(
     model: SelectionModel,
     costs: Costs,
-    chosen: Chosen,
+    target: Target,
+    units: UnitNumbers,
+    pieces: list[Piece],
     speech: Speech,
     constraints: Constraints | None = None,
-    *,
-    close: bool = False,
 ) -> tuple[Motion, ReducedVariance]:
-    """Return the motion of chosen units, lips closed if wanted, and its variance, as ``LearnedMotion.generate``."""
+    """Return the motion of units and pieces chosen for a target, and its variance, as ``LearnedMotion.generate``."""
     frames = len(speech.features.values)
-    track = join_pieces(costs.inventory, chosen.target, chosen.pieces, frames)
+    track = join_pieces(costs.inventory, target, pieces, frames)
     always = not is_silent(costs.stand_ins.get(SILENCE, SILENCE))
     resting = _resting(np.asarray(speech.features.values), speech.units, always=always)[:, None]
     means = with_dynamics(track + resting * (model.rest - track))
     precisions = np.broadcast_to(1 / model.variances, means.shape)
-    target, middle = chosen.target, costs.config.window // 2
+    middle = costs.config.window // 2
     around = slice(middle - 1, middle + 2)  # units that were recorded between other phones may be corrected
-    differs = (costs.index.contexts[chosen.units][:, around] != target.contexts[:, around]).any(axis=1)
+    differs = (costs.index.contexts[units][:, around] != target.contexts[:, around]).any(axis=1)
     reliability = np.zeros(frames)
     for (start_s, end_s), other in zip(target.windows.times_s.tolist(), differs.tolist(), strict=True):
         within = slice(int(start_s * FRAME_RATE_HZ), int(np.ceil(end_s * FRAME_RATE_HZ)))
         reliability[within] = float(other and not target.by_sound)
-    return model.motion.for_voice(speech.voice).generate(
+    return model.motion.generate(
         lambda block: (means[block].copy(), precisions[block].copy()),
         frames,
         speech.units,
         constraints,
-        close=close,
+        close=costs.config.closures,
         reliability=reliability,
     )
 

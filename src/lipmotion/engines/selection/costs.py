@@ -28,7 +28,6 @@ from lipmotion.engines.selection.inventory import (
     parse_invisible,
 )
 from lipmotion.errors import InputError
-from lipmotion.motion.modulation_filter import STRENGTH
 from lipmotion.motion.predictors import AUTOMATIC, check_predictor
 from lipmotion.types import FRAME_RATE_HZ, Configuration, Rule, option
 from lipmotion.units import PHONES
@@ -83,8 +82,6 @@ class SelectionConfig(Configuration):
     joint_recogniser : train the joint model as well, where there is enough speech: it recognises phones of this speaker
     closures   : make the lips meet in every p, b and m
     articulation : lean on the table of English articulation in contexts that training saw little of
-    modulation_filter : how far generated motion is given the modulation spectrum of recorded motion: as of the
-                 trajectory engine (docs/results/jerk.md)
     predictor  : name of the predictor that is the guide (docs/extend/predictor.md); ``auto``: as suits the recordings
     """
 
@@ -114,7 +111,6 @@ class SelectionConfig(Configuration):
     articulation: bool = True
     predictor: str = option(AUTOMATIC, omit_default=True)
     suppressed: bool = option(False, omit_default=True)
-    modulation_filter: float = option(0.0, STRENGTH, omit_default=True)
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"minnis2000": MINNIS_2000}
 
@@ -138,16 +134,13 @@ class SelectionConfig(Configuration):
         return self.invisible_phones if self.suppressed else frozenset()
 
 
-LARGEST_WINDOW = 11
-"""Keys of larger windows do not fit into 64 bits."""
+LARGEST_WINDOW = 11  # keys of larger windows do not fit into 64 bits
 
 
 Array = NDArray[np.float64]
-POINTS = 5
-"""Points of a phone at which motions are compared."""
+POINTS = 5  # points of a phone at which motions are compared
 FRACTIONS = (np.arange(POINTS) + 0.5) / POINTS
-PER_S = 10.0
-"""Costs of the guide are given for a tenth of a second."""
+PER_S = 10.0  # costs of the guide are given for a tenth of a second
 MIN_S = 0.01
 ABUTTING_JOIN, JOIN_BEFORE, JOIN_AFTER, NO_JOIN = 0, 1, 2, 3
 """Kinds of a join: units abut, overlap in the phone before or after it, or were recorded in succession."""

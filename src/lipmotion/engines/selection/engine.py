@@ -6,23 +6,15 @@ import logging
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from textwrap import wrap
 from typing import Any, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
-from lipmotion.engines.selection.concatenation import Chosen, Piece, TimeMap, join_motion, list_shown_units, to_pieces
+from lipmotion.engines.selection.concatenation import Piece, TimeMap, join_motion, list_shown_units, to_pieces
 from lipmotion.engines.selection.costs import JOIN_AFTER, JOIN_BEFORE, Costs, SelectionConfig, Target, select
-from lipmotion.engines.selection.inventory import (
-    PHONE_NUMBER,
-    SOURCE,
-    RecordedUnits,
-    find_source,
-    find_substitutes,
-    list_windows,
-)
+from lipmotion.engines.selection.inventory import PHONE_NUMBER, SOURCE, RecordedUnits, find_source, list_windows
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
 from lipmotion.engines.selection.selection_training import build_target, fit_selection
 from lipmotion.errors import InputError
@@ -30,7 +22,6 @@ from lipmotion.motion.predictors import count_conditions
 from lipmotion.printable import printable
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Configuration, Constraints, Example, Generation, Monitor, Speech, StateTrace, Timeline, Unit
-from lipmotion.units import PHONES
 
 Array = NDArray[np.float64]
 SOUND: dict[str, Any] = {
@@ -82,9 +73,7 @@ def _source_piece(inventory: RecordedUnits, target: Target, piece: Piece, follow
 
 
 LOG = logging.getLogger("lipmotion")
-LINE = 110
-NAMED_UNITS = 3
-"""Units that one warning names."""
+NAMED_UNITS = 3  # units that one warning names
 
 
 @final
@@ -123,8 +112,7 @@ class SelectionEngine(Engine[SelectionModel]):
         frames = len(speech.features.values)
         units = select(costs, target, required=_find_named_units(costs, target, speech.units))[0]
         pieces = to_pieces(costs, target, units)
-        chosen = Chosen(target, units, pieces)
-        motion, variance = join_motion(model, costs, chosen, speech, constraints, close=self.config.closures)
+        motion, variance = join_motion(model, costs, target, units, pieces, speech, constraints)
         sources = [find_source(costs.inventory, unit) for unit in units.tolist()]
         starts_s = target.windows.times_s[:, 0]
         shown, places = np.unique(list_shown_units(target, pieces, frames), return_inverse=True)
@@ -167,23 +155,11 @@ class SelectionEngine(Engine[SelectionModel]):
             with_sources(units, target.windows.times_s[:, 0], sources),
         )
 
-    def describe(self, model: SelectionModel) -> str:  # noqa: D102
-        windows, usable = model.inventory.windows, model.inventory.usable
-        counts = {phone: int((usable & (windows.phones == number)).sum()) for number, phone in enumerate(PHONES)}
-        stand_ins = find_substitutes(windows, usable)
-        lines = [f"{int(usable.sum())} units of {len(model.inventory.names)} recordings"]
-        for title, items in (
-            ("units of each phone", [f"{phone} {count}" for phone, count in counts.items() if count]),
-            ("phones without units, and what stands in for them", [f"{p} ({q})" for p, q in stand_ins.items()]),
-        ):
-            lines += [f"{title}:", *(f"  {line}" for line in wrap(", ".join(items), LINE))] if items else []
-        return "\n".join(lines)
-
     def to_arrays(self, model: SelectionModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         return model_arrays(model)
 
     def from_arrays(self, arrays: Arrays) -> SelectionModel:  # noqa: D102
-        return model_from_arrays(arrays, filtered=self.config.modulation_filter > 0)
+        return model_from_arrays(arrays)
 
 
 def _find_named_units(costs: Costs, target: Target, units: Timeline[Unit]) -> dict[int, int]:

@@ -64,8 +64,7 @@ def parse_invisible(text: str) -> frozenset[str]:
     return phones
 
 
-INVISIBLE_SYMBOL = len(PHONES)
-"""The symbol of all suppressed phones."""
+INVISIBLE_SYMBOL = len(PHONES)  # the symbol of all suppressed phones
 SYMBOLS = len(PHONES) + 1
 PHONE_NUMBER = {phone: number for number, phone in enumerate(PHONES)}
 SILENT = PHONE_NUMBER[SILENCE]
@@ -202,8 +201,7 @@ def list_windows(timelines: Sequence[Timeline[Unit]]) -> PhoneWindows:
     )
 
 
-SOURCE = re.compile(r" \d+\.\d+-\d+\.\d+ s \S+$")
-"""The end of what ``find_source`` returns."""
+SOURCE = re.compile(r" \d+\.\d+-\d+\.\d+ s \S+$")  # the end of what ``find_source`` returns
 
 
 def find_source(inventory: RecordedUnits, unit: int) -> str:

@@ -47,10 +47,8 @@ def interpolate_at(motion: Array, times_s: Array) -> Array:
 
 
 Array = NDArray[np.float64]
-LONGEST_SILENCE_FRAMES = 100
-"""At least one of so many frames is stored."""
-LATE_S = 1.0
-"""Units end at most so long after the motion of their recording."""
+LONGEST_SILENCE_FRAMES = 100  # at least one of so many frames is stored
+LATE_S = 1.0  # units end at most so long after the motion of their recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,12 +112,12 @@ def model_arrays(model: SelectionModel) -> dict[str, NDArray[Any]]:
     return learned_motion_to_arrays(model.motion) | arrays | recogniser
 
 
-def model_from_arrays(arrays: Arrays, *, filtered: bool) -> SelectionModel:
-    """Deserialise a model, ``filtered`` with a modulation filter. Raises ModelFormatError: a missing or wrong array."""
+def model_from_arrays(arrays: Arrays) -> SelectionModel:
+    """Deserialise a model. Raises ModelFormatError: a missing or wrong array."""
     with format_errors("the model of recorded units"):
         named = (name for name in arrays if name.startswith(JOINT_PREFIX))
         refuse_undeclared(arrays, LEARNED_MOTION_ARRAYS, list_predictor_arrays(arrays), UNITS, GUIDE, named)
-        motion = learned_motion_from_arrays(arrays, filtered=filtered)
+        motion = learned_motion_from_arrays(arrays)
         dimensions = motion.space.dimensions
         stored = check_arrays(arrays, UNITS, Q=dimensions)
         predictor = predictor_from_arrays(arrays, dimensions)

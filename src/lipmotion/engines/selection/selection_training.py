@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.selection.concatenation import Chosen, join_motion, join_pieces, to_pieces
+from lipmotion.engines.selection.concatenation import join_pieces, to_pieces
 from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target, select
 from lipmotion.engines.selection.inventory import RecordedUnits, cover_recording, list_windows
 from lipmotion.engines.selection.model import Guide, SelectionModel, interpolate_at
@@ -18,7 +18,6 @@ from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.closure import OPENING
 from lipmotion.motion.frame_labels import find_runs, mark_distant, rate_phones
 from lipmotion.motion.generation import fit_motion
-from lipmotion.motion.modulation_filter import learn_filter
 from lipmotion.motion.predictors import PREDICTORS, PredictorTraining, choose_predictor
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
@@ -26,10 +25,8 @@ from lipmotion.storage.archive import Checkpoint
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Span, Speech, Timeline, Unit, sub_monitor
 from lipmotion.units import SILENCE, is_silent
 
-SEGMENT_S = 0.1
-"""Duration of the segments of speech whose phones cannot be relied on."""
-MIN_RELIABILITY = 0.5
-"""Mean reliability of the phones from which on they choose."""
+SEGMENT_S = 0.1  # duration of the segments of speech whose phones cannot be relied on
+MIN_RELIABILITY = 0.5  # mean reliability of the phones from which on they choose
 
 
 def build_target(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
@@ -62,10 +59,8 @@ LEFT_OUT_RECORDINGS = 24
 MIN_EXPANSION, MAX_EXPANSION = 1.0, 1.6
 NEW_SPEECH_EXPANSION = 1.05
 """Predictions for new recordings are so much narrower again than those for recordings of the training."""
-REST_AWAY_S = 0.3
-"""The rest pose is that of silence further than this from speech,"""
-MIN_REST_FRAMES = 20
-"""or, where there are fewer frames of it, that of the frames with the smallest openings."""
+REST_AWAY_S = 0.3  # the rest pose is that of silence further than this from speech,
+MIN_REST_FRAMES = 20  # or, where there are fewer frames of it, that of the frames with the smallest openings
 KEPT_SILENCE_S = 0.5
 """Silence further than this from speech is not stored (§6: "to edit out this data but maintain synchronisation")."""
 _STAGE = "units"
@@ -106,27 +101,17 @@ def fit_selection(
     rest, unknown = _rest_pose(examples, values, motion.space), np.ones((3, len(scale)))
     model = SelectionModel(motion, inventory, scale, rest, unknown, guide, recogniser)
     costs, errors = model.costs(config), []
-    left_out: list[tuple[int, NDArray[np.bool_], Chosen]] = []  # recordings, measured frames, what stands in for them
     numbers = np.unique(np.linspace(0, len(examples) - 1, LEFT_OUT_RECORDINGS).astype(int)).tolist()
     for number in numbers if len(examples) > 1 else ():
         frames = mark_known_dynamics(examples[number].valid)
         if frames.any():
             target = build_target(model, costs, examples[number].speech)
             units = select(costs, target, costs.inventory.windows.recording == number)[0]
-            chosen = Chosen(target, units, to_pieces(costs, target, units))
-            left_out.append((number, frames, chosen))
-            joined = join_pieces(costs.inventory, target, chosen.pieces, len(values[number]))
+            joined = join_pieces(costs.inventory, target, to_pieces(costs, target, units), len(values[number]))
             errors.append(with_dynamics(values[number] - joined)[frames])
     spread = with_dynamics(recorded).var(axis=0)
     variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else spread
     model = replace(model, variances=np.maximum(variances, 1e-4 * spread + 1e-12))
-    compared = (
-        (values[number][frames], motion.space.reduce(made.values.astype(float))[frames])
-        for number, frames, chosen in left_out
-        for made, _ in [join_motion(model, costs, chosen, examples[number].speech)]
-    )
-    modulation = learn_filter(config.modulation_filter, compared, examples, values)
-    model = replace(model, motion=replace(motion, modulation=modulation))
     monitor(Progress(_STAGE, 3, 3, 1.0))
     return model, np.sqrt(model.variances[0])
 

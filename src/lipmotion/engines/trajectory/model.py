@@ -26,7 +26,7 @@ from lipmotion.motion.generation import LearnedMotion, VarianceScaling
 from lipmotion.motion.modulation_filter import STRENGTH, ModulationFilter
 from lipmotion.motion.predictors import AUTOMATIC, Predictor, check_predictor
 from lipmotion.motion.space import MotionLimits, MotionSpace, check_spread, measure_limits
-from lipmotion.stats.trees import TREES, Context, Tree, trees_from_arrays
+from lipmotion.stats.trees import TREES, Tree, trees_from_arrays
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
 from lipmotion.types import Configuration, Rule, Speech, option
 from lipmotion.units import UnitSet, load_unit_set
@@ -114,9 +114,6 @@ class TrajectoryConfig(Configuration):
 
 Array = NDArray[np.float64]
 
-MAX_CONTEXTS = 50_000
-"""Contexts whose leaves are kept, so that motion is generated again sooner."""
-
 
 @dataclass(frozen=True, eq=False)
 class AcousticRegression:
@@ -147,44 +144,33 @@ class Emission:
     regression: AcousticRegression | None
 
     @cached_property
-    def _rows(self) -> dict[tuple[str, int], int]:
-        leaves = [(name, leaf) for name, tree in self.forest.items() for leaf in tree.leaves.tolist()]
-        return {leaf: row for row, leaf in enumerate(leaves)}
+    def _first_rows(self) -> dict[str, int]:
+        ends = np.cumsum([0, *(len(tree.leaves) for tree in self.forest.values())])
+        return dict(zip(self.forest, ends.tolist(), strict=False))
+
+    @cached_property
+    def _names(self) -> dict[tuple[str, int], str]:
+        return {}
 
     def row(self, state: FullContextState, layout: StateLayout) -> int:
         """Return the number of the density of a full-context state: its row in ``means``."""
         if state == layout.rest:
             return len(self.means) - 1
         name = layout.name(state)
-        return self._rows[name, self._leaf(name, state.context)]
-
-    def _leaf(self, name: str, context: Context) -> int:
-        """Return the leaf of a context in a tree; it is looked for once."""
-        if (name, context) not in self._leaves:
-            if len(self._leaves) > MAX_CONTEXTS:
-                self._leaves.clear()
-            self._leaves[name, context] = self.forest[name].path(context)[-1]
-        return self._leaves[name, context]
-
-    @cached_property
-    def _leaves(self) -> dict[tuple[str, Context], int]:
-        return {}
-
-    @cached_property
-    def _names(self) -> dict[tuple[str, int], str]:
-        return {}
+        return self._first_rows[name] + self.forest[name].rank(state.context)
 
     def source(self, state: FullContextState, layout: StateLayout) -> str:
         """Return the origin of the density of a state, in words: its tree, its leaf, and the frames of the leaf."""
         if state == layout.rest:
             return "rest"
         name = layout.name(state)
-        leaf = self._leaf(name, state.context)
-        if (name, leaf) not in self._names:
-            tree = self.forest[name]
-            self._names[name, leaf] = f"{tree.name(leaf)} ({tree.frames[leaf]:.0f} frames)"
+        tree = self.forest[name]
+        rank = tree.rank(state.context)
+        if (name, rank) not in self._names:
+            leaf = int(tree.leaves[rank])
+            self._names[name, rank] = f"{tree.name(leaf)} ({tree.frames[leaf]:.0f} frames)"
         left, unit, right = state.context
-        return f"{left}-{unit}+{right} {name}: {self._names[name, leaf]}"
+        return f"{left}-{unit}+{right} {name}: {self._names[name, rank]}"
 
     def statistics(self, rows: NDArray[np.intp], features: NDArray[np.float32], frames: slice) -> tuple[Array, Array]:
         """Return means and precisions [each shape=(N, 3, Q)] of N successive frames of densities [shape=(N,)]."""
@@ -239,13 +225,11 @@ EMISSION = (*TREES, *DENSITIES, *REGRESSION)
 """Names of the arrays of an emission: L densities, C regressions on A components."""
 
 
-NETWORK_SHARE = 0.6
-"""Weight of the predictor beside the states, 0 to 1, in models that have no other."""
+NETWORK_SHARE = 0.6  # weight of the predictor beside the states, 0 to 1, in models that have no other
 RESTING_SHARE = 0.5
 """Share of its weight that the predictor has where the states rest, with voices that training knows: their mouths open
 before they speak."""
-UNSEEN_VOICE_LOSS = 0.8
-"""Share of their weight that states lose with voices that training does not know at all."""
+UNSEEN_VOICE_LOSS = 0.8  # share of their weight that states lose with voices that training does not know at all
 
 
 @dataclass(frozen=True, eq=False)

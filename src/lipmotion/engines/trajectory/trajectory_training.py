@@ -127,8 +127,7 @@ def fit_acoustic_regression(
     return replace(emission, regression=regression, variances=_variances(emission, regression, clips, options, layout))
 
 
-_Node = tuple[str, int]
-"""A node of a tree: name of the tree, number of the node."""
+_Node = tuple[str, int]  # a node of a tree: name of the tree, number of the node
 
 
 def _variances(

@@ -89,18 +89,13 @@ def stream_observations(
     F0 becomes three streams: static values, Δ and Δ², each known where its whole window is voiced. Motion is one, of
     static values, Δ and Δ² side by side, known where all three are.
     Source: Hofer 2008, §4; the windows of F0 as for motion.
-    Raises InputError: as ``StreamObservations``; log F0 or motion of another shape, infinite log F0, a mask that is not
-    that of the frames, or a measured value that is not finite.
+    Raises InputError: as ``StreamObservations``; motion of another shape, or a mask that is not that of the frames.
     """
     speech = np.asarray(speech)
     streams = {SPEECH: ObservedStream(speech, np.ones(len(speech), bool))}
     if log_f0 is not None:
         pitch: NDArray[np.float64] = np.asarray(log_f0, np.float64)
-        if pitch.ndim != 1 or np.isinf(pitch).any():
-            raise InputError(
-                f"log F0 has shape {pitch.shape}, required (T,), NaN where there is no voice, never infinite"
-            )
-        voiced = ~np.isnan(pitch)
+        voiced = np.isfinite(pitch)
         dynamics = with_dynamics(np.where(voiced, pitch, 0.0)[:, None])
         masks = (voiced, *[mark_known_dynamics(voiced)] * 2)
         for window, (name, mask) in enumerate(zip(F0_STREAMS, masks, strict=True)):
@@ -110,26 +105,17 @@ def stream_observations(
         seen = np.ones(len(values), bool) if measured is None else np.asarray(measured)
         if values.ndim != 2 or seen.shape != values.shape[:1]:
             raise InputError(f"motion has shape {values.shape}, its mask {seen.shape}; required (T, Q) and (T,)")
-        if not np.isfinite(values[seen]).all():
-            raise InputError(
-                "motion holds values that are not finite where it was measured; mark these frames as not measured"
-            )
         known = mark_known_dynamics(np.asarray(seen, bool))
         dynamics = with_dynamics(np.where(seen[:, None], values, 0.0)).reshape(len(values), -1)
         streams[MOTION] = ObservedStream(np.where(known[:, None], dynamics, 0.0), known)
     return StreamObservations(streams)
 
 
-MIN_FRAMES = 2.0
-"""A Gaussian with less data, in frames, is not re-estimated."""
-SPLIT_FRAMES = 40.0
-"""A Gaussian with less data, in frames, is not split."""
-MIN_VOICED_PROBABILITY = 1e-3
-"""Smallest probability of a frame being voiced, and of its being unvoiced."""
-MIN_POSTERIOR = np.float32(1e-10)
-"""Smaller posteriors are set to 0; so none is denormal, which would be slow."""
-MIN_SCALE = 1e-6
-"""Smallest standard deviation of a scale: a dimension that varies less is constant."""
+MIN_FRAMES = 2.0  # a Gaussian with less data, in frames, is not re-estimated
+SPLIT_FRAMES = 40.0  # a Gaussian with less data, in frames, is not split
+MIN_VOICED_PROBABILITY = 1e-3  # smallest probability of a frame being voiced, and of its being unvoiced
+MIN_POSTERIOR = np.float32(1e-10)  # smaller posteriors are set to 0; so none is denormal, which would be slow
+MIN_SCALE = 1e-6  # smallest standard deviation of a scale: a dimension that varies less is constant
 
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]

@@ -63,10 +63,6 @@ class Forest:
         ends = np.cumsum([0, *(len(tree.leaves) for tree in self.trees.values())])
         return dict(zip(self.trees, ends.tolist(), strict=False))
 
-    @cached_property
-    def _leaf_cache(self) -> dict[TriphoneState, int]:
-        return {}
-
     @property
     def size(self) -> int:
         """The number of leaves."""
@@ -74,14 +70,9 @@ class Forest:
 
     def leaf(self, state: TriphoneState) -> int:
         """Return the leaf of a state in context, whether or not the context occurred in training."""
-        number = self._leaf_cache.get(state)
-        if number is None:
-            context, position = state
-            name = self.inventory.tree(context[1], position)
-            tree = self.trees[name]
-            number = self._first_leaf[name] + int(np.searchsorted(tree.leaves, tree.path(context)[-1]))
-            self._leaf_cache[state] = number
-        return number
+        context, position = state
+        name = self.inventory.tree(context[1], position)
+        return self._first_leaf[name] + self.trees[name].rank(context)
 
     def leaves(self, states: Iterable[TriphoneState]) -> NDArray[np.intp]:
         """Return the leaves of states in context [shape=(S,)]."""

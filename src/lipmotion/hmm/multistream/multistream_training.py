@@ -41,8 +41,7 @@ from lipmotion.stats.trees import Question
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Monitor, Progress, silent_monitor, sub_monitor
 
-MIN_STAY_PROBABILITY = 0.05
-"""Smallest probability of staying in a state."""
+MIN_STAY_PROBABILITY = 0.05  # smallest probability of staying in a state
 MIN_MIXTURE_POSTERIOR = 1e-5
 """Smaller state posteriors are left out of the statistics of mixtures; nearly all posteriors are smaller."""
 Rows = NDArray[np.float32]

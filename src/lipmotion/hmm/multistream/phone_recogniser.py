@@ -23,13 +23,11 @@ PHONES = UNIT_SETS["phone"]
 CONFIG = JointConfig(mixtures=16)
 MIN_MINUTES = 8.0
 """Smallest amount of speech for training; with less, the models of many voices recognise phones better."""
-LONGEST_S = 120.0
-"""Longer recordings are left to the shared recogniser, which works block by block."""
+LONGEST_S = 120.0  # longer recordings are left to the shared recogniser, which works block by block
 SIMILARITY_MARGIN = -6.0
 """A speaker counts as one of the training if the speaker similarity score exceeds that of the training data plus this.
 Minus that, measured: GRID's s1 in other recordings -6 to 2; five other speakers of the same studio -9 to -7."""
-SIMILARITY_FRAMES = 400
-"""Frames, spread evenly over a recording, from which the speaker similarity score is computed."""
+SIMILARITY_FRAMES = 400  # frames, spread evenly over a recording, from which the speaker similarity score is computed
 JOINT_PREFIX = "joint_"
 SCORE = {"typical": ArraySpec(np.float64, "1", -1e6, 1e6)}
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +13,7 @@ from lipmotion.errors import AlignmentError
 from lipmotion.hmm.multistream.densities import ACOUSTIC_STREAMS, MOTION, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.unit_states import RecognisedUnit, TriphoneStates, expand_triphones
-from lipmotion.hmm.network import LogLikelihoods, NetworkBuilder, UnitLoop, build_chain, decode_path
+from lipmotion.hmm.network import LogLikelihoods, UnitLoop, build_chain, build_loop, decode_path, score_language
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.stats.curves import with_dynamics
 
@@ -74,98 +72,17 @@ def align(
     return StatePath(states, chosen[path])
 
 
-Grid = NDArray[np.intp]
-
-
-@dataclass(frozen=True, eq=False)
-class ContextLoop:
-    """The network in which every unit that was spoken in training may follow every other, in context.
-
-    leaves     : by acoustic stream, the leaves of each distinct density [shape=(C,)]
-    monophones : [shape=(nodes,)], the number of each node's state without context
-    """
-
-    network: UnitLoop
-    leaves: dict[str, NDArray[np.intp]]
-    monophones: NDArray[np.intp]
-
-
-class _StateNodes(NamedTuple):
-    """The nodes of one state of a unit: one for each class of left and each of right neighbours that it tells apart.
-
-    left, right : [shape=(N,)], the class of every neighbour
-    numbers     : of the nodes [shape=(classes, classes)]
-
-    A node stands for what the states from it on make of the left neighbour, and what the states up to it made of the
-    right one: neighbours that these do not tell apart share it. So the search is exact with the fewest nodes.
-    """
-
-    left: NDArray[np.intp]
-    right: NDArray[np.intp]
-    numbers: Grid
-
-
 @lru_cache(maxsize=4)
-def build_context_loop(hmm: JointHmm) -> ContextLoop:
-    """Return the loop of a model's units with the back-off bigram (Hofer 2008, Eq. 5), as if silence were around it.
+def build_context_loop(hmm: JointHmm) -> tuple[UnitLoop, dict[str, NDArray[np.intp]]]:
+    """Return the loop of the units spoken in training with the back-off bigram (Hofer 2008, Eq. 5), in context.
 
-    The loops of the last few models are cached.
+    Beside it, by acoustic stream, the leaves of each of its distinct densities [shape=(C,)]. The loops of the last few
+    models are cached.
     """
-    inventory = hmm.inventory
+    inventory, config = hmm.inventory, hmm.config
     units = [unit for unit in hmm.spoken if unit not in inventory.free[1:]]
-    leaves, densities = _number_densities(hmm, units)
-    builder, owners, monophones = NetworkBuilder(), list[str](), list[int]()
-    nodes: dict[str, list[_StateNodes]] = {}
-    for unit in units:
-        nodes[unit] = []
-        for state, grid in enumerate(densities[unit]):
-            monophone = inventory.monophones[unit, state]
-            left = _classify(densities[unit][state:].transpose(1, 0, 2))
-            right = _classify(densities[unit][: state + 1].transpose(2, 0, 1))
-            _, first_left = np.unique(left, return_index=True)
-            _, first_right = np.unique(right, return_index=True)
-            chosen = grid[np.ix_(first_left, first_right)]
-            stay = float(hmm.log_stay[monophone])
-            numbers = np.array([[builder.state(int(density), stay) for density in row] for row in chosen], np.intp)
-            owners += [unit] * numbers.size
-            monophones += [monophone] * numbers.size
-            nodes[unit].append(_StateNodes(left, right, numbers))
-        for state, (source, target) in enumerate(pairwise(nodes[unit])):
-            _advance(builder, source, target, float(hmm.log_move[inventory.monophones[unit, state]]))
-    _join_units(builder, hmm, units, nodes)
-    entries = frozenset(int(number) for of_unit in nodes.values() for number in of_unit[0].numbers.ravel())
-    network = UnitLoop(builder.build(), tuple(owners), entries)
-    return ContextLoop(network, leaves, np.array(monophones, np.intp))
-
-
-def _join_units(
-    builder: NetworkBuilder, hmm: JointHmm, units: Sequence[str], nodes: Mapping[str, Sequence[_StateNodes]]
-) -> None:
-    """Join the last state of every unit to the first one of every unit, and let recordings begin and end."""
-    place, silence = {unit: number for number, unit in enumerate(units)}, hmm.inventory.silence
-    for unit in units:
-        first, last = nodes[unit][0], nodes[unit][-1]
-        leave = float(hmm.log_move[hmm.inventory.monophones[unit, hmm.inventory.count(unit) - 1]])
-        for following in units:
-            entered, score = nodes[following][0], leave + _language_score(hmm, unit, following)
-            for source in last.numbers[:, last.right[place[following]]].tolist():
-                for target in entered.numbers[entered.left[place[unit]]].tolist():
-                    builder.arc(source, target, score)
-        begin = hmm.config.insertion if unit == silence else _language_score(hmm, silence, unit)
-        builder.initial.update(dict.fromkeys(first.numbers[first.left[place[silence]]].tolist(), begin))
-        end = leave + (0.0 if unit == silence else _language_score(hmm, unit, silence))
-        builder.final.update(dict.fromkeys(last.numbers[:, last.right[place[silence]]].tolist(), end))
-
-
-def _language_score(hmm: JointHmm, unit: str, following: str) -> float:
-    """Return the score of the language model: weighted log bigram plus insertion penalty."""
-    return hmm.config.bigram_weight * hmm.bigram(unit, following) + hmm.config.insertion
-
-
-def _number_densities(hmm: JointHmm, units: Sequence[str]) -> tuple[dict[str, NDArray[np.intp]], dict[str, Grid]]:
-    """Return the leaves of distinct densities by stream, and by unit the density of each state beside N² neighbours."""
     acoustic = [name for name in ACOUSTIC_STREAMS if name in hmm.models]
-    counts = [hmm.inventory.count(unit) for unit in units]
+    counts = [inventory.count(unit) for unit in units]
     grids = np.stack(
         [
             np.stack([hmm.models[name].forest.leaf_grid(unit, state, units) for name in acoustic], axis=-1)
@@ -175,19 +92,13 @@ def _number_densities(hmm: JointHmm, units: Sequence[str]) -> tuple[dict[str, ND
     )
     distinct, number = np.unique(grids.reshape(-1, len(acoustic)), axis=0, return_inverse=True)
     of_states = np.split(number.reshape(grids.shape[:-1]), np.cumsum(counts)[:-1])
-    return dict(zip(acoustic, distinct.T, strict=True)), dict(zip(units, of_states, strict=True))
-
-
-def _classify(rows: Grid) -> NDArray[np.intp]:
-    """Return the class of every row: those of equal rows are the same [shape=(N,)]."""
-    return np.unique(rows.reshape(len(rows), -1), axis=0, return_inverse=True)[1].reshape(-1)
-
-
-def _advance(builder: NetworkBuilder, source: _StateNodes, target: _StateNodes, log_move: float) -> None:
-    """Join two successive states: left neighbours that the second tells apart, and right ones that the first did."""
-    for left, left_after in set(zip(source.left.tolist(), target.left.tolist(), strict=True)):
-        for right, right_after in set(zip(source.right.tolist(), target.right.tolist(), strict=True)):
-            builder.arc(int(source.numbers[left, right]), int(target.numbers[left_after, right_after]), log_move)
+    log_stay = {
+        unit: [float(hmm.log_stay[inventory.monophones[unit, state]]) for state in range(count)]
+        for unit, count in zip(units, counts, strict=True)
+    }
+    language = score_language(hmm.bigram, config.bigram_weight, config.insertion)
+    loop = build_loop(dict(zip(units, of_states, strict=True)), log_stay, inventory.silence, language, config.insertion)
+    return loop, dict(zip(acoustic, distinct.T, strict=True))
 
 
 def recognise_units(hmm: JointHmm, observed: StreamObservations) -> list[RecognisedUnit]:
@@ -198,23 +109,20 @@ def recognise_units(hmm: JointHmm, observed: StreamObservations) -> list[Recogni
     Raises InputError: no active stream. Raises AlignmentError: too few frames.
     Source: Hofer 2008, Eq. 5.
     """
-    weights, context_loop = hmm.config.recognition, build_context_loop(hmm)
+    weights, (loop, leaves) = hmm.config.recognition, build_context_loop(hmm)
     streams = hmm.standardise(observed, weights)
 
     def log_density(first: int, end: int, _: NDArray[np.intp] | None) -> NDArray[np.float32]:
         rows = {name: stream[first:end] for name, stream in streams.items()}
-        return hmm.log_density(rows, context_loop.leaves, weights).astype(np.float32)
+        return hmm.log_density(rows, leaves, weights).astype(np.float32)
 
-    loop = context_loop.network
     units, starts = decode_path(loop, loop.network.best_path(LogLikelihoods(observed.frames, log_density)))
     return [RecognisedUnit(unit, int(first)) for unit, first in zip(units, starts[:-1], strict=True)]
 
 
 Array = NDArray[np.float64]
-ITERATIONS = 20
-"""Largest number of steps of EM; a dozen are enough nearly always."""
-MIN_GAIN = 1e-4
-"""EM ends when a step raises the log likelihood per frame by less."""
+ITERATIONS = 20  # largest number of steps of EM; a dozen are enough nearly always
+MIN_GAIN = 1e-4  # EM ends when a step raises the log likelihood per frame by less
 LOG_2PI = float(np.log(2 * np.pi))
 
 

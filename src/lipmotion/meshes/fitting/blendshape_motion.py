@@ -35,7 +35,6 @@ from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Motion, Timeline, Uni
 
 Array = NDArray[np.float64]
 Real = NDArray[np.floating[Any]] | float
-
 HINGE = (-0.45, -0.75)  # the axis of the jaw: height and depth behind the eyes, in eye distances
 JAW_ANGLE_RAD = 0.44  # how far ``jawOpen`` turns the jaw: the lower lip goes down by about half an eye distance
 UPPER_PART = 0.08  # the share of the gap that the upper lip closes in ``mouthClose``; the lower lip closes the rest

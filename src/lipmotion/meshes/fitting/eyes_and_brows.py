@@ -21,7 +21,6 @@ from lipmotion.types.delivery import Staging
 from lipmotion.types.motion import RADIAN, WEIGHT
 
 Array = NDArray[np.float64]
-
 FULL_LOOK_RAD = 0.55  # ARKit's blendshapes of looking turn the eyes so far at weight 1, in radians
 FULL_BROW_RISE = 0.08  # brows are raised so far at weight 1, in eye distances
 CHEEK_SQUINT = 0.6  # raised cheeks narrow the eyes by this part of their weight

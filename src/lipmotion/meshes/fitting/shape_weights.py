@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,27 +21,17 @@ from lipmotion.meshes.fitting.blendshape_motion import find_own_weights, move_po
 from lipmotion.meshes.model.face_shapes import NOT_FROM_POINTS, FaceShapes
 from lipmotion.meshes.model.shape_names import SIDES, VISEMES_15
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
-from lipmotion.units.spelling import parse_table
 
 Array = NDArray[np.float64]
-VISEME_PHONES = parse_table(
-    "sil=sil_sp PP=p_b_m_em FF=f_v TH=th_dh DD=t_d kk=k_g_hh CH=ch_jh_sh_zh SS=s_z nn=n_l_ng_en_el RR=r_er_axr "
-    "aa=aa_ay_aw_ah E=eh_ey_ae_ax ih=ih_iy_ix_y oh=ao_ow_oy ou=uw_uh_w"
-)
-"""The phones of each viseme (the groups of the Oculus LipSync reference, in the project's phones)."""
-VISEME_OF_PHONE = {phone: viseme for viseme, phones in VISEME_PHONES.items() for phone in phones.split()}
+_TABLE = resources.files(__package__).joinpath("visemes.csv").read_text(encoding="ascii")
+_VISEMES = list(csv.DictReader(_TABLE.splitlines()))
+VISEME_OF_PHONE = {phone: row["viseme"] for row in _VISEMES for phone in row["phones"].split()}
+"""The groups of the Oculus LipSync reference, in the project's phones."""
 VISEME_CHANNELS = tuple(f"viseme_{name}" for name in VISEMES_15)
-NEAREST_VOWEL = {
-    **{"TH": "ih", "DD": "ih", "kk": "ih", "CH": "ou", "SS": "ih", "nn": "ih", "RR": "oh", "E": "ee"},
-    **{"aa": "aa", "ih": "ih", "oh": "oh", "ou": "ou"},
-}
+NEAREST_VOWEL = {row["viseme"]: row["vowel"] for row in _VISEMES if row["vowel"]}
 """The vowel of VRM for each viseme that opens the mouth."""
-VISEME_POSES = {
-    **{"FF": (0.05, 0.0), "TH": (0.1, 0.0), "DD": (0.12, 0.0), "kk": (0.14, 0.0), "CH": (0.14, 0.45)},
-    **{"SS": (0.13, 0.0), "nn": (0.13, 0.0), "RR": (0.13, 0.35), "aa": (0.22, 0.0), "E": (0.18, 0.0)},
-    **{"ih": (0.14, 0.0), "oh": (0.15, 0.75), "ou": (0.1, 1.0)},
-}
-"""The gap, in eye distances, and the protrusion of each open viseme at weight 1: about those of distinct speech."""
+VISEME_POSES = np.array([[float(row[name] or 0) for row in _VISEMES] for name in ("gap", "protrusion")])
+"""The gap, in eye distances, and the protrusion of each viseme at weight 1, as in distinct speech; 0: closed."""
 LARGEST_ADDED = 0.4  # a viseme gives up at most this share to ``aa`` where the lips are further apart
 LAX = "E"  # the viseme of parted lips in a pause
 MAX_CLOSED_WEIGHT = 0.85  # largest sum of the visemes of closed lips where the lips are parted
@@ -81,7 +73,7 @@ def blend_visemes(held: Array, gap: Array, protrusion: Array) -> Array:
     Of open visemes, part becomes ``ou`` where the lips are rounder, and ``aa`` where they are further apart; what is
     left is as strong as their gap.
     """
-    gaps, roundness = np.array([VISEME_POSES.get(name, (0.0, 0.0)) for name in VISEMES_15]).T
+    gaps, roundness = VISEME_POSES
     ou, aa, named = VISEMES_15.index("ou"), VISEMES_15.index("aa"), gaps > 0
     total = held[:, named].sum(axis=1)
     mix = held * named / np.maximum(total, MIN_WEIGHT)[:, None]
@@ -154,8 +146,11 @@ class CurveCosts:
     smooth: float = 1e-1
 
 
+USUAL_COSTS = CurveCosts()
+
+
 def solve_shape_weights(
-    motion: Motion, units: Timeline[Unit], shapes: FaceShapes, costs: CurveCosts | None = None
+    motion: Motion, units: Timeline[Unit], shapes: FaceShapes, costs: CurveCosts = USUAL_COSTS
 ) -> Motion:
     """Return the weights of blendshapes over time: one channel a blendshape, by the mesh's names, 0 to 1.
 
@@ -167,7 +162,6 @@ def solve_shape_weights(
     weights.
     Raises InputError: as ``move_points``.
     """
-    costs = costs or CurveCosts()
     points = move_points(motion, units)
     mouth, channels = points.mouth, tuple(Channel(name, WEIGHT) for name in shapes.names)
     own_weights, mood = find_own_weights(motion, shapes), weigh_moods(mouth, shapes)
@@ -198,7 +192,7 @@ def solve_shape_weights(
 def fit_bounded_curves(
     matrix: Array,
     targets: Array,
-    costs: CurveCosts | None = None,
+    costs: CurveCosts = USUAL_COSTS,
     ties: Array | None = None,
     limits: Limits = (0.0, 1.0),
     initial: Array | None = None,
@@ -219,7 +213,6 @@ def fit_bounded_curves(
     Source: Beck & Teboulle 2009 (FISTA), with the restart of O'Donoghue & Candès 2015 and a diagonal preconditioner.
     Cost: O(T·S²) a step; some hundred steps.
     """
-    costs = costs or CurveCosts()
     if matrix.ndim != 2 or targets.ndim != 2 or matrix.shape[1] != targets.shape[1]:
         raise InputError(f"shapes {matrix.shape} and targets {targets.shape} do not fit, required (S, D) and (T, D)")
     if not (np.isfinite(matrix).all() and np.isfinite(targets).all()):

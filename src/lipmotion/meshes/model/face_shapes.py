@@ -12,7 +12,6 @@ from lipmotion.articulation.lip_points import CHIN, FACING
 from lipmotion.meshes.model.mesh import Mesh
 
 Array = NDArray[np.float64]
-
 NOT_FROM_POINTS = {"tongueOut", "jawLeft", "jawRight", "mouthLeft", "mouthRight", "mouthShrugUpper", "mouthDimpleLeft"}
 NOT_FROM_POINTS |= {"mouthDimpleRight", "jawForward", "mouthFrownLeft", "mouthFrownRight", "mouthPressLeft"}
 NOT_FROM_POINTS |= {"mouthPressRight"}

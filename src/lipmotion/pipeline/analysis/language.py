@@ -1,19 +1,26 @@
-"""The language of a request, found by its transcript and its sound."""
+"""The language of a request, found by its transcript and its sound; the words of a recording."""
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import groupby
-from typing import cast
+from pathlib import Path
+from typing import Any, cast
 
-from lipmotion.errors import InputError
+from lipmotion.errors import ExportError, InputError
+from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_recording
-from lipmotion.pipeline.request import Request
+from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.request import Request, SpeechInput, as_request
 from lipmotion.speech.recognition.network.posteriors import WORD_BOUNDARY, find_installed_recogniser, find_stretches
-from lipmotion.speech.recognition.recognised_speech import Recognition
+from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
+from lipmotion.speech.recognition.recogniser import open_recogniser
 from lipmotion.speech.sound.analysed_audio import analysed
-from lipmotion.types import Audio, TimedTranscript, TimedWord, TranscriptLine
+from lipmotion.storage.files import atomic_file, check_distinct, check_target
+from lipmotion.storage.json_text import as_json
+from lipmotion.types import Audio, Span, TimedTranscript, TimedWord, Timeline, TranscriptLine
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
 from lipmotion.units.ipa_phones import read_tokens
 from lipmotion.units.lexicon import detect_language, is_english
@@ -84,13 +91,12 @@ def detect_english(audio: Audio) -> bool | None:
     audio : at 16 kHz
     The network writes every language with the phones of English: it cannot say which other one it is.
     """
-    name = find_installed_recogniser()
-    if name is None:
+    if find_installed_recogniser() is None:
         return None
     part = analysed(Audio(audio.samples[: int(PART_S * audio.rate_hz)], audio.rate_hz))
     tokens = [
         token
-        for _, posteriors in find_stretches(name, part)
+        for _, posteriors in find_stretches(part)
         for token in (*(each.token for each in posteriors.best_tokens), WORD_BOUNDARY)
     ]
     words = (list(group) for ends, group in groupby(tokens, WORD_BOUNDARY.__eq__) if not ends)
@@ -111,3 +117,81 @@ def warn_of_another_language(recognition: Recognition) -> None:
             "give its language (--language es, fr, de, ...); or it is noisy, then give its words (--transcript)",
             *(confidence, MIN_CONFIDENCE),
         )
+
+
+TEXT, JSON = ".txt", ".json"
+LINE_PAUSE_S = 0.5  # a longer pause between words ends a line of text
+
+
+@limit_threads()
+def recognise_words(speech: SpeechInput, *, model: Model | str | Path | None = None, workers: int = 1) -> Recognition:
+    """Return the English words of a recording in time, with the phones that they or free recognition decided.
+
+    speech  : an audio or video file, samples at 16 kHz, or a ``Request``, of which the transcript is not used
+    model   : whose phone models align the words: from ``load_model``, or a path; None: the shipped one
+    workers : as of ``animate``
+    Raises InputError: the recording is not usable, or the recogniser does not recognise words.
+    Raises MissingDependencyError: pocketsphinx is not installed.
+
+    >>> from lipmotion.pipeline.analysis.language import recognise_words
+    >>> found = recognise_words("examples/welcome.flac")
+    >>> found.words[0].label.text, found.word_s > found.phone_s
+    ('please', True)
+    """
+    request = as_request(speech)
+    chosen = model if isinstance(model, Model) else load_model(model or request.model)
+    if request.recogniser != "auto":
+        raise InputError(f"the recogniser {request.recogniser!r} recognises phones, not words; required 'auto'")
+    audio = analysed(read_recording(request))
+    recogniser = open_recogniser(chosen.phones, request.recogniser, chosen.adaptation)
+    if workers == 1:
+        return recogniser.recognition(audio, audio.mfcc())
+    from lipmotion.pipeline.workers import map_in_processes
+
+    return recogniser.recognition(audio, audio.mfcc(), map_in_processes(workers))
+
+
+def format_words(words: Timeline[RecognisedWord]) -> str:
+    """Return words as a transcript, a line for what is said without a long pause."""
+    lines: list[list[str]] = []
+    end_s = float("-inf")
+    for span in words:
+        if span.start_s - end_s > LINE_PAUSE_S:
+            lines.append([])
+        lines[-1].append(span.label.text)
+        end_s = span.end_s
+    return "".join(" ".join(line) + "\n" for line in lines)
+
+
+def describe_words(words: Timeline[RecognisedWord]) -> list[dict[str, Any]]:
+    """Return words for JSON: ``word``, ``start`` and ``end`` in seconds, and the confidence ``conf``, as Vosk's."""
+
+    def describe(span: Span[RecognisedWord]) -> dict[str, Any]:
+        times = {"start": round(span.start_s, 3), "end": round(span.end_s, 3)}
+        return {"word": span.label.text, **times, "conf": round(span.label.confidence, 3)}
+
+    return [describe(span) for span in words]
+
+
+def write_words(words: Timeline[RecognisedWord], paths: Sequence[Path]) -> None:
+    """Write words to files that can be edited and given back as transcripts, of ``check_word_outputs``."""
+    text = format_words(words)
+    document = {"result": describe_words(words), "text": " ".join(text.split())}
+    for path in paths:
+        with atomic_file(path) as unfinished:
+            unfinished.write_text(as_json(document, indent=1) + "\n" if path.suffix.lower() == JSON else text, "utf-8")
+
+
+def check_word_outputs(outputs: Sequence[str | Path], speech: str | Path | None = None) -> list[Path]:
+    """Return the paths of files of words: ``.txt``, or ``.json`` with their times.
+
+    speech : the recording, which must not be overwritten
+    Raises ExportError: another suffix, no such folder, one file twice, or the recording.
+    """
+    paths = [Path(output) for output in outputs]
+    check_distinct(paths)
+    for path in paths:
+        if path.suffix.lower() not in (TEXT, JSON):
+            raise ExportError(f"{path}: unknown format {path.suffix!r}; required one of: {TEXT} {JSON}")
+        check_target(path, speech)
+    return paths

@@ -22,7 +22,6 @@ from lipmotion.pipeline.model import Model, with_prior
 from lipmotion.pipeline.request import DETECTED, Request
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP
-from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recognition.network.beam_search import load_english
 from lipmotion.speech.recognition.network.posteriors import infer_posteriors
 from lipmotion.speech.recognition.recognised_speech import (
@@ -33,7 +32,7 @@ from lipmotion.speech.recognition.recognised_speech import (
     place_units,
     select_reliable,
 )
-from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, Recogniser, find_network, open_recogniser
+from lipmotion.speech.recognition.recogniser import Recogniser, open_recogniser, uses_network
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.speaker_similarity import rate_knowledge
 from lipmotion.speech.sound.voice_events import find_voice_events, silence_units
@@ -177,7 +176,7 @@ def with_voice(
 def prepare_search(request: Request) -> None:
     """Load the words that are searched where a phone recogniser decides; they are then there when it is done."""
     is_searched = request.transcript is None and request.units is None and request.language == ENGLISH
-    if is_searched and find_network(request.recogniser) is not None:
+    if is_searched and uses_network(request.recogniser):
         with suppress(MissingDependencyError):  # whoever needs them says so
             load_english()
 
@@ -214,8 +213,7 @@ def align_between(
 
 
 def _open_recogniser(model: Model, request: Request) -> Recogniser:
-    kind = "auto" if request.recogniser in INSTALLED_RECOGNISERS else request.recogniser
-    return open_recogniser(model.phones, kind, model.adaptation)
+    return open_recogniser(model.phones, request.recogniser, model.adaptation)
 
 
 def _report_progress(each: ParallelMap, duration_s: float, monitor: Monitor) -> ParallelMap:
@@ -240,9 +238,6 @@ def _report_progress(each: ParallelMap, duration_s: float, monitor: Monitor) -> 
 
 
 def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: ParallelMap) -> SpeechAnalysis:
-    kinds = (*RECOGNISER_KINDS, *INSTALLED_RECOGNISERS)
-    if request.recogniser not in kinds:
-        raise InputError(f"unknown recogniser {request.recogniser!r}; required one of: {', '.join(kinds)}")
     range_db = measure_level_range(audio.log_energy)
     phones, features, fit = _open_recogniser(model, request), audio.joined_mfcc(), None
     results: list[Recognition] = []
@@ -262,8 +257,6 @@ def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: Par
         speech = build_speech(model.engine, audio, features, units, phones.kind, each)
         return SpeechAnalysis(replace(speech, times_given=True), None, range_db, fit)
     words = _read_words(cast("str | TimedTranscript | None", request.transcript), audio.duration_s)
-    if words is None and request.recogniser in INSTALLED_RECOGNISERS:
-        words = recognise_words(audio, request.recogniser)
     if words is not None:
         from lipmotion.pipeline.analysis.transcribe import transcribe
 
@@ -296,8 +289,8 @@ def build_speech(
     f0 = audio.joined(log_f0, np.nan) if inputs.f0 else None
     spectrum = rows(lambda sound: sound.spectrum) if inputs.conditions else None
     encoding = rows(lambda sound: sound.encoding) if inputs.encoding else None
-    network = find_network(kind) if inputs.posteriors else None
-    posteriors = infer_posteriors(network, audio, each, dense=audio.is_passage) if network is not None else None
+    is_heard = inputs.posteriors and uses_network(kind)
+    posteriors = infer_posteriors(audio, each, dense=audio.is_passage) if is_heard else None
     parts = None
     if not audio.is_passage:
         parts = tuple(
@@ -373,7 +366,7 @@ def recognise_speech(
     units, spoken, recognition = list[Timeline[Unit]](), list[SpeechPart](), None
     for part, (_, _, sound) in zip(passages, audio.passages, strict=True):
         within = None
-        if phones.kind not in ("general", "words") and rate_knowledge(phones.own, sound):
+        if phones.kind != "general" and rate_knowledge(phones.own, sound):
             within = engine.recognise(learned, part.speech)
         if within is not None:
             try:
@@ -421,8 +414,8 @@ def _follow_units(
     units = close_gaps(Timeline(tuple(spans)), audio.duration_s)
     if kind == "own" or request.spoken_so or not all(span.label.phone for span in units):
         return units, None
-    name = find_network(kind) if request.language == ENGLISH else None
-    posteriors, sure = compute_phone_posteriors(name, audio) if name is not None else (None, 0.0)
+    is_heard = request.language == ENGLISH and uses_network(kind)
+    posteriors, sure = compute_phone_posteriors(audio) if is_heard else (None, 0.0)
     is_sure = sure >= WORD_POSTERIORS[0]
     fit = label_fit(audio, units, posteriors if is_sure else None)
     filling = _fill_open(spans, fit.missing if is_sure else (), audio.duration_s, recognised)

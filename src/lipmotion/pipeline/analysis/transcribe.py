@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, shorten
-from lipmotion.hmm.loudness import find_loud_frames
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, measure_fit
-from lipmotion.speech.recognition.anchors import find_anchors, fit_transcript
+from lipmotion.speech.recognition.anchors import find_anchors, leave_out_late_lines
 from lipmotion.speech.recognition.network.posteriors import (
     POSTERIOR_STEP,
     WORD_BOUNDARY,
@@ -25,7 +24,7 @@ from lipmotion.speech.recognition.network.posteriors import (
     read_posteriors,
 )
 from lipmotion.speech.recognition.recognised_speech import PHONE_POSTERIORS, WORD_POSTERIORS
-from lipmotion.speech.recognition.recogniser import Recogniser, find_network
+from lipmotion.speech.recognition.recogniser import Recogniser, uses_network
 from lipmotion.speech.recognition.transcript_evidence import (
     MIN_GAP_S,
     SURE_COSTS,
@@ -88,7 +87,7 @@ def transcribe(
     Raises AlignmentError: the words cannot be aligned with the recording.
     """
     if isinstance(words, TimedTranscript):
-        words = fit_transcript(words, find_loud_frames(analysed(audio, features).log_energy), audio.duration_s)
+        words = leave_out_late_lines(words, audio.duration_s)
     spoken = words.words if isinstance(words, TimedTranscript) else words or ()
     if is_other_language(spoken, lexicon):
         LOG.warning(
@@ -97,17 +96,13 @@ def transcribe(
         )
     else:
         warn_of_guesses(spoken, lexicon)
-    name = None if isinstance(lexicon, LanguageLexicon) else find_network(phones.kind)
+    is_heard = not isinstance(lexicon, LanguageLexicon) and uses_network(phones.kind)
     refused: AlignmentError | None = None
     try:
         units = align_or_recognise(phones, audio, features, words, lexicon)
     except AlignmentError as error:  # too much for the recording: some of the words may be said all the same
         check_words(spoken, audio.duration_s)
-        if (
-            name is None
-            or recognised is None
-            or compute_phone_posteriors(name, analysed(audio))[1] < PHONE_POSTERIORS[0]
-        ):
+        if not is_heard or recognised is None or compute_phone_posteriors(analysed(audio))[1] < PHONE_POSTERIORS[0]:
             raise
         refused = error
         labels = [Unit(phone, word=word) for word in spoken for phone in lexicon.pronunciations(word)[0]]
@@ -116,10 +111,10 @@ def transcribe(
     if words is None or phones.kind == "own":
         return Transcription(units, None)
     fit = measure_fit(audio, units)
-    if name is None:
+    if not is_heard:
         warn_of_misfit(fit)
         return Transcription(units, fit)
-    posteriors, sure = compute_phone_posteriors(name, analysed(audio))
+    posteriors, sure = compute_phone_posteriors(analysed(audio))
     costs = SURE_COSTS if sure >= WORD_POSTERIORS[0] else WORD_COSTS
     evidence = find_evidence(posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units, costs)
     if recognised is None or (refused is None and not (evidence.others and sure >= PHONE_POSTERIORS[0])):
@@ -139,11 +134,11 @@ def transcribe(
     return Transcription(units, fit)
 
 
-def compute_phone_posteriors(name: str, audio: AnalysedAudio) -> tuple[NDArray[np.float64], float]:
+def compute_phone_posteriors(audio: AnalysedAudio) -> tuple[NDArray[np.float64], float]:
     """Return the log posteriors of a phone recogniser, and how sure it is of what is said, or of nothing, 0 to 1."""
-    posteriors = read_posteriors(name, audio)
+    posteriors = read_posteriors(audio)
     hears = any(stretch.token != WORD_BOUNDARY for stretch in posteriors.best_tokens)
-    sure = mean_posterior(find_stretches(name, audio)) if hears else 1.0
+    sure = mean_posterior(find_stretches(audio)) if hears else 1.0
     return posteriors.of_phones.astype(float), sure
 
 

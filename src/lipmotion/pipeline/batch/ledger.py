@@ -148,7 +148,7 @@ _TEXT, _NUMBER = text(LARGEST_RECORD_BYTES), number(-LARGEST_NUMBER, LARGEST_NUM
 _INPUT = {"path": _TEXT, "size": whole(0, 1 << 63), "changed_ns": whole(-(1 << 63), 1 << 63), "sha256": _TEXT}
 _CHECKED = members(
     {
-        **dict.fromkeys(("name", "recording", "run", "fingerprint", "words", "heard", "error"), _TEXT),
+        **dict.fromkeys(("name", "recording", "run", "fingerprint", "words", "heard", "error", "redone"), _TEXT),
         **dict.fromkeys(("warnings", "advice"), items(_TEXT)),
         **dict.fromkeys(("duration_s", "seconds", "confidence", "range_db", "widest", "motion"), _NUMBER),
         **dict.fromkeys(("closures_heard", "closures_made", "least_sure_s", "width"), _NUMBER),
@@ -319,13 +319,22 @@ class Ledger:
         """
         if self._last.get(_key(line.name), ("", 0))[0] != fingerprint_line(line, of_settings):
             return None
+        record = self.finished(line, out)
+        return record if record is not None and are_same_inputs(line, record) else None
+
+    def finished(self, line: BatchLine, out: Path) -> Record | None:
+        """Return the record of a line that was done, whatever the settings; None: it was not, or lacks an output."""
         record = self.record_of(line.name)
         if record is None or record["outcome"] != DONE:
             return None
-        inputs = [InputFile(**each) for each in record["inputs"]]
-        same = [each.path for each in inputs] == list(map(str, list_input_paths(line)))
-        same = same and all(each.is_unchanged() for each in inputs)
-        return record if same and all((out / name).is_file() for name in record["outputs"]) else None
+        return record if all((out / name).is_file() for name in record["outputs"]) else None
+
+
+def are_same_inputs(line: BatchLine, record: Record) -> bool:
+    """Return whether the files of a line are those of its record, with the same content."""
+    inputs = [InputFile(**each) for each in record["inputs"]]
+    same = [each.path for each in inputs] == list(map(str, list_input_paths(line)))
+    return same and all(each.is_unchanged() for each in inputs)
 
 
 @contextmanager

@@ -22,7 +22,7 @@ FILE_COLUMNS = ("file", "path", "recording", "audio", "wav")
 """Names of the column with the recording; the first row of a table is a header if it has one of them."""
 COLUMNS = ("transcript", "output", "speaker")
 """Names of the other columns that are read."""
-OWN_FILES = ("batch.jsonl", "report.csv", "report.html")
+OWN_FILES = ("batch.jsonl", "report.csv", "report.html", "marks.csv")
 """Files of the batch itself, in the folder of its lines' outputs."""
 OWN_FOLDER = ".batch"
 """Folder of unfinished work in the folder of the outputs."""

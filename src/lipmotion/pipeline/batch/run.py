@@ -9,7 +9,7 @@ import tempfile
 import time
 import uuid
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from contextvars import ContextVar
 from dataclasses import asdict, dataclass, replace
@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.errors import CorpusError, ExportError, LipMotionError
+from lipmotion.errors import CorpusError, ExportError, LipMotionError, shorten
 from lipmotion.extensions import describe_failed_extension, load_provided
 from lipmotion.formats.base import find_suffix
 from lipmotion.measures.closures import CLOSED_SHARE
@@ -31,9 +31,11 @@ from lipmotion.pipeline.batch.ledger import (
     CUES,
     DONE,
     FAILED,
+    Ledger,
     Place,
     Record,
     are_in_place,
+    are_same_inputs,
     check_job,
     fingerprint_job,
     fingerprint_line,
@@ -43,8 +45,8 @@ from lipmotion.pipeline.batch.ledger import (
     read_receipt,
     write_receipt,
 )
-from lipmotion.pipeline.batch.lines import BatchLine, check_names, read_lines
-from lipmotion.pipeline.batch.report import write_reports
+from lipmotion.pipeline.batch.lines import MAX_NAMED_LINES, BatchLine, check_names, read_lines
+from lipmotion.pipeline.batch.report import APPROVE, MARKS, REDO, Mark, is_due, read_marks, write_marks, write_reports
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.job import Job, check_outputs, open_face, run, write_outputs
 from lipmotion.pipeline.model import Model, load_model
@@ -304,6 +306,7 @@ def batch(
     *,
     jobs: int | None = None,
     cluster: str = "",
+    marks: str | Path | None = None,
     monitor: Monitor = silent_monitor,
 ) -> BatchSummary:
     """Turn many recordings into motion files, videos or cues, and write a report of all of them.
@@ -317,9 +320,11 @@ def batch(
     jobs     : number of processes; None: one a core. With more than one, a script must be guarded by
                ``if __name__ == "__main__":``
     cluster  : address of the scheduler of a Dask cluster that does the work instead of this machine
+    marks    : table of approved lines and of those to be done again, as the report saves it; its rows are added to
+               ``marks.csv`` in ``out``, whose marks hold in every run
     monitor  : receives an ``Item`` for every line and the progress
-    A line that was done before, with the same settings and from the same files, is kept. A line that cannot be done is
-    part of the report, and the others go on.
+    A line that was done before, with the same settings and from the same files, is kept; so is an approved one,
+    whatever has changed. A line that cannot be done is part of the report, and the others go on.
     The motion is that of ``animate``, whatever the number of processes.
     Raises InputError: there are no recordings, a setting is not usable, or the cluster is not.
     Raises ExportError: two lines have the same output, an output would replace a recording, another process is at
@@ -345,9 +350,18 @@ def batch(
     for line in lines:
         if os.path.realpath(line.recording).startswith(inside):  # an output could replace it
             raise ExportError(f"{place.out}: holds the recording {line.recording}; give another folder for the outputs")
+    marks_file = Path(place.out) / MARKS
+    earlier = read_marks(marks_file) if marks_file.is_file() else {}
+    later = read_marks(Path(marks)) if marks is not None else {}
+    names = {line.name for line in lines}
+    if unknown := [name for name in later if name not in names]:
+        LOG.warning("%s: %d marks of lines that are not in this batch: %s", marks, len(unknown), _some(unknown))
+    chosen = {name: mark for name, mark in (earlier | later).items() if mark.kind}  # the others were taken back
     check_line_job(job, place.run)
     of_settings = fingerprint_job(job)
     with open_ledger(place, lines) as ledger:
+        if marks is not None:
+            write_marks(marks_file, chosen)
         counts = Counter[str]()
         monitor(Progress(STAGE, 0, len(lines), 0.0))
 
@@ -356,21 +370,49 @@ def batch(
             monitor(Item(name, outcome, reason))
             monitor(Progress(STAGE, counts.total(), len(lines), counts.total() / len(lines)))
 
-        waiting = []
+        finished = _find_finished(lines, ledger, place, of_settings, chosen)
+        waiting = [LineWork(line, job, of_settings, place) for line in lines if line.name not in finished]
         for line in lines:
-            if ledger.kept(line, of_settings, Path(place.out)) is None:
-                waiting.append(LineWork(line, job, of_settings, place))
-            else:
+            if line.name in finished:
                 count(line.name, "kept")
         pool = cluster_pool(cluster, Path(place.out)) if cluster else open_local_pool(processes)
         if waiting:
             with pool as each, closing(_finish_lines(each, waiting)) as records:
                 for record in records:
+                    mark = chosen.get(record["name"])
+                    if mark is not None and mark.kind == REDO and record["outcome"] == DONE:
+                        record["redone"] = mark.when  # so that it is redone once
                     ledger.append(record)
                     place.receipt(record["name"]).unlink(missing_ok=True)
                     count(record["name"], record["outcome"], record.get("error", ""))
-        csv, html = write_reports(lines, ledger, Path(place.out))
+        csv, html = write_reports(lines, ledger, Path(place.out), chosen)
     return BatchSummary(counts[DONE], counts["kept"], counts[FAILED], csv, html)
+
+
+def _find_finished(
+    lines: Sequence[BatchLine], ledger: Ledger, place: Place, of_settings: str, marks: Mapping[str, Mark]
+) -> set[str]:
+    """Return the names of the lines that need not be done; a warning names approved ones that are out of date."""
+    out, finished, outdated = Path(place.out), set(), []
+    for line in lines:
+        mark = marks.get(line.name)
+        if mark is not None and is_due(mark, ledger.record_of(line.name)):
+            continue
+        approved = ledger.finished(line, out) if mark is not None and mark.kind == APPROVE else None
+        if approved is not None or ledger.kept(line, of_settings, out) is not None:
+            finished.add(line.name)
+        if approved is not None and not are_same_inputs(line, approved):
+            outdated.append(line.name)
+    if outdated:
+        LOG.warning(
+            "%d approved lines have another recording or other words now, and are kept: %s; mark them redo",
+            *(len(outdated), _some(outdated)),
+        )
+    return finished
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(map(shorten, names[:MAX_NAMED_LINES])) + ", ..." * (len(names) > MAX_NAMED_LINES)
 
 
 def _finish_lines(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, None, None]:

@@ -137,13 +137,6 @@ def _rows(explanation: Explanation) -> Iterator[tuple[str, str]]:
         text = f"{gaussian.density}{which}, responsible for {gaussian.responsibility:.2f}{distance}"
         yield f"Gaussian of {gaussian.stream}", text
         yield from _list_values(gaussian.channels)
-    for regression in explanation.regressions:
-        shown = _list_probabilities(regression.shares)
-        text = f"regression on the acoustic features and posteriors around the frame: {shown}"
-        if regression.shares[0].name == "rest":
-            text = "the rest pose: silence away from speech"
-        yield f"mean of {regression.stream}", text
-        yield from _list_values(regression.channels)
     values = _list_values(explanation.motion)
     yield "generated", next(values)[1]
     yield from values

@@ -25,7 +25,7 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, to_arkit
 from lipmotion.pipeline.outputs.curve_sets import show_edited_curves, with_curves
 from lipmotion.types import Generation, Prosody, VoiceEvent
-from lipmotion.types.audio import LAUGHTER, SHOUT, WHISPER
+from lipmotion.types.audio import LAUGHTER
 from lipmotion.types.delivery import NEUTRAL, PLAIN, MoodKey, Staging, sort_moods
 from lipmotion.types.motion import RADIAN
 
@@ -37,20 +37,11 @@ LAUGHING: Final = "happy"
 
 
 def with_detected(asked: Sequence[MoodKey], events: Sequence[VoiceEvent]) -> tuple[MoodKey, ...]:
-    """Return moods and manners over time: those that are asked for, or else those that are detected.
-
-    asked  : where it has a mood, no other is detected; where it has a manner, no manner
-    events : laughter is a mood; phrases that are whispered or shouted have this manner, as far as they are strong
-    """
-    manner_of = {LAUGHTER: False, WHISPER: True, SHOUT: True}
+    """Return moods and manners over time: those that are asked for, and where no mood is, that of laughter."""
     keys = list(asked)
-    for event in events:
-        is_manner = manner_of.get(event.kind)
-        if is_manner is None or any(key.is_manner == is_manner for key in asked):
-            continue
-        named, usual = (event.kind, PLAIN) if is_manner else (LAUGHING, NEUTRAL)
-        strength = event.strength if is_manner else 1.0
-        keys += [MoodKey(event.start_s, named, strength), MoodKey(event.end_s, usual)]
+    for event in events if all(key.is_manner for key in asked) else ():
+        if event.kind == LAUGHTER:
+            keys += [MoodKey(event.start_s, LAUGHING), MoodKey(event.end_s, NEUTRAL)]
     return sort_moods(keys)
 
 
@@ -74,8 +65,8 @@ def deliver(generation: Generation, delivery: Delivery) -> Generation:
     """Return generated motion with its mood, intensity, anticipation and offset; held poses come last (``hold_poses``).
 
     Moods of the delivery at time 0 are those before the first one of the generation, and later ones are added to these;
-    without any, motion keeps the moods that it has. So do manners of speaking. Where none is asked for, those that are
-    detected count.
+    without any, motion keeps the moods that it has. So do manners of speaking. Where no mood is asked for, that of
+    laughter counts.
     Raises InputError: the offset leaves nothing.
     """
     keys = with_detected(sort_moods((*delivery.moods, *generation.moods)), generation.events)

@@ -28,7 +28,6 @@ from lipmotion.speech.features.f0 import find_prosody
 from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.resampling import decimate
 from lipmotion.storage.files import check_distinct, check_target
 from lipmotion.storage.sources import VIDEO_SUFFIXES
 from lipmotion.types import SPEECH_RATE_HZ, Audio, Generation, Monitor, Prosody, silent_monitor
@@ -228,9 +227,7 @@ def measure_prosody(speech: str | Path | Audio) -> Prosody:
 def _prosody(sound: Audio) -> Prosody:
     ratio = Fraction(SPEECH_RATE_HZ, int(sound.rate_hz))
     samples = sound.samples.astype(np.float32)
-    if ratio.numerator == 1:
-        samples = decimate(samples, ratio.denominator)
-    else:
+    if ratio != 1:
         from scipy.signal import resample_poly
 
         samples = resample_poly(samples, ratio.numerator, ratio.denominator).astype(np.float32)

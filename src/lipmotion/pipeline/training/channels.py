@@ -152,10 +152,9 @@ def with_sound_inputs(
     inputs = engine.inputs(sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ)
     recordings, count = [sound[example.name] for example in examples], len(examples)
     result = list(examples)
-    name = find_installed_recogniser() if inputs.posteriors else None
-    if name is not None:
+    if inputs.posteriors and find_installed_recogniser() is not None:
         report = sub_monitor(monitor, 0, 0.5)
-        for number, posteriors in enumerate(each(partial(infer_posteriors, name), recordings)):
+        for number, posteriors in enumerate(each(infer_posteriors, recordings)):
             result[number] = replace(result[number], speech=replace(result[number].speech, posteriors=posteriors))
             if (number + 1) % BLOCK == 0:
                 report(Progress("posteriors of phones", number + 1, count, (number + 1) / count))

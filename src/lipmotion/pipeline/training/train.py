@@ -190,7 +190,7 @@ def train(  # noqa: PLR0913
     if speakers is not None:
         generated = (engine.generate(fit.model, example.speech).motion.values for example in examples)
         speakers = add_habits(speakers, examples, people, generated)
-        about["speakers"] = list(speakers.names)
+        about["speakers"] = list(speakers)
     prior = prior if fit.uses_prior else None
     model = Model(phones, engine, fit.model, about, eigenlips=eigenlips, prior=prior, speakers=speakers)
     return model, TrainReport(used, skipped, fit.figures)

@@ -17,22 +17,20 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from lipmotion.speech.features.mfcc import HOP, WINDOW
+from lipmotion.speech.features.mfcc import HOP, WINDOW, make_triangles
 from lipmotion.types import SPEECH_RATE_HZ
 
 Array = NDArray[np.float32]
 WEIGHTS = "speech-encoder.npz"
 COMPONENTS = 64
 """Principal components that are kept of the 384 values; more serve the voice of the training, fewer all others."""
-ROW_FRAMES = 2
-"""Frames of 10 ms from one row of the network to the next."""
+ROW_FRAMES = 2  # frames of 10 ms from one row of the network to the next
 WINDOW_ROWS, OVERLAP_ROWS = 400, 100
 """The network takes 8 s at a time; windows overlap by 2 s, over which one fades into the next."""
 LEVEL = 25.0
 """Factor from samples at the level of all passages to that of speech in the training of the network."""
 BANDS, HEADS, LAYERS = 80, 6, 2
-FLOOR = -4.5
-"""The smallest logarithm of a power, eight powers of ten beneath loud speech, as in Whisper."""
+FLOOR = -4.5  # the smallest logarithm of a power, eight powers of ten beneath loud speech, as in Whisper
 
 
 class WindowedEncoding:
@@ -199,8 +197,6 @@ def _filters() -> Array:
     top = 15 + np.log(SPEECH_RATE_HZ / 2 / 1000) * 27 / np.log(6.4)
     mel = np.linspace(0, top, BANDS + 2)
     edges = np.where(mel < 15, mel * 200 / 3, 1000 * 6.4 ** ((mel - 15) / 27))
-    hertz = np.linspace(0, SPEECH_RATE_HZ / 2, WINDOW // 2 + 1)[:, None]
-    rising = (hertz - edges[:-2]) / (edges[1:-1] - edges[:-2])
-    falling = (edges[2:] - hertz) / (edges[2:] - edges[1:-1])
-    filters = np.maximum(0, np.minimum(rising, falling)) * 2 / (edges[2:] - edges[:-2])
+    hertz = np.linspace(0, SPEECH_RATE_HZ / 2, WINDOW // 2 + 1)
+    filters = make_triangles(hertz, edges) * 2 / (edges[2:] - edges[:-2])
     return filters.astype(np.float32)

@@ -21,14 +21,11 @@ from lipmotion.speech.features.mfcc import HOP, check_samples, frame_count
 from lipmotion.types import SPEECH_RATE_HZ, Audio, Prosody
 
 LOWEST_HZ, HIGHEST_HZ = 60.0, 400.0
-BLOCK = 1024
-"""Frames searched at a time: memory stays bounded for any length."""
+BLOCK = 1024  # frames searched at a time: memory stays bounded for any length
 
-UNVOICED_COST = 0.52
-"""Cost of an unvoiced frame; a voiced one costs 1 − its correlation, weighted."""
+UNVOICED_COST = 0.52  # cost of an unvoiced frame; a voiced one costs 1 − its correlation, weighted
 VOICING_CHANGE_COST = 0.25
-JUMP_COST = 0.4
-"""Cost of a change of F0 by a factor of e; an octave costs 0.28."""
+JUMP_COST = 0.4  # cost of a change of F0 by a factor of e; an octave costs 0.28
 LONG_LAG_SHARE = 0.2
 """The correlation of the longest lag is reduced by this share: that of two periods is as high as that of one."""
 SILENCE_POWER = 2e-4
@@ -167,21 +164,14 @@ def lags() -> NDArray[np.float64]:
 
 
 class _Tables(NamedTuple):
-    """Matrices that signals are multiplied by.
+    """Matrices that signals are multiplied by; x is the low-passed signal, w the window, k the lag."""
 
-    low_pass    : 10 ms → what they add to the same 10 ms at 4 kHz, and to the two before [shape=(160, 3 · 40)]
-    fourier     : a frame → its windowed spectrum, real parts and then imaginary ones [shape=(_WINDOW, 2 · bins)]
-    inverse     : powers of the spectrum → Σ w(t) x(t) w(t+k) x(t+k) [shape=(bins, L)]
-    early, late : squares of a frame → Σ w(t) w(t+k) x²(t), and of x²(t+k) [shape=(_WINDOW, L)]
-    mass        : Σ w(t) w(t+k) [shape=(L,)]
-    """
-
-    low_pass: Floats
-    fourier: Floats
-    inverse: Floats
-    early: Floats
-    late: Floats
-    mass: Floats
+    low_pass: Floats  # 10 ms → what they add to the same 10 ms at 4 kHz, and to the two before [shape=(160, 3 · 40)]
+    fourier: Floats  # a frame → its windowed spectrum, real parts and then imaginary ones [shape=(_WINDOW, 2 · bins)]
+    inverse: Floats  # powers of the spectrum → Σ w(t) x(t) w(t+k) x(t+k) [shape=(bins, L)]
+    early: Floats  # squares of a frame → Σ w(t) w(t+k) x²(t) [shape=(_WINDOW, L)]
+    late: Floats  # and of x²(t+k)
+    mass: Floats  # Σ w(t) w(t+k) [shape=(L,)]
 
 
 @cache
@@ -207,8 +197,7 @@ def _window(time: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(np.abs(time + 0.5 - _WINDOW / 2) < _WINDOW / 2, np.sin(np.pi * (time + 0.5) / _WINDOW) ** 2, 0)
 
 
-MIN_POWER = 1e-9
-"""Power that is added to every frame's: digital silence is at -90 dB."""
+MIN_POWER = 1e-9  # power that is added to every frame's: digital silence is at -90 dB
 
 
 def find_prosody(audio: Audio) -> Prosody:

@@ -18,10 +18,8 @@ HOP = 160  # 10 ms
 FFT_SIZE = 512
 FILTERS = 26
 CEPSTRA = 12
-FEATURES = 39
-"""12 cepstra and the log energy, their Δ and ΔΔ."""
-LOG_ENERGY = ENERGY_FEATURE
-"""The column of the features that holds the log energy."""
+FEATURES = 39  # 12 cepstra and the log energy, their Δ and ΔΔ
+LOG_ENERGY = ENERGY_FEATURE  # the column of the features that holds the log energy
 LIFTER = 22
 PRE_EMPHASIS = 0.97
 DYNAMIC_RANGE = 1e-8
@@ -31,10 +29,8 @@ ROUNDING_SHARE = 1e-5
 in a constant they deviate by up to 4e-7 of it, on every processor by another amount; in speech by 8e-4 or more."""
 LARGEST_SAMPLE = 1e6
 """Samples beyond are damage, whatever their full scale was; their squares would not be finite."""
-KNEE_HZ = 6500.0
-"""Frequencies are warped in full up to here, or until they are as high as this."""
-BLOCK = 256
-"""Frames transformed at a time: they fit into the cache, and memory stays bounded for any length."""
+KNEE_HZ = 6500.0  # frequencies are warped in full up to here, or until they are as high as this
+BLOCK = 256  # frames transformed at a time: they fit into the cache, and memory stays bounded for any length
 
 
 def mfcc(audio: Audio, warp: float = 1.0) -> Features:
@@ -206,8 +202,7 @@ def build_cosine(filters: int, first: int, end: int) -> NDArray[np.float32]:
     return (basis * (1 + LIFTER / 2 * np.sin(np.pi * order / LIFTER))).astype(np.float32)
 
 
-BANDS = SPECTRUM_BANDS, 60.0, 7600.0
-"""The bands of spectra: their number, lowest and highest frequency in Hz."""
+BANDS = SPECTRUM_BANDS, 60.0, 7600.0  # the bands of spectra: their number, lowest and highest frequency in Hz
 DYNAMIC_RANGE_DB = 60.0
 """Powers are floored this far below the loudest of the recording: what is under the noise of most rooms is the same."""
 MIN_DEVIATION = 1e-3

@@ -14,8 +14,7 @@ from lipmotion.speech.sound.analysed_audio import AnalysedAudio
 from lipmotion.stats.constrained_mllr import identity, transformed
 from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 
-LARGEST_WARP = 2.0
-"""Frequencies are not stretched by more, nor by less than its inverse."""
+LARGEST_WARP = 2.0  # frequencies are not stretched by more, nor by less than its inverse
 _GENERAL = (len(STREAMS), STREAMS[0].stop, STREAMS[0].stop + 1)
 
 

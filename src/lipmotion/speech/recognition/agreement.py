@@ -19,19 +19,15 @@ DOUBTFUL_SCORE = -4.2
 """Under this score the transcript is probably wrong: right ones score 0 to -4.1, wrong ones -2 to -8."""
 WORST_SCORE = -9.0
 """No frame counts for less: a sound that a voice makes in its own way, as synthetic ones do, does not decide alone."""
-FRAME_STEP = 4
-"""Only every fourth frame is scored: its neighbours are much like it."""
+FRAME_STEP = 4  # only every fourth frame is scored: its neighbours are much like it
 LONG_PHONE_S, LONG_PHONE_SCORE, MIN_LOUD_S = 0.35, -4.0, 0.2
 """A phone that lasts as long, agrees with the sound less and is loud for as long is stretched over speech that the
 transcript leaves out. A sound that is drawn out lasts longer, too, but agrees; a pause before a word is quiet."""
 MIN_VOICE_S = 1.0
 """Silence with so much loud sound in it is speech that the transcript leaves out; breath and coughs are shorter."""
-MIN_IDLE_S = 0.3
-"""Given phones in silence for so long are doubted."""
-MIN_FITTING_SHARE = 0.9
-"""A transcript that fits less of the speech is worth a remark."""
-JOINED_S = 0.5
-"""Places nearer than this are one stretch."""
+MIN_IDLE_S = 0.3  # given phones in silence for so long are doubted
+MIN_FITTING_SHARE = 0.9  # a transcript that fits less of the speech is worth a remark
+JOINED_S = 0.5  # places nearer than this are one stretch
 Place = tuple[float, float]
 """Start and end in seconds."""
 

@@ -26,11 +26,7 @@ FREE_FRAMES = 60_000
 """Recordings of up to ten minutes are aligned without times where these belong to something else."""
 NEIGHBOURS = 3
 """Words on each side of one without room whose windows are widened too, with all that share its time."""
-MAX_SHIFT_S, MIN_CORRELATION, MIN_GAIN, MIN_TIMES = 120.0, 0.3, 0.15, 20
-"""A common shift of all times: the largest that is searched; the correlation, and its gain over no shift, from which it
-is corrected; and the times that are needed to tell."""
-MAX_WIDENINGS = 40
-"""Doublings of windows without room; then every word may lie anywhere."""
+MAX_WIDENINGS = 40  # doublings of windows without room; then every word may lie anywhere
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,18 +63,11 @@ def find_anchors(transcript: TimedTranscript) -> Anchors:
     return Anchors(table[:, 0], table[:, 1], table[:, 2], np.append(0, np.cumsum(differs)))
 
 
-def fit_transcript(transcript: TimedTranscript, loud: NDArray[np.bool_], duration_s: float) -> TimedTranscript:
-    """Return a transcript whose times fit a recording as a whole.
+def leave_out_late_lines(transcript: TimedTranscript, duration_s: float) -> TimedTranscript:
+    """Return a transcript without the lines that begin after the end of a recording; a warning says so.
 
-    loud : which frames are loud [shape=(T,)]
-    If all are late or early they are corrected; lines that begin after the end are left out. Warnings say so.
     Raises InputError: all lines begin after the end.
     """
-    late_s = measure_lateness(transcript, loud)
-    if late_s:
-        which = "late" if late_s > 0 else "early"
-        LOG.warning("the times of the transcript are %.1f s %s; corrected", abs(late_s), which)
-        transcript = transcript.shifted(-late_s)
     latest_s = duration_s + LINE_TOLERANCE_S
     lines = [line for line in transcript.lines if line.start_s is None or line.start_s <= latest_s]
     if not lines:
@@ -90,38 +79,6 @@ def fit_transcript(transcript: TimedTranscript, loud: NDArray[np.bool_], duratio
         what = "the transcript goes on after the recording ends at %.2f s; its last %d lines are left out"
         LOG.warning(what, duration_s, left_out)
     return TimedTranscript(tuple(lines))
-
-
-def measure_lateness(transcript: TimedTranscript, loud: NDArray[np.bool_]) -> float:
-    """Return by how many seconds all times of a transcript are late, as of subtitles for another cut; 0: unclear.
-
-    loud : which frames are loud [shape=(T,)]
-    It is the shift up to ``MAX_SHIFT_S`` at which the spans of the times and the loud frames correlate best: by at
-    least ``MIN_CORRELATION``, and ``MIN_GAIN`` better than without; 0 within the tolerance of lines.
-    """
-    anchors = find_anchors(transcript)
-    known = ~np.isnan(anchors.start_s) & ~np.isnan(anchors.end_s)
-    max_shift = min(round(MAX_SHIFT_S * FRAME_RATE_HZ), len(loud) // 4)
-    if len(np.unique(anchors.groups[known])) < MIN_TIMES or max_shift == 0:
-        return 0.0
-    spoken = np.zeros(len(loud) + 2 * max_shift)
-    edges = np.round(np.stack([anchors.start_s, anchors.end_s])[:, known] * FRAME_RATE_HZ) + max_shift
-    for first, end in np.unique(np.clip(edges, 0, len(spoken)).astype(np.intp), axis=1).T:
-        spoken[first:end] = 1
-    loudness, count = loud.astype(float), len(loud)
-    deviation = loudness - loudness.mean()
-    size = 1 << (len(spoken) + count - 1).bit_length()
-    product = np.fft.irfft(np.fft.rfft(spoken, size) * np.conj(np.fft.rfft(deviation, size)), size)
-    total = np.cumsum(np.append(0.0, spoken))
-    mean = (total[count:] - total[:-count]) / count
-    scale = count * loudness.std() * np.sqrt(np.maximum(mean - mean**2, 0.0))  # of zeros and ones
-    product = product[: len(mean)]
-    correlation = np.divide(product, scale, out=np.zeros_like(product), where=scale > 1e-6)
-    best = int(correlation.argmax())
-    late_s = (best - max_shift) / FRAME_RATE_HZ
-    gain = correlation[best] - max(correlation[max_shift], 0.0)
-    is_sure = correlation[best] >= MIN_CORRELATION and gain >= MIN_GAIN
-    return late_s if is_sure and abs(late_s) > LINE_TOLERANCE_S else 0.0
 
 
 def make_windows(anchors: Anchors, tolerance_s: NDArray[np.float64], frames: int) -> Windows:

@@ -26,15 +26,12 @@ PHONES = (
 ).split()
 """Names in the order of the files; the first two are noise and noise of the mouth."""
 STATES = 3
-STREAMS = (slice(0, 13), slice(13, 26), slice(26, 39))
-"""Cepstra, Δ and ΔΔ have separate codebooks."""
+STREAMS = (slice(0, 13), slice(13, 26), slice(26, 39))  # cepstra, Δ and ΔΔ have separate codebooks
 GAUSSIANS = 128
 WEIGHT_STEP = 1024 * float(np.log(1.0001))
 """Step of the negative logarithms by which the mixture weights are stored, as bytes."""
-BLOCK = 128
-"""Frames computed at a time: the values of their 5,376 Gaussians fit into the cache."""
-THREADS = 2
-"""Threads that compute blocks: NumPy lets them run at the same time."""
+BLOCK = 128  # frames computed at a time: the values of their 5,376 Gaussians fit into the cache
+THREADS = 2  # threads that compute blocks: NumPy lets them run at the same time
 MIN_VARIANCE = 1e-4
 
 
@@ -182,8 +179,7 @@ def _read_bigram() -> NDArray[np.float64]:
 
 NOISES = ("+nsn+", "+spn+")
 """Units that only the general models have: noise, and noise of the mouth (a breath, a cough)."""
-ENGLISH_SHARE = 0.5
-"""Weight of the English bigram; the rest is the weight of the bigram of the own corpus."""
+ENGLISH_SHARE = 0.5  # weight of the English bigram; the rest is the weight of the bigram of the own corpus
 BIGRAM_WEIGHT, INSERTION_SCORE = 3.0, -4.0
 MAX_CACHED_FRAMES = 400_000
 """The general log densities of a recording of up to so many frames, about an hour, are cached: they are needed twice

@@ -120,8 +120,7 @@ def find_form(name: str) -> str:
     return COMPARED_FORMS.get(phone, phone)
 
 
-FORMS = tuple(sorted({find_form(phone) for phone in PHONES}))
-"""The phones that are compared."""
+FORMS = tuple(sorted({find_form(phone) for phone in PHONES}))  # the phones that are compared
 
 
 LabelT = TypeVar("LabelT")
@@ -136,8 +135,7 @@ noise of 20 dB 0.70 to 0.95, other languages 0.58 to 0.64."""
 RANGE_PERCENTILES = (5, 95)
 NOISY_DB = 20.0
 """A recording with a smaller range of levels is noisy: 25 to 34 dB in these pieces, 16 to 19 dB in babble of 10 dB."""
-GAP_S = 1e-6
-"""Shorter gaps between phones are of rounding."""
+GAP_S = 1e-6  # shorter gaps between phones are of rounding
 SLIVER_FRAMES = 3
 """Phones without words of which fewer frames are left beside a word are not made: no phone model is shorter."""
 

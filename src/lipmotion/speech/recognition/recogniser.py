@@ -36,10 +36,10 @@ from lipmotion.speech.recognition.recognised_speech import (
     time_phones,
 )
 from lipmotion.speech.recognition.word_search import (
-    WordSearch,
     begin_decoding,
     decode_network,
     list_wordless,
+    match_words,
     recognise_free,
 )
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
@@ -47,12 +47,11 @@ from lipmotion.speech.sound.speaker_similarity import OWN_SCORE, STRANGER_SCORE,
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, find_similar_phone, is_silent
 
-RECOGNISER_KINDS = ("auto", "words", "fast", "own", "general")
+RECOGNISER_KINDS = ("auto", "fast", "own", "general")
 """Phones are recognised by: ``own``: the model's own phone models alone; ``general``: those of many voices alone;
-``fast``: both, the own ones weighted by how similar the speaker is to those of their training data. ``words``: English
-words are recognised by pocketsphinx and aligned. ``auto``: by a phone recogniser, where one is installed and sure; else
-as ``fast``, and words where they fit."""
-USING_WORDS, WEIGHTED = ("auto", "words"), ("auto", "words", "fast")
+``fast``: both, the own ones weighted by how similar the speaker is to those of their training data. ``auto``: by a
+phone recogniser, where one is installed and sure; else as ``fast``, and words where they fit: English words that
+pocketsphinx recognises are aligned."""
 SMALL_PERPLEXITY = 9.0
 """A voice with a speaker similarity over ``OWN_SCORE`` is that of the own models; if the perplexity of their bigram is
 less than this, their corpus has few words, which no language model of English expects. Then the phones alone decide.
@@ -111,8 +110,8 @@ class Recogniser:
         if not features.values.any() or not audio.passages:
             return build_recognition([LabelledFrames(0, SILENCE)], (), len(features.values), features.duration_s, None)
         if not audio.is_passage:
-            if (network := find_network(self.kind)) is not None:
-                find_stretches(network, audio, each)  # of all passages at once: several processes work on them
+            if uses_network(self.kind):
+                find_stretches(audio, each)  # of all passages at once: several processes work on them
             sounds = (passage.audio for passage in audio.passages)
             recognitions = [self.recognition(sound, sound.mfcc(), each, english=english) for sound in sounds]
             return join_recognition(list(zip(audio.passages, recognitions, strict=True)), features.duration_s)
@@ -124,24 +123,19 @@ class Recogniser:
             and similarity.score > OWN_SCORE
             and self.own.bigram.perplexity < SMALL_PERPLEXITY
         )
-        network = None if known else find_network(self.kind)
-        if network is not None:
-            stretches = find_stretches(network, audio, each)
+        if uses_network(self.kind) and not known:
+            stretches = find_stretches(audio, each)
             if mean_posterior(stretches) >= WORD_POSTERIORS[0] or not english:
                 return self._network_recognition(audio, similarity, stretches, english=english)
-        with_words = self.kind in USING_WORDS and not known
-        spoken = begin_decoding(audio, each) if with_words else None
+        spoken = begin_decoding(audio, each) if self.kind == "auto" and not known else None
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
         path = self._loop.network.best_path(log_likelihoods)
         labels, recognised = self._free_labels(audio, features, path), list[RecognisedWord]()
         if spoken is not None:
             aligning = self._log_likelihoods(audio, aligning=True)[1] if self._has_few_gaussians else log_likelihoods
-            loud = find_loud_frames(audio.log_energy)
-            free = self._loop.network.emission[path]
-            parts, recognised = WordSearch(
-                hmm, self._loop, log_likelihoods, aligning, free, loud, believing=self.kind == "words"
-            ).words_of(spoken)
-            labels = splice(labels if self.kind == "auto" else [LabelledFrames(0, SILENCE)], parts, len(path))
+            loud, free = find_loud_frames(audio.log_energy), self._loop.network.emission[path]
+            parts, recognised = match_words(hmm, self._loop, log_likelihoods, aligning, free, loud, spoken)
+            labels = splice(labels, parts, len(path))
         return build_recognition(labels, recognised, len(path), features.duration_s, similarity)
 
     def _network_recognition(
@@ -167,7 +161,7 @@ class Recogniser:
     def _free_labels(self, audio: AnalysedAudio, features: Features, path: NDArray[np.intp]) -> list[LabelledFrames]:
         """Return the phones of a recording as they are recognised without words, of their best path."""
         labels = recognise_free(self._loop, path)
-        if self.kind not in WEIGHTED or not self._has_few_gaussians:
+        if self.kind not in ("auto", "fast") or not self._has_few_gaussians:
             return labels
         named, bounds = [(label.phone, "") for label in labels], [label.first for label in labels]
         phones = time_phones(named, np.array([*bounds, len(path)]), features.duration_s)
@@ -295,9 +289,9 @@ def _aligned(
     return spoken, align_units(hmm, log_likelihoods, [unit for item in spoken for unit in item.units], of_units)
 
 
-def find_network(kind: str) -> str | None:
-    """Return the name of the phone recogniser that a kind of recogniser uses; None: none, or none is installed."""
-    return find_installed_recogniser() if kind == "auto" else None
+def uses_network(kind: str) -> bool:
+    """Return whether a kind of recogniser uses the phone recogniser, and it is installed."""
+    return kind == "auto" and find_installed_recogniser() is not None
 
 
 open_recogniser = lru_cache(maxsize=4)(Recogniser)

@@ -28,16 +28,13 @@ GAP_COST, WORD_COST, PHONE_COST = 6.0, 9.0, 1.0
 """What it costs, in nats, that anything is said; that words are left out there; and each phone of these words."""
 WORD_COSTS, SURE_COSTS = (WORD_COST, PHONE_COST), (4.0, 0.5)
 """The last two; and where a recogniser is sure of what it hears, so that a single wrong word is noticed."""
-MIN_HEARD = 1.0
-"""Something is said in a frame in which any phone is so many nats more probable than none."""
-MIN_GAP_S = 0.1
-"""Where something else is said for a shorter time, no speech is missing."""
+MIN_HEARD = 1.0  # something is said in a frame in which any phone is so many nats more probable than none
+MIN_GAP_S = 0.1  # where something else is said for a shorter time, no speech is missing
 MIN_SAID_SHARE = 0.25
 """A transcript of which so small a share of the phones is said is not that of the recording."""
 MIN_LOG_POSTERIOR = -23.0
 """No frame counts for less: what the network holds for impossible is as good as any other mistake."""
-LARGEST_SEARCH = 20_000_000
-"""Frames times phones that are searched at once, about three minutes of speech."""
+LARGEST_SEARCH = 20_000_000  # frames times phones that are searched at once, about three minutes of speech
 MIN_STRETCH_S, LONGEST_STRETCH_S = 10.0, 30.0
 """A longer recording is divided at the first silence after so many seconds, or else at the first word after so many."""
 
@@ -114,13 +111,7 @@ def find_evidence(
     units   : the phones of the transcript, aligned with the recording; of their times only the silences count, where a
               long recording is divided, and those of words that are not said
     costs   : of words that are left out, and of each of their phones
-    Raises ValueError: the posteriors are not of all phones, or end before the phones.
     """
-    spoken_s = max((span.end_s for span in units if not is_silent(span.label.phone)), default=0.0)
-    if (len(log_posteriors) + 1) * frame_s < spoken_s:
-        raise ValueError(f"posteriors of {len(log_posteriors) * frame_s:.2f} s, required {spoken_s:.2f}")
-    if log_posteriors.shape[1] != len(PHONES) + 1:
-        raise ValueError(f"posteriors of {log_posteriors.shape[1]} classes, required {len(PHONES) + 1}")
     log_posteriors = np.maximum(log_posteriors, MIN_LOG_POSTERIOR)
     words: list[WordEvidence] = []
     others: list[OtherSpeech] = []

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import threading
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -49,13 +48,11 @@ class FoundWord(NamedTuple):
     posterior: float
 
 
-VARIANT = re.compile(r"\(\d+\)$")
-"""The number of a pronunciation behind a word."""
+VARIANT = re.compile(r"\(\d+\)$")  # the number of a pronunciation behind a word
 OPTIONS = {"fwdflat": False, "maxhmmpf": 10_000}
 """One pass over the tree of all words finds more phones, and faster, than with a second one over the words that it
 found (docs/decisions/recognition.md)."""
-_LOCK = threading.Lock()
-"""A decoder works on one recording at a time."""
+_LOCK = threading.Lock()  # a decoder works on one recording at a time
 
 
 def spot_words(samples: bytes) -> tuple[FoundWord, ...]:
@@ -118,13 +115,11 @@ WORD_FIT, STRETCH_FIT = -2.0, -1.5
 WORD_BONUS, WORD_REACH_FRAMES = 2.0, 2
 """Where words are not believed, their phones are still more probable than others, by so many nats a frame, and so many
 frames earlier or later than in their alignment, linearly less."""
-FIT_WEIGHT, POSTERIOR_WEIGHT, CONSTANT = 0.62, 3.4, -1.9
-MIN_FIT, MAX_FIT = -4.0, 1.0
-"""Coefficients of the confidence; fits count within these limits."""
+FIT_WEIGHT, POSTERIOR_WEIGHT, CONSTANT = 0.62, 3.4, -1.9  # coefficients of the confidence
+MIN_FIT, MAX_FIT = -4.0, 1.0  # fits count within these limits
 SHORT_FRAMES = 3000
 """The words of so little sound are recognised in this process: to start another one would take as long."""
-DICTIONARY = Lexicon()
-"""Words that were recognised are in the dictionary."""
+DICTIONARY = Lexicon()  # words that were recognised are in the dictionary
 
 
 def begin_decoding(audio: AnalysedAudio, each: ParallelMap = map) -> Iterable[tuple[Stretch, Sequence[FoundWord]]]:
@@ -137,55 +132,45 @@ def begin_decoding(audio: AnalysedAudio, each: ParallelMap = map) -> Iterable[tu
     return zip(stretches, each(spot_words, (read_stretch(audio, stretch) for stretch in stretches)), strict=True)
 
 
-@dataclass(frozen=True, eq=False)
-class WordSearch:
-    """The search for words in one recording of T frames, beside the phones that are recognised without words.
+def match_words(
+    hmm: UnitHmm,
+    loop: UnitLoop,
+    free: LogLikelihoods,
+    aligning: LogLikelihoods,
+    path: NDArray[np.intp],
+    loud: NDArray[np.bool_],
+    spoken: Iterable[tuple[Stretch, Sequence[FoundWord]]],
+) -> tuple[list[LabelledStretch], list[RecognisedWord]]:
+    """Return the stretches of a recording of T frames whose phones words decide, with these, and all words found.
 
-    loop      : the network of phones without words
-    free      : log likelihoods of the recording, in the search of phones without words
-    aligning  : log likelihoods for the alignment of words
-    path      : the density of every frame on the best path of phones without words [shape=(T,)]
-    loud      : frames that are too loud for silence [shape=(T,)]
-    believing : whether all words are believed
+    loop, free : the network of phones without words, and the log likelihoods for it
+    aligning   : log likelihoods for the alignment of words
+    path       : the density of every frame on the best path of phones without words [shape=(T,)]
+    loud       : frames that are too loud for silence [shape=(T,)]
+    spoken     : of ``begin_decoding``, whose errors it raises
     """
-
-    hmm: UnitHmm
-    loop: UnitLoop
-    free: LogLikelihoods
-    aligning: LogLikelihoods
-    path: NDArray[np.intp]
-    loud: NDArray[np.bool_]
-    believing: bool = False
-
-    def words_of(
-        self, spoken: Iterable[tuple[Stretch, Sequence[FoundWord]]]
-    ) -> tuple[list[LabelledStretch], list[RecognisedWord]]:
-        """Return the stretches in which words were recognised, with their phones, and these words.
-
-        spoken : of ``begin_decoding``, whose errors it raises
-        """
-        parts, recognised = list[LabelledStretch](), list[RecognisedWord]()
-        for stretch, words in spoken:
-            if not words:
-                continue
-            fits, texts = np.full(len(words), MIN_FIT), [word.text for word in words]
-            values = self.aligning.stretch(*stretch)
-            aligned = align_recognised_words(self.hmm, values, self.loud[slice(*stretch)], texts, DICTIONARY)
-            if aligned is not None:
-                fits, fit = aligned.fits(values, self.path[slice(*stretch)])
-                believed = np.full(len(words), self.believing or fit > STRETCH_FIT) | (fits > WORD_FIT)
-                decided = list(label_words(aligned, stretch, believed, len(recognised)))
-                if not believed.all():
-                    # phones as they are recognised if those of words in it are more probable than others
-                    forms = np.array([FORMS.index(find_form(phone)) for phone in aligned.phones])
-                    present = np.eye(len(FORMS), dtype=np.float32)[forms[aligned.of_frame]]
-                    bonus = weigh_densities(self.hmm, present, WORD_BONUS, WORD_REACH_FRAMES)
-                    path = self.loop.network.best_path(wrap_log_likelihoods(self.free.stretch(*stretch) + bonus))
-                    decided = [(stretch, splice(recognise_free(self.loop, path, stretch.first), decided, stretch.end))]
-                parts += decided
-            scores = map(score_words, fits.tolist(), (word.posterior for word in words))
-            recognised += map(RecognisedWord, texts, scores)
-        return parts, recognised
+    parts, recognised = list[LabelledStretch](), list[RecognisedWord]()
+    for stretch, words in spoken:
+        if not words:
+            continue
+        fits, texts = np.full(len(words), MIN_FIT), [word.text for word in words]
+        values = aligning.stretch(*stretch)
+        aligned = align_recognised_words(hmm, values, loud[slice(*stretch)], texts, DICTIONARY)
+        if aligned is not None:
+            fits, fit = aligned.fits(values, path[slice(*stretch)])
+            believed = np.full(len(words), fit > STRETCH_FIT) | (fits > WORD_FIT)
+            decided = list(label_words(aligned, stretch, believed, len(recognised)))
+            if not believed.all():
+                # phones as they are recognised if those of words in it are more probable than others
+                forms = np.array([FORMS.index(find_form(phone)) for phone in aligned.phones])
+                present = np.eye(len(FORMS), dtype=np.float32)[forms[aligned.of_frame]]
+                bonus = weigh_densities(hmm, present, WORD_BONUS, WORD_REACH_FRAMES)
+                drawn = loop.network.best_path(wrap_log_likelihoods(free.stretch(*stretch) + bonus))
+                decided = [(stretch, splice(recognise_free(loop, drawn, stretch.first), decided, stretch.end))]
+            parts += decided
+        scores = map(score_words, fits.tolist(), (word.posterior for word in words))
+        recognised += map(RecognisedWord, texts, scores)
+    return parts, recognised
 
 
 def score_words(fit: float, posterior: float) -> float:

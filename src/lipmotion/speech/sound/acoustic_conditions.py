@@ -1,116 +1,44 @@
-"""Acoustic conditions: hum taken out, noise at a stated ratio; and for training, rooms, telephones, other voices."""
+"""Acoustic conditions: noise at a stated ratio; and for training, rooms, telephones, other voices."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.hmm.loudness import find_loud_frames
-from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP, WINDOW, check_samples, log_energy, spectrum
-from lipmotion.speech.sound.voice_activity import find_passages
 from lipmotion.types import SPEECH_RATE_HZ, Audio, ConditionSpectrum
 
 NOISE_KINDS = ("white", "babble")
 MIN_TALKERS = 2  # one other talker is an interruption, not a babble
-HEARD, FAINT, SPEECH_LIKE_DB = 1.01, 1e-4, 0.6
-"""Energies beside that of a voice: of all channels, above which it is not alone, and of the faintest that may speak.
-Swings of the level in decibels, times the share of frames whose pitch moves: speech has 1 to 5, music up to 0.5."""
 SILENT_RMS = 1e-6  # speech of a lower root mean square, full scale 1, is silence
-HUM, MIN_HUM, MAX_HUM_BLOCKS, HUM_RATIO, HUM_WIDTH = 16_000, 32_000, 200, 8.0, 61
-HUM_SHARE, HUM_REST = 0.03, 1e-5
-"""Hum is looked for in blocks of a second, in sound of two and more: bins of a hertz of so much more amplitude than
-those around, also where all else pauses, and this share of the loudest. Without it, this share of the power is left."""
-
-
-def remove_hum(samples: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return sound at 16 kHz [shape=(N,)] without lines of its spectrum that never pause, if a voice is beside them."""
-    from scipy.ndimage import binary_dilation, median_filter
-
-    if len(samples) < MIN_HUM:
-        return samples
-    padded = np.concatenate([samples[: HUM // 2], samples, samples[-HUM // 2 :]])  # by whole periods of any mains
-    blocks, window, part = sliding_window_view(padded, HUM)[:: HUM // 4], np.hanning(HUM + 1)[:-1], HUM // 10
-    judged = blocks[:: max(len(blocks) // MAX_HUM_BLOCKS, 1)]
-    steady, loud = np.quantile(np.abs(np.fft.rfft(judged * window)), (0.2, 0.9), axis=0)
-    lines = steady > np.maximum(HUM_RATIO * median_filter(steady, HUM_WIDTH), HUM_SHARE * loud.max())
-    # hum sounds in every tenth of a second; a voice on one note pauses for consonants
-    faintest = np.quantile(np.abs(np.fft.rfft(judged.reshape(-1, part) * np.hanning(part + 1)[:-1])), 0.05, axis=0)
-    lines &= 10 * faintest[np.rint(np.arange(len(lines)) / 10).astype(int)] > steady / 2
-    if not lines.any():
-        return samples
-    rest, clean = ~binary_dilation(lines, iterations=3), np.zeros(len(padded), np.float32)
-    for number, block in enumerate(blocks):
-        clean[number * HUM // 4 :][:HUM] += np.fft.irfft(np.fft.rfft(block * window) * rest).astype(np.float32) / 2
-    clean = clean[HUM // 2 :][: len(samples)]
-    within, before = (sound[HUM // 2 : -HUM // 2] for sound in (clean, samples))  # hum may be left at the ends
-    voiced = np.square(within).sum() > HUM_REST * np.square(before).sum() and find_passages(log_energy(within))
-    return clean if voiced else samples
-
-
-def speaks_alone(channel: int, energies: Sequence[float], decode: Callable[[int], NDArray[np.float32]]) -> bool:
-    """Return whether one of several channels is speech, and the others, which are heard beside it, are music or noise.
-
-    decode : returns the sound of a channel at 16 kHz [shape=(N,)]
-    """
-    if sum(energies) < HEARD * energies[channel]:
-        return False
-    others = [n for n, energy in enumerate(energies) if n != channel and energy > FAINT * energies[channel]]
-    return _is_like_speech(decode(channel)) and not any(_is_like_speech(decode(number)) for number in others)
-
-
-def _is_like_speech(samples: NDArray[np.float32]) -> bool:
-    """Speech swings with its syllables (after Scheirer & Slaney 1997), and its pitch moves. Whispers do not count."""
-    from scipy.ndimage import maximum_filter1d, uniform_filter1d
-
-    level_db = 10 / np.log(10) * log_energy(samples).astype(float)
-    level_db = np.maximum(level_db, level_db.max() - 40)
-    heard = maximum_filter1d(level_db, 101) > level_db.max() - 25  # pauses of a voice that says little do not count
-    swing_db = np.sqrt(np.square(uniform_filter1d(level_db, 5) - uniform_filter1d(level_db, 50))[heard].mean())
-    steps = np.abs(np.diff(log_f0(Audio(samples, SPEECH_RATE_HZ))))[: len(heard) - 1]
-    return bool(swing_db * ((steps > 0.004) & (steps < 0.1))[heard[: len(steps)]].mean() > SPEECH_LIKE_DB)
 
 
 def mix_noise(audio: Audio, kind: str, snr_db: float, talkers: Sequence[Audio] = (), seed: int = 0) -> Audio:
-    """Return a recording with noise of a kind added to it.
+    """Return a recording with noise of a kind, scaled to a signal-to-noise ratio, added from start to end.
 
     kind    : one of ``NOISE_KINDS``
-    snr_db  : as ``add_noise`` measures it
+    snr_db  : 10 · log10 of the mean power of the recording over that of the noise, both over the samples of speech
+              (``mark_spoken``); noise that the recording already has counts as speech there
     talkers : recordings of the babble's talkers, other people than the one in ``audio``; white noise does not use them
-    Raises InputError: another kind, a talker that is the recording itself, or as ``add_noise`` and ``make_babble``.
+    The samples are not clipped: beyond full scale they are exact for features, not for sound files of integers.
+    Raises InputError: another kind, a ratio that is not finite, a talker that is the recording itself, or as
+    ``mark_spoken`` and ``make_babble``.
     """
-    if kind not in NOISE_KINDS:
-        raise InputError(f"unknown noise {kind!r}; required one of: {', '.join(NOISE_KINDS)}")
-    count = len(check_samples(audio))
-    if kind == "white":
-        return add_noise(audio, np.random.default_rng(seed).standard_normal(count, np.float32), snr_db)
+    if kind not in NOISE_KINDS or not np.isfinite(snr_db):
+        raise InputError(f"{kind!r} noise at {snr_db} dB; required {' or '.join(NOISE_KINDS)}, and a finite ratio")
     if any(np.array_equal(talker.samples, audio.samples) for talker in talkers):
         raise InputError("the recording is one of the talkers of its own babble; leave its speaker out of the talkers")
-    return add_noise(audio, make_babble(talkers, count, seed), snr_db)
-
-
-def add_noise(audio: Audio, noise: NDArray[np.floating], snr_db: float) -> Audio:
-    """Return a recording with noise, scaled to a signal-to-noise ratio, added from start to end.
-
-    noise  : as many samples as the recording has [shape=(N,)], of any level
-    snr_db : 10 · log10 of the mean power of the recording over that of the noise, both over the samples of speech
-             (``mark_spoken``); noise that the recording already has counts as speech there
-    The samples are not clipped: beyond full scale they are exact for features, not for sound files of integers.
-    Raises InputError: a ratio that is not finite, other lengths, noise that is silent or not finite, or no speech.
-    """
-    if not np.isfinite(snr_db):
-        raise InputError(f"the signal-to-noise ratio is {snr_db} dB, required a finite number")
     spoken = mark_spoken(audio)
-    if noise.shape != audio.samples.shape:
-        raise InputError(f"the noise has shape {noise.shape}, required that of the recording, {audio.samples.shape}")
+    if kind == "white":
+        noise = np.random.default_rng(seed).standard_normal(len(audio.samples), np.float32)
+    else:
+        noise = make_babble(talkers, len(audio.samples), seed)
     noise_power = float(np.square(noise[spoken], dtype=float).mean())
-    if not 0 < noise_power < np.inf:
-        raise InputError(f"the noise has a mean power of {noise_power} in speech; required above 0 and finite")
     gain = np.sqrt(_power(audio, spoken) / noise_power) * 10 ** (-snr_db / 20)
     return Audio((audio.samples + gain * noise).astype(np.float32), audio.rate_hz)
 

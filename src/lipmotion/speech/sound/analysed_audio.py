@@ -24,6 +24,7 @@ from lipmotion.speech.features.mfcc import (
     mfcc_of_warps,
     spectrum,
 )
+from lipmotion.speech.sound.noise_reduction import reduce_noise
 from lipmotion.speech.sound.voice_activity import (
     SEPARATE_FRAMES,
     SOFTEST_DROP,
@@ -39,12 +40,9 @@ from lipmotion.types import Audio, Features, JoinedRows
 MadeT = TypeVar("MadeT")
 SILENT_FRAMES = 50
 """Frames of silence before and after the sound of each passage, recorded or not: the mouth opens before the sound."""
-QUIETEST = 0.1
-"""So large a share of a passage, its most silent frames, say what silence is like in it."""
-OFFSET_SHARE = 0.02
-"""An offset of so small a share of the level of the sound hides no pause."""
-SILENT_ENERGY = -17.0
-"""The log energy between passages: 80 dB beneath their loudest moments."""
+QUIETEST = 0.1  # so large a share of a passage, its most silent frames, say what silence is like in it
+OFFSET_SHARE = 0.02  # an offset of so small a share of the level of the sound hides no pause
+SILENT_ENERGY = -17.0  # the log energy between passages: 80 dB beneath their loudest moments
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,15 +114,10 @@ class AnalysedAudio(Audio):
             if len(samples) < WINDOW:
                 continue
             energy = log_energy(samples)
+            if (clean := reduce_noise(samples, energy)) is not samples:
+                samples, energy = clean, log_energy(clean)
             tones = find_tones(samples, energy)
             passages = [] if tones else find_passages(energy)
-            if not passages:
-                from lipmotion.speech.sound.acoustic_conditions import remove_hum
-
-                if (clean := remove_hum(samples)) is not samples:
-                    samples, energy = clean, log_energy(clean)
-                    tones = find_tones(samples, energy)
-                    passages = [] if tones else find_passages(energy)
             cuts = _find_silences(passages, samples)
             if tones:
                 waiting.append((start, samples.copy()))
@@ -295,10 +288,9 @@ def _find_silences(passages: Sequence[Stretch], samples: NDArray[np.float32]) ->
 
 @dataclass(frozen=True, eq=False)
 class _PassageAudio(AnalysedAudio):
-    """The sound of one passage, of which features are computed.
+    """The sound of one passage, with ``lead`` and ``tail`` frames of silence that have features of its quietest moment.
 
-    encodings, first : of the sound between digital silences that it is part of, and the frame there in which it begins
-    lead, tail : frames of silence before and after what is recorded, with the features of the quietest moment
+    ``first`` is its frame in ``encodings``, of the sound between digital silences that it is part of.
     """
 
     encodings: WindowedEncoding | None = None

@@ -44,15 +44,8 @@ def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
 
 
 class _TrackDecoder:
-    """Decodes one track: its sound, and what is known of it.
+    """Decodes one track; ``channel`` None: to the mean of its channels. Energies do not count what is constant.
 
-    channel          : number of the channel to take; None: the mean of all channels
-    samples, rate_hz : float32 array [shape=(N,)], and its sampling rate
-    energies, centre : of every channel; the number of the centre of three and more, None where there is none
-    mean_energy      : energy of the channels' mean; none of them counts what is constant
-    packets, damaged : how many packets the track has, and how many of them could not be decoded
-    silence_s        : duration of the silence that fills holes
-    missing_s        : what the container states beyond the end
     The sound so far is in ``_pieces``, each with the number of samples before it. Digital silence, and that which fills
     holes, is left out until the end: memory that nobody writes to costs nothing.
     """
@@ -103,8 +96,6 @@ class _TrackDecoder:
         while self._pieces:  # each is freed when it is copied
             first, piece = self._pieces.pop()
             samples[first : first + len(piece) // 4] = np.frombuffer(piece, np.float32)
-        names = [channel.name for channel in self._stream.layout.channels]
-        third = 2 if len(names) in (6, 8) and "NONE" in names else None  # names that a WAVE file may lack
         is_stated = self._stream.duration or not self._container.streams.video
         stated_s = read_duration(self._container, self._stream) if is_stated else 0.0
         rounded_s = ROUNDED_S if self._container.format.name in STATED else (1 - CUT_SHORT_SHARE) * stated_s
@@ -117,7 +108,6 @@ class _TrackDecoder:
             self.energies = np.atleast_1d(np.maximum(self._energies - constant, 0)).tolist()
             self.mean_energy -= float(np.mean(self._sums)) ** 2 / max(self._count, 1)
         self.missing_s = missing_s if missing_s > rounded_s else 0.0
-        self.centre = names.index("FC") if "FC" in names[1:] else third
 
     def _place(self, frame: Any) -> None:
         """Note a hole before a frame that starts later than the one before it ended."""
@@ -217,13 +207,6 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
         what = "%s: its %d channels cancel one another in their mean; channel %d, the loudest, is used"
         LOG.log(level, what, path, count, loudest + 1)
         sound = _decode(path, rate_hz, loudest)
-    elif sound.centre is not None:
-        from lipmotion.speech.sound.acoustic_conditions import speaks_alone
-
-        if speaks_alone(sound.centre, sound.energies, lambda number: _decode(path, SPEECH_RATE_HZ, number).samples):
-            what = "%s: of its %d channels, channel %d alone holds speech and is used; mix them down if others speak"
-            LOG.log(level, what, path, count, sound.centre + 1)
-            sound = _decode(path, rate_hz, sound.centre)
     if sound.note:
         LOG.log(level, "%s: %s", path, sound.note)
     damage = f"{sound.damaged} of {sound.packets} packets of sound cannot be decoded"
@@ -288,14 +271,11 @@ class _Wave(mmap.mmap):
 
 
 def _correct_wave(path: Path) -> tuple[_Wave | None, float, str]:
-    """Return a WAVE file under a header that FFmpeg understands, how many seconds its own states beyond its end, and
-    what else is wrong with it.
+    """Return a WAVE file under a header that FFmpeg understands, the seconds that its own states beyond its end, and
+    what else is wrong; None: its own header will do. Raises ValueError: the high byte comes first.
 
-    None: its own is one, or it is no WAVE file. 0 seconds: also of streams, which do not know their size.
-    FFmpeg reads samples of as many bits as are valid, without the zeros that fill their container: 24 bits in 32 as 24,
-    20 as another format, 17 as 24. It also loses its way at a chunk of odd length that no byte follows, and reads one
-    of several pieces of sound.
-    Raises ValueError: numbers with the high byte first, which FFmpeg would read as the other ones.
+    FFmpeg reads samples of as many bits as are valid, without the zeros that fill their container; it loses its way at
+    a chunk of odd length that no byte follows, and reads one of several pieces of sound.
     """
     with path.open("rb") as file:
         kind = file.read(4)
@@ -330,11 +310,7 @@ def _correct_wave(path: Path) -> tuple[_Wave | None, float, str]:
 
 
 def _find_wave_sound(content: _Wave) -> tuple[bytes, int, int, bool, str]:
-    """Return the content of the chunk of the form, where the samples are, how many bytes of them, whether FFmpeg would
-    not find them, and what is wrong. The form is empty where there is none, or there are no samples.
-
-    Several pieces of sound, of which FFmpeg reads the last one, are joined in their place.
-    """
+    """Return the form (empty: no sound), where the samples are, how many bytes, if FFmpeg misses some, and a note."""
     form, body, size, reached, pieces, rewritten = b"", 0, 0, 0, 0, False
     for name, place, length, unpadded in _iterate_wave_chunks(content):
         if name == b"fmt " and form not in (b"", content[place : place + length]):

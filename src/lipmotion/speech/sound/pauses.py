@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.hmm.loudness import find_sound_runs
 from lipmotion.types import Audio
 
 Array = NDArray[np.float64]
@@ -67,15 +68,8 @@ def list_spans(levels: Array) -> list[tuple[float, float]]:
         values.append(QUIETEST_DB - 1 if high - low < MIN_RANGE_DB else low + SPEECH_SHARE * (high - low))
     middles = (np.arange(count) + 0.5) * len(levels) / count
     loud = levels > np.interp(np.arange(len(levels)), middles, values)
-    edges = np.flatnonzero(np.diff(np.r_[False, loud, False]))
-    starts_s, ends_s = edges[::2] * STEP_S, edges[1::2] * STEP_S
-    joined: list[tuple[float, float]] = []
-    for start_s, end_s in zip(starts_s.tolist(), ends_s.tolist(), strict=True):
-        if joined and start_s - joined[-1][1] < MIN_PAUSE_S:
-            joined[-1] = (joined[-1][0], end_s)
-        else:
-            joined.append((start_s, end_s))
-    return [(start_s, end_s) for start_s, end_s in joined if end_s - start_s >= MIN_SPEECH_S]
+    runs = find_sound_runs(loud, round(MIN_PAUSE_S / STEP_S))
+    return [(first * STEP_S, end * STEP_S) for first, end in runs if (end - first) * STEP_S >= MIN_SPEECH_S]
 
 
 def find_quietest(levels: Array, start_s: float, end_s: float) -> float:

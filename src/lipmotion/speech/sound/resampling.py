@@ -1,4 +1,4 @@
-"""Lower sampling rates of sound in memory, and joining pieces of recordings by waveform-similarity overlap-add.
+"""Sound in memory at 16 kHz, and joining pieces of recordings by waveform-similarity overlap-add.
 
 Source: W. Verhelst and M. Roelands, "An overlap-add technique based on waveform similarity (WSOLA) for high quality
 time-scale modification of speech", ICASSP 1993: of the places where the next piece may begin, the one is taken at which
@@ -35,39 +35,6 @@ def resample_speech(sound: Audio) -> Audio:
 
 
 Samples = NDArray[np.float32]
-
-REACH = 10  # the filter reaches this many samples of the lower rate to either side
-DECIMATED_BLOCK = 1 << 18  # samples of the lower rate that are computed at a time: memory stays bounded for any length
-KAISER_BETA = 5.0
-
-
-def decimate(samples: Samples, factor: int) -> Samples:
-    """Return every ``factor``-th sample of a sound from which what the lower rate cannot hold is removed.
-
-    samples : [shape=(N,)]
-    factor  : at least 1
-    Returns float32 [shape=(ceil(N / factor),)]; beyond its ends the sound is silent.
-    Source: Oppenheim & Schafer, Discrete-Time Signal Processing, 4.6: a low-pass filter by a Kaiser window, computed
-    only for the samples that are kept. The filter is that of ``scipy.signal.resample_poly``.
-    """
-    if factor == 1 or not len(samples):
-        return samples
-    half = REACH * factor
-    at = np.arange(-half, half + 1)
-    taps = np.sinc(at / factor) * np.kaiser(2 * half + 1, KAISER_BETA)
-    taps = (taps / taps.sum()).astype(np.float32)
-    result = np.zeros(-(-len(samples) // factor), np.float32)
-    for start in range(0, len(result), DECIMATED_BLOCK):
-        part = result[start : start + DECIMATED_BLOCK]
-        first = (start - REACH) * factor  # the sample that padded[0] is
-        padded = np.zeros((len(part) + 2 * REACH + 1) * factor, np.float32)
-        inside = samples[max(first, 0) : first + len(padded)]
-        padded[max(-first, 0) :][: len(inside)] = inside
-        phases = padded.reshape(-1, factor)  # sample n · factor + p of the sound is [n - first / factor, p]
-        for phase in range(factor):
-            part += np.convolve(phases[:, phase], taps[phase::factor][::-1], "valid")[: len(part)]
-    return result
-
 
 OVERLAP_S = 0.012  # duration over which two pieces overlap; about one period of a low voice
 REACH_S = 0.008  # the next piece begins so much earlier or later, at most

@@ -14,10 +14,8 @@ from lipmotion.speech.features.encoding import COMPONENTS, read_background
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio
 from lipmotion.stats.mixture import QuadraticForm
 
-WARPS = (0.88, 0.94, 1.0, 1.06, 1.12)
-"""The lengths of adults' vocal tracts differ by about so much."""
-JUDGED_FRAMES = 2000
-"""20 seconds are enough to judge a speaker by."""
+WARPS = (0.88, 0.94, 1.0, 1.06, 1.12)  # the lengths of adults' vocal tracts differ by about so much
+JUDGED_FRAMES = 2000  # 20 seconds are enough to judge a speaker by
 STRANGER_SCORE, OWN_SCORE = -9.0, -3.0
 """A model knows nothing of a voice with the first speaker similarity score; one with the second is its training's own.
 The score of another speaker in the same studio is -4 to -6 for GRID's models, of other voices in other rooms -7 to -15,
@@ -27,8 +25,7 @@ STRANGER_LIKENESS, OWN_LIKENESS = (0.3, 0.6), (0.6, 0.9)
 it half knows it (docs/results/voices.md)."""
 QUIET_SHARE = 0.4
 """So many of the frames, the most quiet, are not used for a speaker vector: pauses sound like the room alone."""
-JUDGED_RECORDINGS = 100
-"""Recordings of a training whose speaker vectors are enough."""
+JUDGED_RECORDINGS = 100  # recordings of a training whose speaker vectors are enough
 
 
 class SpeakerSimilarity(NamedTuple):

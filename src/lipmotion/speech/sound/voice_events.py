@@ -1,13 +1,10 @@
-"""Voice events: what a sound says beside words: laughter, breaths in pauses, phrases that are whispered or shouted.
+"""Voice events: what a sound says beside words: laughter, and breaths in pauses.
 
 Everything but where phones are follows from the sound. Rules are strict: a false event is worse than a missed one.
 
-Sources: whispering, which has no voice, R. W. Morris and M. A. Clements, "Reconstruction of speech from whispers",
-Medical Engineering & Physics 24, 2002; shouting, which is louder, higher, and has more energy at high frequencies, H.
-Traunmueller and A. Eriksson, "Acoustic effects of variation in vocal effort by men, women, and children", Journal of
-the Acoustical Society of America 107, 2000; breaths, D. Ruinskiy and Y. Lavner, "An effective algorithm for automatic
-detection and exact demarcation of breath sounds in speech and song signals", IEEE Transactions on Audio, Speech and
-Language Processing 15, 2007. The limits are ours, chosen on recordings (docs/expression.md).
+Source of the breaths: D. Ruinskiy and Y. Lavner, "An effective algorithm for automatic detection and exact demarcation
+of breath sounds in speech and song signals", IEEE Transactions on Audio, Speech and Language Processing 15, 2007. The
+limits are ours, chosen on recordings (docs/expression.md).
 """
 
 from __future__ import annotations
@@ -24,8 +21,8 @@ from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP, find_centres, log_bands
 from lipmotion.speech.sound.analysed_audio import SILENT_ENERGY, AnalysedAudio, analysed
 from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Unit, VoiceEvent
-from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
-from lipmotion.units import VOWELS, is_silent
+from lipmotion.types.audio import BREATH, LAUGHTER
+from lipmotion.units import is_silent
 
 APART_FRAMES = (11, 40)
 """Calls of one bout are so far apart, least and most."""
@@ -77,22 +74,6 @@ SMOOTHING_FRAMES = 2.0
 """Standard deviation of the window that levels are smoothed with."""
 WORD_CONFIDENCE, MAX_WORD_SHARE = 0.5, 0.2
 """Phones of this confidence, and those that are known, are words; in laughter they have at most this share."""
-PHRASE_PAUSE_S, MIN_PHRASE_S, MIN_VOWELS = 0.25, 0.6, 2
-"""Phrases are divided by such pauses, and judged from so much speech, and so many vowels, on."""
-LOUD_DB = 20.0
-"""The frames of a phrase that are at most so far under its loudest are judged."""
-MIN_SNR_DB, BELOW_LOUDEST_DB = 12.0, 20.0
-"""Whispering is judged in phrases whose loudest frames are so much louder than the quiet of the recording, as noise
-hides a voice; and half of whose frames are at most so far under its loudest ones, beside which no F0 is found."""
-WHISPERED_SHARES = (0.12, 0.24)
-"""A phrase is whispered up to the first share of voiced frames, and not from the second one on."""
-MIN_PHRASES = 5
-"""A shout is one beside the other phrases of a recording: at least so many."""
-SHOUT_SEMITONES, SHOUT_TILT_DB, SHOUT_DB = (4.0, 8.0), (3.0, 7.0), (4.0, 8.0)
-"""How much higher, brighter (1 to 4.5 kHz beside what is lower) and louder than the median phrase a shout is: where it
-begins, and where it is one. The least of the three counts."""
-MIN_VOICED = 15
-"""Frames without which a phrase has no pitch."""
 BREATH_S, BREATH_PAUSE_S = (0.16, 1.2), 0.25
 """Least and most duration of a breath, and the least one of the pause that it is in."""
 BREATH_RISE_DB = (7.0, 15.0)
@@ -123,24 +104,14 @@ def find_voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, 
     audio : at 16 kHz
     Raises InputError: as ``speech.features.mfcc`` says.
     """
-    detected, judged = list[VoiceEvent](), list[tuple[float, float, tuple[float, float, float]]]()
+    detected = list[VoiceEvent]()
     for first, sound in analysed(audio).between_silences:
         at_s = first / FRAME_RATE_HZ
         phones = units.between(at_s, at_s + sound.duration_s)
-        level_db = _smooth(analysed(sound).log_energy.astype(np.float64) * DB)
-        pitch = log_f0(sound).astype(np.float64) * 12 / np.log(2)  # semitones
-        voiced = np.isfinite(pitch)
-        laughs = tuple(_laughs(sound, level_db, voiced, phones))
-        phrases = [
-            phrase
-            for phrase in _phrases(phones)
-            if not any(_find_overlap(phrase, (laugh.start_s, laugh.end_s)) > 0 for laugh in laughs)
-        ]
-        events = *laughs, *_breaths(sound, level_db, voiced, phones), *_whispers(level_db, voiced, phrases)
+        level_db, voiced = _smooth(sound.log_energy.astype(np.float64) * DB), np.isfinite(log_f0(sound))
+        events = *_laughs(sound, level_db, voiced, phones), *_breaths(sound, level_db, voiced, phones)
         detected += [event.shifted(at_s) for event in events]
-        efforts = _efforts(sound, level_db, pitch, phrases)
-        judged += [(start_s + at_s, end_s + at_s, effort) for (start_s, end_s), effort in efforts]
-    return tuple(sorted([*detected, *_shouts(judged)], key=lambda event: event.start_s))
+    return tuple(sorted(detected, key=lambda event: event.start_s))
 
 
 def silence_units(units: Timeline[Unit], others: Sequence[tuple[float, float]]) -> Timeline[Unit]:
@@ -158,12 +129,6 @@ def silence_units(units: Timeline[Unit], others: Sequence[tuple[float, float]]) 
 
 DB = 10 / np.log(10)
 """Decibels of a natural logarithm of power."""
-
-
-def _select_heard(level_db: Curve) -> Curve:
-    """Return the levels within passages, over which levels are compared; all, where there is none."""
-    heard = level_db[level_db > (SILENT_ENERGY + 1) * DB]
-    return heard if len(heard) else level_db
 
 
 def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:
@@ -197,66 +162,9 @@ def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeli
             yield VoiceEvent(start_s, end_s, LAUGHTER, probability, tuple(timed_calls))
 
 
-def _phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
-    """Return start and end, in seconds, of the phrases that are long enough to be judged."""
-    phrases: list[tuple[float, float, float, int]] = []
-    for span in units:
-        if is_silent(span.label.phone):
-            continue
-        vowel = int(span.label.phone in VOWELS)
-        if phrases and span.start_s - phrases[-1][1] < PHRASE_PAUSE_S:
-            start_s, _, said_s, vowels = phrases[-1]
-            phrases[-1] = start_s, span.end_s, said_s + span.duration_s, vowels + vowel
-        else:
-            phrases.append((span.start_s, span.end_s, span.duration_s, vowel))
-    return [each[:2] for each in phrases if each[2] >= MIN_PHRASE_S and each[3] >= MIN_VOWELS]
-
-
-def _whispers(level_db: Curve, voiced: Voiced, phrases: Sequence[tuple[float, float]]) -> Iterator[VoiceEvent]:
-    quiet_db, loud_db = np.percentile(_select_heard(level_db), (10, 99))
-    for start_s, end_s in phrases:
-        frames = _frames(start_s, end_s)
-        middle_db, loudest_db = np.percentile(level_db[frames], (50, 95)) if len(level_db[frames]) else (quiet_db,) * 2
-        if loudest_db - quiet_db < MIN_SNR_DB or middle_db - loud_db < -BELOW_LOUDEST_DB:
-            continue
-        share = float(voiced[frames][level_db[frames] > loudest_db - LOUD_DB].mean())
-        strength = _risen(-share, (-WHISPERED_SHARES[1], -WHISPERED_SHARES[0]))
-        if strength > 0:
-            yield VoiceEvent(start_s, end_s, WHISPER, strength)
-
-
-def _efforts(
-    audio: AnalysedAudio, level_db: Curve, pitch: Curve, phrases: Sequence[tuple[float, float]]
-) -> Iterator[tuple[tuple[float, float], tuple[float, float, float]]]:
-    """Yield the phrases with a voice, and how high (semitones), bright and loud (decibels) it is there."""
-    high = (find_centres() >= 1000) & (find_centres() < 4500)
-    low = find_centres() < 1000
-    for phrase in phrases:
-        frames = _frames(*phrase)
-        voiced = np.flatnonzero(np.isfinite(pitch[frames]))
-        if len(voiced) < MIN_VOICED:
-            continue
-        levels = level_db[frames][voiced]
-        loud = voiced[levels > np.median(levels) - 6]
-        powers = np.exp(_bands(audio, frames)[loud])
-        tilt_db = DB * np.median(np.log(powers[:, high].sum(axis=1)) - np.log(powers[:, low].sum(axis=1)))
-        yield phrase, (np.median(pitch[frames][voiced]), tilt_db, DB * np.log(np.mean(np.exp(levels / DB))))
-
-
-def _shouts(judged: Sequence[tuple[float, float, tuple[float, float, float]]]) -> Iterator[VoiceEvent]:
-    """Yield the phrases that are higher, brighter and louder than the others, of which the efforts are given."""
-    if len(judged) < MIN_PHRASES:
-        return
-    efforts = np.array([effort for *_, effort in judged])
-    for (start_s, end_s, _), values in zip(judged, (efforts - np.median(efforts, axis=0)).tolist(), strict=True):
-        limits = (SHOUT_SEMITONES, SHOUT_TILT_DB, SHOUT_DB)
-        strength = min(_risen(value, limit) for value, limit in zip(values, limits, strict=True))
-        if strength > 0:
-            yield VoiceEvent(start_s, end_s, SHOUT, strength)
-
-
 def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:
-    loud_db, spoken = float(np.percentile(_select_heard(level_db), 95)), np.flatnonzero(voiced)
+    heard = level_db[level_db > (SILENT_ENERGY + 1) * DB]  # within passages
+    loud_db, spoken = float(np.percentile(heard if len(heard) else level_db, 95)), np.flatnonzero(voiced)
     ends_s = [0.0, *(span.end_s for span in units if not is_silent(span.label.phone))]
     starts_s = [*(span.start_s for span in units if not is_silent(span.label.phone))]
     starts_s.append(max((span.end_s for span in units), default=0.0))
@@ -277,7 +185,7 @@ def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timel
             before = first - spoken[place - 1] if place else np.inf
             after = spoken[place] - stop if place < len(spoken) else np.inf
             if before >= BREATH_FROM_SPEECH[0] and after >= BREATH_FROM_SPEECH[1]:
-                strength = _risen(rise_db, BREATH_RISE_DB)
+                strength = float(np.interp(rise_db, BREATH_RISE_DB, (0, 1)))
                 yield VoiceEvent(first / FRAME_RATE_HZ, stop / FRAME_RATE_HZ, BREATH, strength)
 
 
@@ -322,10 +230,6 @@ def _smooth(curve: Curve) -> Curve:
     reach = round(4 * SMOOTHING_FRAMES)
     window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / SMOOTHING_FRAMES) ** 2)
     return np.convolve(np.pad(curve, reach, "edge"), window / window.sum(), "valid")
-
-
-def _risen(value: float, limits: tuple[float, float]) -> float:
-    return float(np.clip((value - limits[0]) / (limits[1] - limits[0]), 0, 1))
 
 
 def _find_overlap(one: tuple[float, float], other: tuple[float, float]) -> float:

@@ -3,8 +3,7 @@
 Only its library tells when each phone begins. The library is called in a process of its own (``espeak_events``), so
 that its state, its crashes and its licence (GPL) stay there. One such process speaks all sentences.
 
-The library of the Python package ``espeakng-loader`` comes first, that of the system second: the package's version is
-pinned, so that the same text gives the same sound on every machine.
+The library is that of the Python package ``espeakng-loader``: the same text gives the same sound on every machine.
 """
 
 from __future__ import annotations
@@ -12,12 +11,10 @@ from __future__ import annotations
 import json
 import logging
 import re
-import shutil
 import sys
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from importlib.util import find_spec
 from itertools import groupby
 from pathlib import Path
@@ -25,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.errors import InputError, LipMotionError, MissingDependencyError, shorten
+from lipmotion.errors import InputError, MissingDependencyError, shorten
 from lipmotion.extensions import install_command
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.espeak_events import PART
@@ -78,18 +75,15 @@ def correct_times(starts: Starts, audio: Audio, phone_map: PhoneMap = ESPEAK_PHO
 
 
 LOG = logging.getLogger("lipmotion")
-PACKAGE, WHEEL, EXTRA = "espeak-ng", "espeakng_loader", "text"
+NAME, WHEEL, EXTRA = "espeak-ng", "espeakng_loader", "text"
 LANGUAGE = "en-us"
 VARIANTS = ("f1", "f2", "f3", "f4", "m1", "m2", "m3", "m4", "m7", "m8")
 """The variants with the vocal tract, pitch and breath of a person; not the robots, whispers, echoes and growls."""
 PROGRAM = [sys.executable, "-I", str(Path(__file__).with_name("espeak_events.py"))]
 DATA = "espeak-ng-data"
-STRESS_MARKS = "',%="
-"""What version 1.52 writes before the vowel of a stressed syllable; 1.51 does not."""
+STRESS_MARKS = "',%="  # what it writes before the vowel of a stressed syllable
 NO_IPA: PhoneMap = {NO_SOUND: ESPEAK_PHONES[NO_SOUND], PART: ESPEAK_PHONES[PART]}
-LARGEST_VOICE_BYTES = 1 << 16
-"""Most bytes of a file that describes a voice."""
-Start = tuple[str, float, int]
+LARGEST_VOICE_BYTES = 1 << 16  # most bytes of a file that describes a voice
 
 
 def find_wheel() -> Path | None:
@@ -99,54 +93,26 @@ def find_wheel() -> Path | None:
     return Path(folders[0]) if folders and (Path(folders[0]) / DATA).is_dir() else None
 
 
-def _library() -> dict[str, str]:
-    """Return the paths of the library and of its data for a task; none for those of the system."""
-    folder = find_wheel()
-    if folder is None:
-        return {}
-    names = ("libespeak-ng.so", "libespeak-ng.dylib", "espeak-ng.dll")
-    path = next((folder / name for name in names if (folder / name).exists()), folder / names[0])
-    return {"library": str(path), "data": str(folder)}
-
-
-def _data() -> Path | None:
-    """Return the folder of languages and variants; None: espeak-ng is not installed."""
-    folder = find_wheel()
-    return folder / DATA if folder else _find_system_data(shutil.which("espeak-ng"))
-
-
-@cache
-def _find_system_data(program: str | None) -> Path | None:
-    """Return the data folder of the system's library, of which ``program`` tells that it is installed."""
-    if program is None:
-        return None
-    try:
-        about = json.loads(run_program(PROGRAM, PACKAGE, stdin="{}"))
-        return Path(about["data"])
-    except (LipMotionError, ValueError, KeyError, TypeError):  # the library or its data are missing
-        return None
-
-
 def _voices() -> tuple[SyntheticVoice, ...]:
-    data = _data()
-    variants = [name for name in VARIANTS if data and (data / "voices" / "!v" / name).is_file()]
-    return tuple(SyntheticVoice(f"{LANGUAGE}+{name}", "espeak-ng", f"espeak-{name}") for name in variants)
+    folder = find_wheel()
+    variants = [name for name in VARIANTS if folder and (folder / DATA / "voices" / "!v" / name).is_file()]
+    return tuple(SyntheticVoice(f"{LANGUAGE}+{name}", NAME, f"espeak-{name}") for name in variants)
 
 
 def _others() -> tuple[SyntheticVoice, ...]:
     """Return a voice of every language; its name and ``+`` and one of ``VARIANTS`` name a voice, too."""
-    data, names = _data(), set[str]()
-    for path in (data / "lang").rglob("*") if data else ():
+    folder, names = find_wheel(), set[str]()
+    for path in (folder / DATA / "lang").rglob("*") if folder else ():
         if path.is_file() and path.stat().st_size <= LARGEST_VOICE_BYTES:
             lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
             names |= {line.split()[1].lower() for line in lines if line.startswith("language ") and line.split()[1:]}
-    return tuple(SyntheticVoice(name, "espeak-ng", f"espeak-{name}", name) for name in sorted(names))
+    return tuple(SyntheticVoice(name, NAME, f"espeak-{name}", name) for name in sorted(names))
 
 
 def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
     ipa = voice.partition("+")[0] != LANGUAGE
-    task = {"voice": voice, "texts": list(texts), "folder": str(folder), "ipa": ipa} | _library()
-    sentences = _answer(run_program(PROGRAM, PACKAGE, len(texts), json.dumps(task), folder))
+    task = {"voice": voice, "texts": list(texts), "folder": str(folder), "ipa": ipa}
+    sentences = _ask_library(task, len(texts))
     labels = (label.lstrip(STRESS_MARKS) for starts_of_phones in sentences for label, _, _ in starts_of_phones)
     phone_map, unknown = complete_map(labels, NO_IPA if ipa else ESPEAK_PHONES, ipa=ipa)
     if unknown:
@@ -175,15 +141,22 @@ def _spell_words(phones: Timeline[str], places: Sequence[int], text: str) -> Tim
     return Timeline(tuple(spans))
 
 
-def _answer(printed: str) -> Any:
-    """Return the parsed output of ``espeak_events``. Raises InputError: it is no JSON."""
+def _ask_library(task: dict[str, Any], count: int) -> list[Any]:
+    """Return the ``count`` answers of ``espeak_events`` to a task. Raises InputError: it answers something else."""
+    wheel = find_wheel() or Path()
+    names = ("libespeak-ng.so", "libespeak-ng.dylib", "espeak-ng.dll")
+    path = next((wheel / name for name in names if (wheel / name).exists()), wheel / names[0])
+    printed = run_program(PROGRAM, NAME, count, json.dumps(task | {"library": str(path), "data": str(wheel)}))
     try:
-        return json.loads(printed)
-    except ValueError as error:
-        raise InputError(f"espeak-ng's library answers {printed[:40]!r}; install it again: {PACKAGE}") from error
+        answers = json.loads(printed)
+    except ValueError:
+        answers = None
+    if not isinstance(answers, list) or len(answers) != count:
+        raise InputError(f"espeak-ng's library answers {printed[:40]!r}; install it again: {install_command(EXTRA)}")
+    return answers
 
 
-ESPEAK_NG = Synthesiser("espeak-ng", PACKAGE, _voices, _synthesise, ESPEAK_PHONES, _others, EXTRA)
+ESPEAK_NG = Synthesiser(NAME, "", _voices, _synthesise, ESPEAK_PHONES, _others, EXTRA)
 
 
 @dataclass(frozen=True)
@@ -233,10 +206,7 @@ def _pronounce(words: Sequence[str], language: str) -> dict[str, tuple[Pronuncia
             f"no pronunciation of {shorten(repr(words[0]))} in {spoken.name}: install espeak-ng "
             f"({install_command(EXTRA)}), or give a lexicon file with its {len(words)} words"
         )
-    task = {"voice": voice, "words": list(words)} | _library()
-    answers = _answer(run_program(PROGRAM, PACKAGE, len(words), json.dumps(task)))
-    if not isinstance(answers, list) or len(answers) != len(words):
-        raise InputError(f"espeak-ng's library answers {str(answers)[:40]!r}; install it again: {PACKAGE}")
+    answers = _ask_library({"voice": voice, "words": list(words)}, len(words))
     pronounced: dict[str, tuple[Pronunciation, ...]] = {}
     for word, ipa in zip(words, answers, strict=True):
         phones = tuple(phone for label in re.split(r"[|\s]+", str(ipa)) for phone in read_ipa(label)[0])

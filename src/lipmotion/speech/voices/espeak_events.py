@@ -1,11 +1,10 @@
 """A stand-alone program: texts to wav files and the start times of their phones, by the library of espeak-ng.
 
-It reads a task as JSON: ``{"voice", "texts", "folder", "ipa"}``, and optionally ``"library"`` and ``"data"``: the
-paths of the library and of the folder that holds ``espeak-ng-data``. It writes a list of ``[label, start_s, place]``
-for every text as JSON, and the sound of text n to ``folder/n.wav``. A label is espeak-ng's mnemonic, or with ``"ipa"``
-the phone in the International Phonetic Alphabet; ``place`` is where the written word begins in the text, in characters.
-With ``"words"`` instead of texts, it writes a list of the phones of each in IPA, divided by ``|`` and blanks; nothing
-is spoken. Without ``"voice"`` it writes what is installed, ``{"version", "data"}``. To start fast it imports nothing.
+It reads a task as JSON: ``{"voice", "texts", "folder", "ipa", "library", "data"}``; the last two are the paths of the
+library, and of the folder that holds ``espeak-ng-data``. It writes a list of ``[label, start_s, place]`` for every text
+as JSON, and the sound of text n to ``folder/n.wav``. A label is espeak-ng's mnemonic, or with ``"ipa"`` the phone in
+IPA; ``place`` is where the written word begins in the text, in characters. With ``"words"`` instead of texts, it writes
+a list of the phones of each in IPA, divided by ``|`` and blanks; nothing is spoken. To start fast it imports nothing.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ import wave
 from pathlib import Path
 from typing import Any
 
-LIBRARIES = ("libespeak-ng.so.1", "libespeak-ng.1.dylib", "libespeak-ng.dll")
 SYNCHRONOUS, PHONEME_EVENTS, IPA, UTF_8 = 2, 1, 2, 1
 END, WORD, PHONEME = 0, 1, 7
 DIVIDER = "|"
@@ -55,15 +53,6 @@ class _Voice(ctypes.Structure):
 
 
 _Callback = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_int, ctypes.POINTER(_Event))
-
-
-def _library(path: str) -> Any:
-    for name in (path,) if path else LIBRARIES:
-        try:
-            return ctypes.CDLL(name)
-        except OSError:
-            continue
-    sys.exit(f"none of {path or ', '.join(LIBRARIES)} is installed; apt install libespeak-ng1")
 
 
 def _speak(library: Any, rate_hz: int, text: str, path: Path) -> list[tuple[str, float, int]]:
@@ -112,21 +101,14 @@ def _pronounce(library: Any, word: str) -> str:
 def main() -> None:
     """Carry out the task on the standard input."""
     task = json.load(sys.stdin)
-    library = _library(task.get("library", ""))
-    data = None
-    if task.get("data"):
-        os.chdir(task["data"])  # the library cuts long paths
-        data = b"."
-    options = PHONEME_EVENTS | (IPA if task.get("ipa") else 0)
-    rate_hz = library.espeak_Initialize(SYNCHRONOUS, 0, data, options)
+    try:
+        library = ctypes.CDLL(task["library"])
+    except OSError as error:
+        sys.exit(f"{task['library']} cannot be loaded ({error}); install espeakng-loader again")
+    os.chdir(task["data"])  # the library cuts long paths
+    rate_hz = library.espeak_Initialize(SYNCHRONOUS, 0, b".", PHONEME_EVENTS | (IPA if task.get("ipa") else 0))
     if rate_hz <= 0:
-        sys.exit("espeak-ng finds no data; apt install espeak-ng-data")
-    if "voice" not in task:
-        library.espeak_Info.restype = ctypes.c_char_p
-        path = ctypes.c_char_p()
-        version = library.espeak_Info(ctypes.byref(path))
-        json.dump({"version": version.decode(), "data": os.path.realpath((path.value or b"").decode())}, sys.stdout)
-        return
+        sys.exit("espeak-ng finds no data; install espeakng-loader again")
     voice = task["voice"].encode()
     properties = ctypes.byref(_Voice(languages=voice))
     if library.espeak_SetVoiceByName(voice) and library.espeak_SetVoiceByProperties(properties):

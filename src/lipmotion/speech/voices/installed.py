@@ -27,8 +27,7 @@ from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import Lexicon, split_words
 
 FLITE_PACKAGE = "flite"
-UNUSED = frozenset({"kal", "awb_time"})
-"""kal is kal16 at 8 kHz; awb_time can only say the time of day."""
+UNUSED = frozenset({"kal", "awb_time"})  # kal is kal16 at 8 kHz; awb_time can only say the time of day
 SPEAKERS = {"kal16": "kal"}
 
 
@@ -43,7 +42,7 @@ def _say_with_flite(voice: str, texts: Sequence[str], folder: Path) -> Iterator[
     path = folder / "flite.wav"
     for text in texts:
         command = ["flite", "-voice", voice, "-psdur", "-o", str(path), "-t", text]
-        printed = run_program(command, FLITE_PACKAGE, folder=folder)
+        printed = run_program(command, FLITE_PACKAGE)
         yield SynthesisedSentence(read_audio(path), parse_phone_ends(printed), path)
 
 
@@ -100,7 +99,7 @@ def _say_with_festival(voice: str, texts: Sequence[str], folder: Path) -> Iterat
     script = folder / "say.scm"
     calls = [f"(say {_quote(text)} {_quote(str(path))})" for text, path in zip(texts, paths, strict=True)]
     script.write_text("\n".join([f"(voice_{voice})", SPEAKING, *calls, ""]), encoding="utf-8")
-    printed = run_program(["festival", "-b", str(script)], FESTIVAL_PACKAGE, len(texts), folder=folder)
+    printed = run_program(["festival", "-b", str(script)], FESTIVAL_PACKAGE, len(texts))
     parts = printed.split(f"{MARK}\n")[1:]
     if len(parts) != len(texts):
         raise InputError(f"festival said {len(parts)} of {len(texts)} sentences; try another text or voice")
@@ -221,7 +220,7 @@ def choose_voice() -> SyntheticVoice:
 
 def explain_missing() -> MissingDependencyError:
     """Return the error that says how to install a synthesiser."""
-    debian = " ".join(synthesiser.package for synthesiser in SYNTHESISERS.values())
+    debian = " ".join(filter(None, (synthesiser.package for synthesiser in SYNTHESISERS.values())))
     return MissingDependencyError(
         f"no speech synthesiser is installed; install one: {install_command(ESPEAK_NG.extra)}, or: apt install {debian}"
     )
@@ -266,6 +265,5 @@ def _is_other(name: str, synthesiser: Synthesiser) -> bool:
 
 
 def explain_install(synthesiser: Synthesiser) -> str:
-    """Return the commands that install a synthesiser, for a message."""
-    package = f"apt install {synthesiser.package}"
-    return f"{package}, or {install_command(synthesiser.extra)}" if synthesiser.extra else package
+    """Return the command that installs a synthesiser, for a message."""
+    return install_command(synthesiser.extra) if synthesiser.extra else f"apt install {synthesiser.package}"

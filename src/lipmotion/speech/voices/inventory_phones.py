@@ -19,8 +19,7 @@ from lipmotion.units.spelling import normalise_text
 GAP_COST, OWN_FORM_COST, OWN_KIND_COST, OTHER_KIND_COST = 0.7, 0.3, 0.8, 1.5
 """Costs of matching a phone with none, a form of itself, another of its kind (vowel, consonant), and the other kind."""
 VOWELS = list_phone_classes()["vowel"]
-WRITTEN_EDGES = re.compile(r"^[^\w]+|[^\w]+$")
-"""Punctuation at the ends of a written word."""
+WRITTEN_EDGES = re.compile(r"^[^\w]+|[^\w]+$")  # punctuation at the ends of a written word
 Phones = Sequence[tuple[str, float, float]]
 
 

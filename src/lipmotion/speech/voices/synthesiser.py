@@ -1,4 +1,4 @@
-"""The interface to speech synthesisers, and their programs, run within bounds of time and of what they write."""
+"""The interface to speech synthesisers, and their programs, run within bounds of time."""
 
 from __future__ import annotations
 
@@ -8,17 +8,16 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.types import Audio, Timeline
 from lipmotion.units import PHONES, SILENCE
 from lipmotion.units.ipa_phones import read_ipa
+from lipmotion.units.spelling import read_table
 
 PhoneMap = Mapping[str, tuple[str, ...]]
 """A synthesiser's label to phones of the inventory."""
@@ -26,24 +25,9 @@ PhoneMap = Mapping[str, tuple[str, ...]]
 ARPABET_PHONES: PhoneMap = {phone: (phone,) for phone in PHONES} | {"pau": (SILENCE,)}
 """Flite and Festival (phone set ``radio``). They have their own ax; their er and ih are stressed and unstressed."""
 
-_ESPEAK: dict[str, str] = {
-    # silences
-    "_ _: _| _^_ |": SILENCE,
-    # vowels, by their sounds in American English
-    "0 A: A": "aa", "a aa": "ae", "V": "ah", "O O: O2": "ao", "aU": "aw", "@ @2 @5 a#": "ax", "3": "axr", "aI": "ay",
-    "E": "eh", "3:": "er", "eI": "ey", "I": "ih", "I# I2": "ix", "i i:": "iy", "oU": "ow", "OI": "oy", "U": "uh",
-    "u u:": "uw",
-    # vowels with the r that follows, or with another vowel
-    "A@": "aa r", "O@ o@": "ao r", "e@": "eh r", "U@": "uh r", "i@3": "ih r", "i@": "iy ax", "aI@": "ay ax",
-    "aI3": "ay axr", "aU@": "aw axr", "@L": "el", "n-": "en", "m-": "em",
-    # consonants; ? is a t that stays in the throat, t# one that the tongue only touches
-    "b": "b", "d d#": "d", "D": "dh", "dZ": "jh", "f": "f", "g": "g", "h": "hh", "j": "y", "k": "k", "l": "l", "m": "m",
-    "n": "n", "N": "ng", "p": "p", "r r-": "r", "s": "s", "S": "sh", "t t# t2 ?": "t", "tS": "ch", "T": "th", "v": "v",
-    "w": "w", "z": "z", "Z": "zh",
-    # parts of what is before: the glide from a vowel to the next, the beginning of an unstressed vowel
-    "; @-": "",
-}  # fmt: skip
-ESPEAK_PHONES: PhoneMap = {name: tuple(phones.split()) for names, phones in _ESPEAK.items() for name in names.split()}
+ESPEAK_PHONES: PhoneMap = {
+    name: tuple(phones.split()) for names, phones in read_table("espeak").items() for name in names.split()
+}
 """espeak-ng's mnemonics (as ``espeak-ng -x`` writes them), voice en-us."""
 
 
@@ -110,12 +94,12 @@ class SynthesisedSentence:
 class Synthesiser:
     """A speech synthesis program.
 
-    package    : the Debian package with it
+    package    : the Debian package with it; empty: it is a Python package
     voices     : returns its installed American English voices; none where it is not installed
     synthesise : yields the sentences of some texts in a voice (name, texts, a folder for temporary files), in order
     phone_map  : its phones to those of the inventory (``phone_maps``)
     others     : returns its voices of other languages and kinds of English
-    extra      : of lipmotion, that installs it; empty: it is no Python package
+    extra      : of lipmotion, that installs that
     """
 
     name: str
@@ -129,24 +113,14 @@ class Synthesiser:
 
 START_S, EACH_S = 30.0, 5.0
 """The time limit of a program: to start, and for each sentence; both are a hundred times what it needs."""
-STILL_S = 30.0
-"""A program that prints and writes nothing for so long hangs."""
-POLL_S = 0.05
-LARGEST_OUTPUT_BYTES = 4 << 20
-"""Most bytes that a program may print: many times the phones of twenty sentences."""
-LARGEST_SOUND_BYTES = 32 << 20
-"""Most bytes that it may write for each sentence: many times the longest one (``units.text_normalisation``)."""
-SHOWN_CHARACTERS = 200
-"""Characters of a program's error message that ours repeats."""
+SHOWN_CHARACTERS = 200  # characters of a program's error message that ours repeats
 
 
-def run_program(
-    command: Sequence[str], package: str, sentences: int = 1, stdin: str = "", folder: Path | None = None
-) -> str:
+def run_program(command: Sequence[str], package: str, sentences: int = 1, stdin: str = "") -> str:
     """Return the standard output of a program. When it has ended, in whatever way, so have the programs it started.
 
-    sentences : how many it synthesises, which sets its limits
-    Raises MissingDependencyError: no such program. Raises InputError: it fails, takes too long, or writes too much.
+    sentences : how many it synthesises, which sets its limit of time
+    Raises MissingDependencyError: no such program. Raises InputError: it fails, or takes too long.
     """
     program = shutil.which(command[0])
     if program is None:
@@ -160,7 +134,9 @@ def run_program(
                 [program, *command[1:]], stdin=task, stdout=printed, stderr=errors, start_new_session=True
             )
             try:
-                _wait(process, name, sentences, (printed, errors), folder)
+                process.wait(limit_s := START_S + EACH_S * sentences)
+            except subprocess.TimeoutExpired as error:
+                raise InputError(f"{name} did not end within {limit_s:.0f} s; give shorter or fewer texts") from error
             finally:
                 if sys.platform == "win32":
                     process.kill()
@@ -177,29 +153,3 @@ def run_program(
             return printed.read().decode().replace("\r\n", "\n")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{name} cannot be run ({error}); install it again: apt install {package}") from error
-
-
-def _wait(
-    process: subprocess.Popen[bytes], name: str, sentences: int, outputs: Sequence[IO[bytes]], folder: Path | None
-) -> None:
-    """Wait until a program ends. Raises InputError: it takes too long, or prints or writes too much."""
-    limit_s, max_written = START_S + EACH_S * sentences, LARGEST_SOUND_BYTES * sentences
-    start = changed = time.monotonic()
-    before = 0, 0
-    running = True
-    while running:
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(POLL_S)
-            running = False
-        printed, written = sum(os.fstat(file.fileno()).st_size for file in outputs), 0
-        with suppress(OSError):  # the program removes what it wrote
-            for path in folder.iterdir() if folder else ():
-                written += path.lstat().st_size
-        now = time.monotonic()
-        changed, before = (changed if before == (printed, written) else now), (printed, written)
-        if printed > LARGEST_OUTPUT_BYTES:
-            raise InputError(f"{name} prints more than {LARGEST_OUTPUT_BYTES} bytes; try another text or voice")
-        if written > max_written:
-            raise InputError(f"{name} writes more than {max_written} bytes; try another text or voice")
-        if running and (now - start > limit_s or now - changed > STILL_S):
-            raise InputError(f"{name} did not end within {now - start:.0f} s; give shorter or fewer texts")

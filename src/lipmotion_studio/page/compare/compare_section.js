@@ -1,27 +1,25 @@
-// The part of the panel that compares: with what, how, and a blind comparison.
+// The part of the panel that compares: with what, and how.
 
 import { iconButton, make, row, section, textButton } from "../dom.js";
 import { TEXT, fill } from "../strings.js";
 import { OTHER } from "./comparison.js";
 
 export function compareSection(studio) {
-  const { store, comparison } = studio, { other, project, blind, recording } = store, against = project?.forms.against;
+  const { store, comparison } = studio, { other, project, recording } = store, against = project?.forms.against;
   const kept = [textButton(TEXT.compareKeep, () => comparison.keep(), { id: "compare-keep" }),
     against && textButton(fill(TEXT.compareModel, { name: against }), () => comparison.with(OTHER), { id: "compare-model" })].filter(Boolean);
   return section(TEXT.compare, recording.versions.length ? make("ul", { className: "list versions" }, ...recording.versions.map((version) => versionRow(studio, version))) : null, other && make("p", { className: "hint", textContent: fill(TEXT.comparedWith, { name: other.name }) }),
-    row(...kept), other && row(...(blind && !blind.result ? blindButtons(studio) : [
+    row(...kept), other && row(
       held(studio), ...Object.entries(TEXT.heads).map(([heads, name]) => textButton(name, () => comparison.toggle(heads), { id: `compare-${heads}`, disabled: !other.weights, "aria-pressed": String(store.heads === heads) })),
-      textButton(TEXT.blind, () => comparison.blind(), { id: "compare-blind", disabled: !other.weights || !comparison.differs }),
-      textButton(TEXT.compareStop, () => comparison.stop(), { id: "compare-stop" })])),
-    blind && make("p", { id: "blind-told", className: "hint", textContent: blind.result || fill(TEXT.blindAsk, { what: "AB"[blind.place] }) }));
+      textButton(TEXT.compareStop, () => comparison.stop(), { id: "compare-stop" })));
 }
 
 function versionRow(studio, version) {
-  const { comparison, store: { other, blind } } = studio, name = fill(TEXT.versionNamed, version), during = { disabled: Boolean(blind && !blind.result) };
+  const { comparison, store: { other } } = studio, name = fill(TEXT.versionNamed, version);
   return make("li", {}, row(
-    textButton(name, () => comparison.with(version.name), { id: version.name, "aria-pressed": String(other?.by === version.name), ...during }),
-    textButton(TEXT.versionBack, () => studio.restoreVersion(version), { id: `${version.name}-back`, title: TEXT.versionBackHint, ...during }),
-    iconButton("remove", fill(TEXT.versionForget, { name }), () => comparison.forget(version.name), { id: `${version.name}-forget`, ...during })));
+    textButton(name, () => comparison.with(version.name), { id: version.name, "aria-pressed": String(other?.by === version.name) }),
+    textButton(TEXT.versionBack, () => studio.restoreVersion(version), { id: `${version.name}-back`, title: TEXT.versionBackHint }),
+    iconButton("remove", fill(TEXT.versionForget, { name }), () => comparison.forget(version.name), { id: `${version.name}-forget` })));
 }
 
 function held({ store }) {
@@ -30,14 +28,4 @@ function held({ store }) {
   hold.addEventListener("keydown", (event) => { if (event.key === " ") { event.preventDefault(); event.stopPropagation(); show(true)(); } });
   hold.addEventListener("keyup", show(false));
   return hold;
-}
-
-function blindButtons({ comparison, store: { blind } }) {
-  const once = { disabled: !blind.asked };
-  return [
-    ...["A", "B"].map((name, place) => textButton(fill(TEXT.blindPlay, { name }), () => comparison.play(place), { id: `blind-play-${name}`, ...once })),
-    ...["A", "B"].map((name, place) => textButton(fill(TEXT.blindBetter, { name }), () => comparison.vote(place), { id: `blind-better-${name}`, ...once })),
-    textButton(TEXT.blindNeither, () => comparison.vote(null), { id: "blind-neither", ...once }),
-    textButton(TEXT.compareStop, () => comparison.stop(), { id: "compare-stop" }),
-  ];
 }

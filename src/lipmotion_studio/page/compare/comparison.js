@@ -1,6 +1,5 @@
-// The other motion: a version that was kept, or that of the other model; and blind comparisons with it.
+// The other motion: a version that was kept, or that of the other model.
 
-import { Refused } from "../server.js";
 import { TEXT, fill } from "../strings.js";
 
 /** What the server calls the model that the project's is compared with. */
@@ -13,7 +12,6 @@ export class Comparison {
     this.store = studio.store;
     this.store.on(["recording", "face"], () => this.renew());
     this.store.on(["channels"], () => this.fill());
-    this.store.on(["playing", "time_s"], () => this.heard());
   }
 
   /** Keep the edits as they are, and compare with them from now on. */
@@ -64,9 +62,9 @@ export class Comparison {
     }
   }
 
-  show(other) { this.store.set({ other, comparing: false, ...(other.by === this.store.other?.by && this.store.blind === null ? {} : { blind: null, heads: "one" }) }); }
+  show(other) { this.store.set({ other, comparing: false, ...(other.by === this.store.other?.by ? {} : { heads: "one" }) }); }
 
-  stop() { this.store.set({ other: null, comparing: false, heads: "one", blind: null }); }
+  stop() { this.store.set({ other: null, comparing: false, heads: "one" }); }
 
   /** After an edit the other model moves the mouth by it, too; weights are of the face that is shown. */
   renew() {
@@ -77,50 +75,4 @@ export class Comparison {
 
   /** Show both heads in a way, or, if they are, one. */
   toggle(heads) { this.store.set({ heads: this.store.heads === heads ? "one" : heads, comparing: false }); }
-
-  /** Play the two, one after the other, in an order that is not told. */
-  blind() {
-    const order = Math.random() < 0.5 ? [false, true] : [true, false], { duration_s } = this.studio.player;
-    const span = this.store.span ?? { start_s: 0, end_s: duration_s };
-    this.store.set({ heads: "one", blind: { order, span, place: 0, asked: false, result: "" } });
-    this.play(0, false);
-  }
-
-  /** Play the first or the second one, 0 or 1. */
-  play(place, alone = true) {
-    const { blind } = this.store;
-    this.store.set({ blind: { ...blind, place, asked: alone || blind.asked }, comparing: blind.order[place] });
-    this.studio.player.seek(blind.span.start_s);
-    this.studio.player.play();
-  }
-
-  /** The end of the first is followed by the second; then it is asked. */
-  heard() {
-    const { blind, playing, time_s } = this.store;
-    if (!blind || blind.result || blind.asked || playing || time_s < blind.span.end_s - 0.02) return;
-    if (blind.place === 0) this.play(1, false);
-    else this.store.set({ blind: { ...blind, asked: true } });
-  }
-
-  /** Whether the other motion may be another one: it is that of the other model, or of other edits. */
-  get differs() {
-    const { other, recording } = this.store;
-    return other?.by === OTHER || recording?.versions.find(({ name }) => name === other?.by)?.digest !== recording?.edits_digest;
-  }
-
-  /** Keep which was better: 0, 1, or null: neither; and tell what was what. */
-  async vote(place) {
-    const { blind, blind: { order }, other, recording, recordingId } = this.store, names = order.map((isOther) => (isOther ? other.name : TEXT.now));
-    const shown = order.map((isOther) => ({ by: isOther ? other.by : "" }));
-    try {
-      const { better, neither } = await this.studio.server.post(`lines/${recordingId}/votes`, { shown, better: place, revision: recording.revision });
-      this.studio.player.stop();
-      const result = fill(TEXT.blindResult, { a: names[0], b: names[1], now: better[order.indexOf(false)], other: better[order.indexOf(true)], neither, name: other.name });
-      this.store.set({ blind: { ...blind, result }, comparing: false });
-      this.studio.say(result);
-    } catch (error) {
-      if (error instanceof Refused && error.status === 409) await this.studio.reportConflict(recordingId, error.state, TEXT.blind, null);
-      else this.studio.refuse(error);
-    }
-  }
 }

@@ -10,7 +10,7 @@ import { historyTab } from "./history_tab.js";
 /** Each tab, and what it is made anew for: a panel that is made anew under the pointer loses a click. */
 const TABS = {
   edit: { shown: editTab, follows: ["recording", "selected", "span"] }, delivery: { shown: deliveryTab, follows: ["recording"] },
-  why: { shown: whyTab, follows: ["recording", "doubts"] }, history: { shown: historyTab, follows: ["recording", "other", "blind", "heads", "project"] },
+  why: { shown: whyTab, follows: ["recording", "doubts"] }, history: { shown: historyTab, follows: ["recording", "other", "heads", "project"] },
 };
 
 export class Panel {

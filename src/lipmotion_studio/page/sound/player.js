@@ -1,7 +1,5 @@
 // The sound of the open recording, which is the clock of everything that moves.
 
-import { endingAt } from "./samples.js";
-
 const LOOP_LEAST_S = 0.03;
 
 export class Player {
@@ -11,12 +9,10 @@ export class Player {
     this.audio = new Audio();
     this.audio.preservesPitch = true;
     this.backwards = null;
-    this.wav = null; // the whole sound, a WAV file
-    this.ends_s = Infinity; // where the sound that is loaded ends
     this.audio.addEventListener("ended", () => {
       if (this.looped) return this.play();
       this.stop();
-      return store.set({ time_s: Math.min(this.ends_s, this.duration_s) });
+      return store.set({ time_s: this.duration_s });
     });
     this.follow = this.follow.bind(this);
     store.on(["speed"], () => { this.audio.playbackRate = store.speed; });
@@ -27,26 +23,16 @@ export class Player {
   /** Take another sound, a WAV file. */
   load(buffer) {
     this.stop();
-    this.wav = buffer;
-    this.endAt(Infinity);
-  }
-
-  /** Let the sound end at a time: it becomes a file that ends there, so that no slow frame is too late to stop it. */
-  endAt(end_s) {
-    this.ends_s = end_s;
     if (this.audio.src) URL.revokeObjectURL(this.audio.src);
-    this.audio.src = URL.createObjectURL(new Blob([endingAt(this.wav, end_s)], { type: "audio/wav" }));
+    this.audio.src = URL.createObjectURL(new Blob([buffer], { type: "audio/wav" }));
     this.audio.playbackRate = this.store.speed;
   }
 
   /** The span that is looped; null: all. */
   get looped() {
     const { span, looping } = this.store;
-    return looping && !this.judged && span && span.end_s - span.start_s > LOOP_LEAST_S ? span : null;
+    return looping && span && span.end_s - span.start_s > LOOP_LEAST_S ? span : null;
   }
-
-  /** The stretch that is compared blind, outside of which nothing is heard; null: none. */
-  get judged() { return this.store.blind && !this.store.blind.result ? this.store.blind.span : null; }
 
   seek(time_s) {
     const held = Math.min(Math.max(time_s, 0), this.duration_s);
@@ -56,10 +42,9 @@ export class Player {
 
   async play() {
     if (!this.store.sound) return;
-    const { looped, judged } = this, { time_s } = this.store, end_s = judged?.end_s ?? Infinity;
-    if (end_s !== this.ends_s) this.endAt(end_s);
+    const { looped } = this, { time_s } = this.store;
     if (looped && (time_s < looped.start_s || time_s >= looped.end_s - 0.005)) this.seek(looped.start_s);
-    else if (time_s >= Math.min(end_s, this.duration_s) - 0.005) this.seek(judged?.start_s ?? 0);
+    else if (time_s >= this.duration_s - 0.005) this.seek(0);
     else this.audio.currentTime = time_s;
     this.backwards = null;
     this.store.set({ playing: true });

@@ -56,15 +56,6 @@ export function samplesOf(buffer) {
   return new Samples(new Int16Array(buffer, start, count), rate_hz);
 }
 
-/** Return a WAV file that ends at a time, to the sample; its beginning is the same. */
-export function endingAt(buffer, end_s) {
-  const { start, count, rate_hz } = partsOf(buffer), stop = start + 2 * Math.min(Math.floor(end_s * rate_hz + 1e-6), count);
-  const cut = buffer.slice(0, stop), view = new DataView(cut);
-  view.setUint32(4, stop - 8, true);
-  view.setUint32(start - 4, stop - start, true);
-  return cut;
-}
-
 /** Where the samples of a WAV file of 16 bits and one channel start, in bytes, how many there are, and their rate. */
 function partsOf(buffer) {
   const view = new DataView(buffer);

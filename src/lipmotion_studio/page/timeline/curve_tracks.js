@@ -66,7 +66,7 @@ export class CurveTracks {
   }
 
   drawRow(name, row, pins, locks) {
-    const { timeline, store, store: { deviation, selected, other, blind } } = this, hidden = blind && !blind.result, comparing = store.comparing && !hidden, motion = store.curvesOf(name), its = other && !hidden && store.curvesOf(name, other), { height } = row;
+    const { timeline, store, store: { deviation, selected, other, comparing } } = this, motion = store.curvesOf(name), its = other && store.curvesOf(name, other), { height } = row;
     const pen = cleared(row.canvas, timeline.width, height), isSelected = selected?.kind === "curve" && selected.channel === name;
     row.label.setAttribute("aria-pressed", isSelected);
     for (const { start_s, end_s } of locks) this.hatch(pen, timeline.x(start_s), timeline.x(end_s), height, colour.line);

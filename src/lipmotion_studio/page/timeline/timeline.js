@@ -52,7 +52,7 @@ export class Timeline {
       this.sized();
     });
     const { store } = this;
-    store.on(["recording", "sound", "motion", "deviation", "confidence", "weights", "channels", "selected", "tool", "other", "comparing", "blind"], this.draw);
+    store.on(["recording", "sound", "motion", "deviation", "confidence", "weights", "channels", "selected", "tool", "other", "comparing"], this.draw);
     store.on(["span"], () => this.place());
     store.on(["time_s"], () => this.followPlayhead());
   }

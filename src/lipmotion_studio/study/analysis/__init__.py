@@ -1,1 +1,1 @@
-"""What the answers of a study say: preferences, opinion scores, rankings, and how sure they are."""
+"""What the answers of a study say: preferences, opinion scores, and how sure they are."""

@@ -19,26 +19,12 @@ MAX_ANCHOR = 0.5
 """Share of the comparisons with the anchor in which it may be preferred."""
 MIN_CHANCE = 0.01
 """A rater whose answers to both orders disagree more than by so small a chance presses the same side."""
-MIN_ALIKE = 8
-"""Who gives the same value in this many judgements or more does not judge."""
-MIN_PANEL = 5
-"""With fewer raters nobody is said to be faster than the others."""
-FASTEST, DEVIATIONS = 0.5, 3.0
-"""A rater below this share of the usual time, and this many deviations of its logarithm below it, is too fast."""
-MIN_ANSWERS = 0.5
-"""Share of the usual number of answers below which a rater gave too few."""
-NORMAL = 1.4826
-"""Standard deviation of a normal distribution over its median absolute deviation."""
 RULES = {
     "attention": f"at least {MIN_ATTENTION:.0%} of the checks of attention right",
     "anchor": f"the anchor rated below the recording (without one: below the mean of the others); preferred in at "
     f"most {MAX_ANCHOR:.0%} of its comparisons",
     "sides": f"not one side whatever is shown: pairs in both orders answered alike not more rarely than by a chance "
     f"of {MIN_CHANCE:.0%}",
-    "same value": f"not one value throughout, from {MIN_ALIKE} judgements of a kind on",
-    "time": f"median time (relative to the same question's usual time) not below {FASTEST:.0%} and {DEVIATIONS:g} "
-    f"robust deviations under the panel's; from {MIN_PANEL} raters on. How long the videos are is not known here",
-    "answers": f"at least {MIN_ANSWERS:.0%} of the usual number of answers",
 }
 
 
@@ -55,8 +41,6 @@ def screen(answers: Sequence[Answer]) -> Figures:
     checks: dict[str, list[Answer]] = {rater: [] for rater in raters}
     for answer in real:
         (checks if answer.expected else judged)[answer.rater].append(answer)
-    fast = _find_fast(select_counting(real))
-    usual = float(np.median([len(mine) for mine in judged.values()])) if raters else 0.0
     left_out = []
     for rater, mine in judged.items():
         right, shown = sum(each.value == each.expected for each in checks[rater]), len(checks[rater])
@@ -64,21 +48,10 @@ def screen(answers: Sequence[Answer]) -> Figures:
             "attention": f"{right} of {shown} right" if right < MIN_ATTENTION * shown else "",
             "anchor": _check_anchor(mine),
             "sides": _check_sides([each for each in mine if each.kind == PAIRED]),
-            "same value": _check_values(mine),
-            "time": fast.get(rater, ""),
-            "answers": f"{len(mine)} of usually {usual:g}" if len(mine) < MIN_ANSWERS * usual else "",
         }
         left_out += [{"rater": rater, "rule": rule, "found": text} for rule, text in texts.items() if text]
     kept = len(raters) - len({row["rater"] for row in left_out})
     return {"rules": dict(RULES), "raters": len(raters), "kept": kept, "left_out": left_out}
-
-
-def _check_values(mine: Sequence[Answer]) -> str:
-    for kind in sorted({each.kind for each in mine} - {PAIRED}):
-        values = [each.value for each in mine if each.kind == kind]
-        if len(values) >= MIN_ALIKE and len(set(values)) == 1:
-            return f"{values[0]} in all {len(values)}"
-    return ""
 
 
 def _check_anchor(mine: Sequence[Answer]) -> str:
@@ -86,15 +59,14 @@ def _check_anchor(mine: Sequence[Answer]) -> str:
     chosen = sum((each.condition == ANCHOR) == (each.value == FIRST) for each in compared)
     if chosen > MAX_ANCHOR * len(compared):
         return f"preferred in {chosen} of {len(compared)}"
-    for kind in sorted({each.kind for each in mine} - {PAIRED}):
-        rated = [(each.condition, int(each.value)) for each in mine if each.kind == kind]
-        names = {name for name, _ in rated} - {ANCHOR}
-        standard = {RECORDING} & names or names
-        values = [value for name, value in rated if name in standard]
-        low = [value for name, value in rated if name == ANCHOR]
-        if low and values and np.mean(low) >= np.mean(values):
-            better = RECORDING if standard == {RECORDING} else "others"
-            return f"rated {np.mean(low):.2f}, {better} {np.mean(values):.2f}"
+    rated = [(each.condition, int(each.value)) for each in mine if each.kind == MOS]
+    names = {name for name, _ in rated} - {ANCHOR}
+    standard = {RECORDING} & names or names
+    values = [value for name, value in rated if name in standard]
+    low = [value for name, value in rated if name == ANCHOR]
+    if low and values and np.mean(low) >= np.mean(values):
+        better = RECORDING if standard == {RECORDING} else "others"
+        return f"rated {np.mean(low):.2f}, {better} {np.mean(values):.2f}"
     return ""
 
 
@@ -107,31 +79,10 @@ def _check_sides(mine: Sequence[Answer]) -> str:
     return ""
 
 
-def _find_fast(answers: Sequence[Answer]) -> dict[str, str]:
-    """Return raters too fast, with their share of the usual time: the median over answers, in logarithms."""
-    timed = [each for each in answers if 0 < each.seconds < np.inf]
-    logs: dict[tuple[str, str], list[float]] = {}
-    for each in timed:
-        logs.setdefault((each.kind, each.question), []).append(float(np.log(each.seconds)))
-    usual = {question: float(np.median(values)) for question, values in logs.items()}
-    by_rater: dict[str, list[float]] = {}
-    for each in timed:
-        by_rater.setdefault(each.rater, []).append(float(np.log(each.seconds)) - usual[each.kind, each.question])
-    if len(by_rater) < MIN_PANEL:
-        return {}
-    times = {rater: float(np.median(relative)) for rater, relative in by_rater.items()}
-    panel = np.array(list(times.values()))
-    middle = float(np.median(panel))
-    spread = DEVIATIONS * NORMAL * float(np.median(np.abs(panel - middle)))
-    limit = middle - max(spread, -np.log(FASTEST))
-    return {rater: f"{np.exp(time - middle):.0%} of the usual time" for rater, time in times.items() if time < limit}
-
-
 MAX_RATERS = 1000
 """No search goes beyond."""
-DIFFERENCES = {MOS: (0.1, 0.2, 0.3, 0.5, 1.0)}
-"""Differences of means whose numbers of raters are given; on the scale of rankings, ``RANK_DIFFERENCES``."""
-RANK_DIFFERENCES = (2.0, 5.0, 10.0, 20.0)
+DIFFERENCES = (0.1, 0.2, 0.3, 0.5, 1.0)
+"""Differences of means whose numbers of raters are given."""
 SHARES = (0.55, 0.6, 0.65, 0.7, 0.75)
 """Preferences whose numbers of raters are given."""
 USUAL_POWER = 0.8
@@ -186,7 +137,7 @@ def plan_study(components: crossed.Components | None, kind: str, sentences: int,
     for share in SHARES if kind == PAIRED else ():
         scaled = crossed.Components(*(share * (1 - share) * np.array(components)).tolist())
         rows.append({"share": share, "raters": count_raters(scaled, share - 0.5, sentences, power)})
-    for difference in () if kind == PAIRED else DIFFERENCES.get(kind, RANK_DIFFERENCES):
+    for difference in () if kind == PAIRED else DIFFERENCES:
         rows.append({"difference": difference, "raters": count_raters(components, difference, sentences, power)})
     return rows
 

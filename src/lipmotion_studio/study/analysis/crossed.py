@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion_studio.study.answers import ANCHOR, HIGHEST_MOS, HIGHEST_RANK, MOS, RECORDING, Answer
+from lipmotion_studio.study.answers import ANCHOR, HIGHEST_MOS, RECORDING, Answer
 
 Array = NDArray[np.float64]
 CONFIDENCE = 0.95
@@ -171,25 +171,19 @@ def correct_p_values(p_values: list[float]) -> list[float]:
     return corrected
 
 
-SCALES = {MOS: (1.0, float(HIGHEST_MOS))}
-"""Lowest and highest value of each kind of judgement; of the others, ``RANKS``."""
-RANKS = (0.0, float(HIGHEST_RANK))
+SCALE = 1.0, float(HIGHEST_MOS)
+"""Lowest and highest judgement."""
+WIDTH = SCALE[1] - SCALE[0]
 Figures = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
 class RatingTable:
-    """Mean judgements on one scale [shape=(C, R, S)], NaN where there is none, and the scale's ends."""
+    """Mean judgements on one scale [shape=(C, R, S)], NaN where there is none."""
 
     conditions: tuple[str, ...]
     values: Array
     count: NDArray[np.intp]
-    scale: tuple[float, float]
-
-    @property
-    def width(self) -> float:
-        """How far apart the ends of the scale are."""
-        return self.scale[1] - self.scale[0]
 
     def select_condition(self, condition: str) -> Array:
         """Return the judgements of a condition [shape=(R, S)]."""
@@ -201,7 +195,7 @@ class RatingTable:
 
     def compare(self, condition: str, other: str) -> CrossedMean:
         """Return the mean difference of two conditions, of the same rater on the same sentence."""
-        return estimate_mean(self.select_condition(condition) - self.select_condition(other), self.width)
+        return estimate_mean(self.select_condition(condition) - self.select_condition(other), WIDTH)
 
 
 def tabulate_ratings(answers: Sequence[Answer]) -> RatingTable:
@@ -217,7 +211,7 @@ def tabulate_ratings(answers: Sequence[Answer]) -> RatingTable:
         totals[place] += int(answer.value)
         count[place] += 1
     values = np.where(count > 0, totals / np.maximum(count, 1), np.nan)
-    return RatingTable(tuple(conditions), values, count, SCALES.get(answers[0].kind, RANKS))
+    return RatingTable(tuple(conditions), values, count)
 
 
 def analyse_ratings(table: RatingTable, baseline: str | None) -> Figures:
@@ -225,11 +219,11 @@ def analyse_ratings(table: RatingTable, baseline: str | None) -> Figures:
     means = []
     for number, name in enumerate(table.conditions):
         values = table.select_condition(name)
-        mean, seen = estimate_mean(values, table.width), np.isfinite(values)
+        mean, seen = estimate_mean(values, WIDTH), np.isfinite(values)
         row = {
             "condition": name,
             "mean": mean.mean,
-            **mean.compute_interval_within(*table.scale)._asdict(),
+            **mean.compute_interval_within(*SCALE)._asdict(),
             "deviation": float(values[seen].std(ddof=1)) if seen.sum() > 1 else np.nan,
             "answers": int(table.count[number].sum()),
             "raters": int(seen.any(axis=1).sum()),
@@ -270,11 +264,11 @@ def measure_improvement(table: RatingTable, condition: str, base: str) -> Figure
     both = np.isfinite(values) & np.isfinite(others)
     row: Figures = {"condition": condition, "percent": np.nan, "low": np.nan, "high": np.nan}
     level = float(others[both].mean()) if both.any() else 0.0
-    if level <= 0:  # never compared; or a baseline of 0 on the scale of rankings
+    if not level:  # never compared
         return row
     ratio = float(values[both].mean()) / level
     percent = 100 * (ratio - 1)
-    interval = estimate_mean(100 * (values - ratio * others) / level, 100 * table.width / level).interval
+    interval = estimate_mean(100 * (values - ratio * others) / level, 100 * WIDTH / level).interval
     return row | {"percent": percent, "low": percent + interval.low, "high": percent + interval.high}
 
 

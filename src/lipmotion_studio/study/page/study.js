@@ -8,7 +8,6 @@ const PARTS = ["welcome", "guide", "trial", "thanks"];
 const KEYS = {
   paired: "Keys: space plays the videos, 1 or ← chooses the first, 2 or → the second, Enter goes on.",
   mos: "Keys: space plays the video, 1 to 5 answer the scales one after another, Enter goes on.",
-  ranking: "Keys: space plays the videos one after another, 1 to 9 play one of them, arrows move a slider, Enter goes on.",
 };
 const ORDINALS = ["First video", "Second video"];
 let study, place, players, startedAt;
@@ -105,10 +104,9 @@ function showTrial() {
   part("progress").setAttribute("aria-label", `Pages done: ${shown.trial} of ${shown.trials}`);
   part("note").hidden = !shown.note;
   part("note").textContent = shown.note;
-  const names = shown.videos.map((_, n) => shown.videos.length === 1 ? "Video"
-    : study.kind === "paired" ? ORDINALS[n] : `Video ${n + 1}`);
+  const names = shown.videos.length === 1 ? ["Video"] : ORDINALS;
   players = new Players(part("videos"), shown.videos, names, changed);
-  part("questions").replaceChildren(...QUESTIONS[study.kind](shown, names));
+  part("questions").replaceChildren(...QUESTIONS[study.kind](shown));
   startedAt = performance.now();
   show("trial");
   changed();
@@ -124,34 +122,18 @@ function scale(title, asks, name, values, words, wide = false) {
     made("div", { className: wide ? "choices wide" : "choices" }, ...choices));
 }
 
-function slider(name, n, highest) {
-  const input = made("input", { type: "range", min: 0, max: highest, step: 1, value: highest / 2, id: `value${n}` });
-  const output = made("output", { textContent: "–" });
-  output.htmlFor = input.id;
-  const set = () => { input.dataset.set = "yes"; output.textContent = input.value; changed(); };
-  for (const event of ["input", "change"]) input.addEventListener(event, set);
-  input.addEventListener("pointerup", () => { if (!input.disabled) set(); }); // also where it is left in the middle
-  return made("div", { className: "slider" }, made("label", { htmlFor: input.id, textContent: `${name}: 0 to ${highest}` }), input, output);
-}
-
 const QUESTIONS = {
   paired: () => [scale("The lips match better in the", "", "value0", ["first", "second"], ORDINALS, true)],
   mos: (shown) => shown.scales.map(({ title, asks }, n) =>
     scale(title, asks, `value${n}`, shown.points.map((_, point) => String(point + 1)), shown.points)),
-  ranking: (shown, names) => {
-    players.list.forEach(({ figure }, n) => figure.append(slider(names[n], n, shown.highest)));
-    return [];
-  },
 };
 
 const groups = () => [...part("questions").querySelectorAll("fieldset")];
-const sliders = () => [...part("videos").querySelectorAll("input[type=range]")];
-const values = () => study.kind === "ranking" ? sliders().map((input) => input.dataset.set && input.value)
-  : groups().map((group) => group.querySelector(":checked")?.value);
+const values = () => groups().map((group) => group.querySelector(":checked")?.value);
 
 function changed(problem) {
   const open = players.allPlayed;
-  for (const input of [...part("questions").querySelectorAll("input"), ...sliders()]) input.disabled = !open;
+  for (const input of part("questions").querySelectorAll("input")) input.disabled = !open;
   const done = open && values().every(Boolean);
   part("next").disabled = !done;
   const each = place.videos.length === 1 ? "the video" : "all videos";
@@ -167,11 +149,6 @@ function submit(event) {
 }
 
 function choose(number) {
-  if (study.kind === "ranking") {
-    const player = players.list[number - 1];
-    if (player) players.play(player);
-    return Boolean(player);
-  }
   const group = groups().find((each) => !each.querySelector(":checked")) ?? groups().at(-1);
   const input = group.querySelectorAll("input")[number - 1];
   if (!input || input.disabled) return false;
@@ -188,7 +165,7 @@ function key(event) {
   if (event.key === " " && on?.tagName !== "BUTTON" && on?.tagName !== "A") {
     players.playOn();
     used = true;
-  } else if (/^[1-9]$/.test(event.key)) {
+  } else if (/^[1-5]$/.test(event.key)) {
     used = choose(Number(event.key));
   } else if (event.key in arrows && study.kind === "paired" && !on) {
     used = choose(arrows[event.key]);

@@ -21,7 +21,6 @@ from lipmotion.engines.coupled.conversion import convert, sum_precisions
 from lipmotion.engines.coupled.training.chain_training import MIN_FRAMES, with_joint_state_densities
 from lipmotion.errors import InputError
 from oracles import coupled as oracle
-from oracles import paths
 
 
 def even(of):
@@ -176,16 +175,6 @@ def test_no_other_tables_have_a_higher_expected_likelihood(kind, sets, limit):
         assert other <= value + 1e-6 * abs(value)
 
 
-def test_rows_without_data_stay():
-    transitions = tiny.chains().transitions
-    counts = random_counts(transitions)
-    without_data = transitions.product.arc_from == 3
-    counts[without_data] = 0
-    best = transitions.reestimated(counts)
-    for chain in range(2):
-        assert best.advance[chain][best.rows[chain][3]] == transitions.advance[chain][transitions.rows[chain][3]]
-
-
 def test_rare_joint_states_share_the_rows_of_their_own_state_and_lead():
     transitions = tiny.chains().transitions
     product, frames = transitions.product, np.zeros(len(transitions.product.joint_states))
@@ -250,76 +239,6 @@ def test_expected_precisions_and_means(kind, sets, limit):
     expected = oracle.component_statistics(model, data, number, 1)
     np.testing.assert_allclose(precision, expected[0], rtol=1e-4)
     np.testing.assert_allclose(weighted, expected[1], rtol=1e-3, atol=1e-4)
-
-
-def test_decoupled_tables_without_a_limit_are_the_product_of_hmms():
-    """γ of each chain, and the likelihood, are those of the chains alone."""
-    model = made(tiny.FACTORIAL, (tiny.THREE, tiny.TWO), None)
-    product = model.transitions.product
-    draw = np.random.default_rng(5)
-    own = [draw.uniform(0.2, 0.8, count) for count in product.structure.state_counts]
-    decoupled = Transitions(product, model.transitions.rows, tuple(own))
-    coupled = type(model)(model.streams, decoupled, model.groups)
-    data = tiny.observations(6)
-    result = coupled.infer(data, coupled.full_lattice).posteriors
-    total = 0.0
-    for chain in range(2):
-        posterior, log_likelihood = single_chain(coupled, chain, own[chain], data)
-        total += log_likelihood
-        np.testing.assert_allclose(result.densities[chain], posterior, atol=2e-5)
-    assert result.log_likelihood == pytest.approx(total, rel=1e-5)
-
-
-def single_chain(model, chain, advance, data):
-    """Return the posteriors and the log likelihood of one chain alone, by all of its paths."""
-    structure, grammar = model.structure, model.transitions.product.grammar
-    count, states = structure.state_counts[chain], structure.states
-    matrix, initial = np.diag(1 - advance), np.zeros(count)
-    initial[::states] = grammar.initial[chain] / grammar.initial[chain].sum()
-    for state in range(count):
-        if state % states < states - 1:
-            matrix[state, state + 1] += advance[state]
-        else:
-            matrix[state, ::states] += advance[state] * grammar.bigrams[chain][state // states]
-    group = model.groups[chain]
-    density = [[oracle.log_density(group, g, data, t)[0] for g in range(count)] for t in range(data.frames)]
-    arcs = {(a, b): np.log(matrix[a, b]) for a, b in np.argwhere(matrix).tolist()}
-    with np.errstate(divide="ignore"):
-        found, _, total = paths.posteriors(density, np.arange(count), arcs, np.log(initial), np.zeros(count))
-    return found, total
-
-
-def test_a_factorial_hmm_of_one_chain_is_the_hmm():
-    """With equal densities of all states of the second chain, the posteriors are those of the first chain alone."""
-    model = made(tiny.FACTORIAL, (tiny.THREE, tiny.TWO), None)
-    group = model.groups[1]
-    same = group.mixtures.select(np.zeros(group.mixtures.size[0], np.intp))
-    blind = type(model)(
-        model.streams,
-        model.transitions,
-        (model.groups[0], type(group)(group.streams, group.columns, same, group.weights, group.tie)),
-    )
-    data = tiny.observations(6)
-    result = blind.infer(data, blind.full_lattice).posteriors
-    posterior, _ = single_chain(blind, 0, blind.transitions.advance[0], data)
-    np.testing.assert_allclose(result.densities[0], posterior, atol=2e-5)
-
-
-def test_one_gaussian_each_makes_hmm_and_multistream_hmm_the_same():
-    joint, apart = (
-        made(tiny.HMM, (tiny.THREE,), 1, components=(1,)),
-        made(tiny.MULTISTREAM, (tiny.THREE,), 1, components=(1, 1)),
-    )
-    whole = joint.groups[0].mixtures
-    groups = []
-    for group, columns in zip(apart.groups, (slice(0, 2), slice(2, 3)), strict=True):
-        cut = type(whole)(whole.log_weights, whole.means[:, :, columns], whole.variances[:, :, columns])
-        groups.append(type(group)(group.streams, group.columns, cut, group.weights, group.tie))
-    apart = type(apart)(apart.streams, joint.transitions, tuple(groups))
-    data = tiny.observations(6)
-    one, other = (x.infer(data, x.full_lattice).posteriors for x in (joint, apart))
-    np.testing.assert_allclose(one.chains[0], other.chains[0], atol=1e-6)
-    assert one.log_likelihood == pytest.approx(other.log_likelihood, rel=1e-6)
 
 
 def test_a_lattice_of_all_units_is_the_full_one_and_a_smaller_one_excludes_paths():

@@ -25,7 +25,7 @@ from lipmotion import engines, errors
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.chains.densities import MIN_COMPONENT_FRAMES, AudioVisualObservations, reestimate_group
 from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
-from lipmotion.engines.coupled.chains.model import Chains, speech_observations
+from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.product import list_unit_sets
 from lipmotion.engines.coupled.conversion import EXACT, VITERBI, convert
 from lipmotion.engines.coupled.training.chain_training import (
@@ -42,7 +42,6 @@ from lipmotion.engines.coupled.training.chain_training import (
 )
 from lipmotion.engines.coupled.training.coupled_training import train_on_speech
 from lipmotion.measures.curves import correlate_pooled
-from lipmotion.motion.frame_labels import mark_distant
 from lipmotion.testing import examples
 from lipmotion.types import FRAME_RATE_HZ, GREY, Channel, Example, Motion, Span, Timeline, Unit, silent_monitor
 from oracles import coupled as oracle
@@ -161,14 +160,6 @@ def test_floors_are_of_observed_frames():
     values = np.where(seen, np.tile([0.0, 2.0], 20), 1e6)[:, None].astype(np.float32)
     data = AudioVisualObservations((np.zeros((40, 2), np.float32), values), (None, seen))
     assert compute_variance_floors([data])[1] == pytest.approx(0.01)
-
-
-def test_frames_away_from_speech_are_silence():
-    units = Timeline((Span(0.0, 0.5, Unit("sil")), Span(0.5, 0.7, Unit("aa")), Span(0.7, 1.5, Unit("sil"))))
-    away = mark_distant(units, 151, 0.45)
-    assert away[:4].all()
-    assert not away[6:114].any()
-    assert away[116:].all()
 
 
 def with_pictures(number: int) -> Example:
@@ -394,35 +385,6 @@ def test_motion_that_was_not_observed_is_ignored_wherever_the_example_stands() -
     first = arrays([*moving, *speech_only])
     assert first == arrays([speech_only[0], moving[0], *channels[1:], *moving[1:]])
     assert first != arrays(moving)
-
-
-def right(engine: Any, model: Any, sentence: Example) -> tuple[float, float]:
-    """Return the correlation of the opening with the original's, of unknown words, and of speech frames right."""
-    spoken = replace(sentence.speech, units_known=False)
-    generated = engine.generate(model, spoken).motion["opening"]
-    chains = model.chains
-    found = chains.infer(speech_observations(spoken, model.visual), chains.full_lattice).posteriors
-    states = found.chains[0].argmax(axis=1) // chains.structure.states
-    labels = [
-        (chains.structure.units[0].index(span.label.phone), frame)
-        for span in spoken.units
-        if span.label.phone != "sil"
-        for frame in range(round(span.start_s * FRAME_RATE_HZ), round(span.end_s * FRAME_RATE_HZ))
-    ]
-    share = float(np.mean([states[frame] == unit for unit, frame in labels]))
-    return float(np.corrcoef(generated, sentence.motion["opening"])[0, 1]), share
-
-
-@pytest.mark.long
-def test_another_speaker_is_recognised_and_the_first_one_still_is() -> None:
-    moving, speech_only = examples(6), [other_speaker(one) for one in examples(6, seed=9)]
-    (own,), (original,) = examples(1, seed=20), examples(1, seed=21)
-    other = replace(original, speech=other_speaker(original).speech)
-    one, two = fitted(moving), fitted([*moving, *speech_only])
-    before, after = right(*one, other), right(*two, other)
-    assert after[0] > before[0] + 0.1
-    assert after[1] > before[1] + 0.2
-    assert right(*two, own) > (0.9, 0.9)
 
 
 STATES, LAGGED = 3, ("p", "uw", "aa")

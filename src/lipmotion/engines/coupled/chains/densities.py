@@ -13,8 +13,7 @@ from lipmotion.stats.mixture import Mixtures, QuadraticForm, normalise_component
 
 Index = NDArray[np.intp]
 Single = NDArray[np.float32]
-MIN_COMPONENT_FRAMES = 0.1
-"""A component with less data than so many frames keeps its mean and variance."""
+MIN_COMPONENT_FRAMES = 0.1  # a component with less data than so many frames keeps its mean and variance
 
 
 @dataclass(frozen=True, eq=False)

@@ -96,8 +96,7 @@ def tie_posteriors(posterior: Single, tie: Index, count: int) -> Single:
 
 
 Array = NDArray[np.float64]
-VISIBLE_FRAMES = 10
-"""The lips may be in a unit this many frames before and after the voice."""
+VISIBLE_FRAMES = 10  # the lips may be in a unit this many frames before and after the voice
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,12 +41,10 @@ class NetworkLattice(Lattice):
     network: ForwardBackwardNetwork
 
     def posteriors(self, transitions: Transitions, logs: Sequence[Single]) -> LatticePosteriors:  # noqa: D102
-        network = self.network.with_arcs(
-            transitions.arc_log[self.transition_index], transitions.log_initial[self.states]
-        )
-        order = network.layout.order
+        order = self.network.layout.order
         ordered_ties = [tie[order] for tie in self.ties]
-        expected = network.posteriors(logs, ordered_ties, np.array([len(logs[0])]))
+        arcs = transitions.arc_log[self.transition_index], transitions.log_initial[self.states]
+        expected = self.network.posteriors(*arcs, logs, ordered_ties)
         structure = transitions.product.structure
         return LatticePosteriors(
             tuple(
@@ -59,7 +57,7 @@ class NetworkLattice(Lattice):
             ),
             self.states[order[expected.posterior.argmax(axis=1)]],
             expected.counts,
-            float(expected.log_likelihood[0]),
+            expected.log_likelihood,
             JointPosteriors(self.states[order], expected.posterior),
         )
 
@@ -103,13 +101,7 @@ def build_network_lattice(
     arcs = np.flatnonzero(inside[product.arc_from] & inside[product.arc_to])
     position = np.cumsum(inside) - 1
     arc_from, arc_to = position[product.arc_from[arcs]], position[product.arc_to[arcs]]
-    network = ForwardBackwardNetwork.of(
-        arc_from,
-        np.zeros(len(arcs)),
-        np.searchsorted(arc_to, np.arange(len(states))),
-        np.zeros(len(states)),
-        np.zeros(len(states)),
-    )
+    network = ForwardBackwardNetwork.of(arc_from, np.searchsorted(arc_to, np.arange(len(states))))
     densities, lattice_ties = zip(*(np.unique(tie[states], return_inverse=True) for tie in ties), strict=True)
     density_units = np.zeros(len(densities[0]), np.intp)
     density_units[lattice_ties[0]] = product.chain_states[0][states] // structure.states

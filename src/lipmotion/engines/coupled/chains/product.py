@@ -20,8 +20,7 @@ from lipmotion.units import PHONES, UnitSet, load_unit_set
 
 HMM, MULTISTREAM, FACTORIAL, COUPLED = "hmm", "multistream", "factorial", "coupled"
 STRUCTURES = (HMM, MULTISTREAM, FACTORIAL, COUPLED)
-UNSEEN_LOSS = 10.0
-"""Chosen on the validation list (docs/results/xieliu2007.md)."""
+UNSEEN_LOSS = 10.0  # chosen on the validation list (docs/results/xieliu2007.md)
 
 AS_PRINTED: dict[str, Any] = {
     "states": 5,
@@ -288,12 +287,10 @@ def _enter_units(
 
 
 Array = NDArray[np.float64]
-INITIAL_ADVANCE = 0.2
-"""Probability of moving on in a frame before training: a state lasts 50 ms on average."""
+INITIAL_ADVANCE = 0.2  # probability of moving on in a frame before training: a state lasts 50 ms on average
 MIN_FRAMES = 50.0
 """A joint state with fewer frames in training shares its row with all that have the same own state and asynchrony."""
-MIN_ADVANCE = 1e-5
-"""Least probability of moving on, and of staying."""
+MIN_ADVANCE = 1e-5  # least probability of moving on, and of staying
 MAX_SWEEPS, CONVERGENCE_TOLERANCE = 50, 1e-6
 """Iterative scaling ends after so many sweeps, or when no probability changes by as much."""
 

@@ -45,8 +45,7 @@ from lipmotion.types import FRAME_RATE_HZ, Timeline, Unit
 from lipmotion.units import SILENCE, find_similar_phone
 
 Index = NDArray[np.intp]
-SLACK_S = 0.05
-"""A unit is allowed this long before and after its label."""
+SLACK_S = 0.05  # a unit is allowed this long before and after its label
 FIRST_SHARE = 0.1
 """Share of the probability of the first unit that is spread over all units, whatever utterances begin with."""
 
@@ -109,10 +108,8 @@ def estimate_grammar(structure: Structure, data: Sequence[AlignedUtterance]) -> 
     return Grammar(tuple(bigrams), tuple(initials))
 
 
-SHARD = 16
-"""Utterances of a shard of the E-step."""
-MIN_DENSITY_FRAMES = 3.0
-"""A density with less data than so many frames stays as it is."""
+SHARD = 16  # utterances of a shard of the E-step
+MIN_DENSITY_FRAMES = 3.0  # a density with less data than so many frames stays as it is
 FLOOR_SHARE, MIN_VARIANCE = 0.01, 1e-4
 """No variance falls under this share of the stream's own variance, or under this least variance."""
 
@@ -229,8 +226,7 @@ def _shard_sums(job: tuple[Chains, Sequence[LatticeUtterance]]) -> Sums:
     return sums
 
 
-MIN_FRAMES = 10
-"""A joint state with at least so many frames in training has densities of its own."""
+MIN_FRAMES = 10  # a joint state with at least so many frames in training has densities of its own
 
 
 def with_joint_state_densities(
@@ -379,16 +375,13 @@ def _with_borrowed_densities(
     return replace(group, mixtures=group.mixtures.select(source))
 
 
-FRAMES_A_GAUSSIAN = 25.0
-"""A density is split if it has so many frames for each Gaussian that it would have."""
-CONVERGENCE_GAIN = 0.02
-"""EM ends when the log likelihood per frame gains less."""
+FRAMES_A_GAUSSIAN = 25.0  # a density is split if it has so many frames for each Gaussian that it would have
+CONVERGENCE_GAIN = 0.02  # EM ends when the log likelihood per frame gains less
 
 
 Report = Callable[[int, Chains, ChainStatistics], None]
 """Called after every step of EM with its number, the new chains, and the statistics that they were estimated from."""
-MAX_STEPS = 6
-"""Greatest number of EM steps between one splitting and the next."""
+MAX_STEPS = 6  # greatest number of EM steps between one splitting and the next
 
 
 def grow_chains(  # noqa: PLR0913

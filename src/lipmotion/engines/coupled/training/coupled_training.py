@@ -43,7 +43,6 @@ from lipmotion.motion.articulation import fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.frame_labels import mark_distant
 from lipmotion.motion.generation import fit_scaling_factors
-from lipmotion.motion.modulation_filter import learn_filter
 from lipmotion.motion.predictors import PREDICTORS, Predictor, PredictorTraining
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.stats.curves import mark_known_dynamics
@@ -100,8 +99,7 @@ def _run_threaded(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], 
         yield from pool.map(function, items)
 
 
-THREADS = Checkpoint(parallel_map=_run_threaded)
-"""Nothing is stored; threads of this process share the work."""
+THREADS = Checkpoint(parallel_map=_run_threaded)  # nothing is stored; threads of this process share the work
 
 
 def grow_models(
@@ -160,14 +158,9 @@ def grow_models(
         if config.dynamic and config.acoustic_regression:
             monitor(Progress("regression of visual means", 1, 1, 0.75))
             model = replace(model, regression=_estimate_regression(model, data))
-        if config.filtered or (config.dynamic and config.variance_scaling):
+        if config.dynamic and config.variance_scaling:
             recorded = [x[mask] for x, mask in zip(values, valid, strict=True)]
-            generated = _generated(model, data)
-            if config.variance_scaling:
-                model = replace(model, scaling=fit_scaling_factors(recorded, generated))
-            scaled = ((x, model.scaling * made) for x, made in zip(recorded, generated, strict=True))
-            modulation = learn_filter(config.modulation_filter, scaled, moving, values)
-            model = replace(model, modulation=modulation)
+            model = replace(model, scaling=fit_scaling_factors(recorded, _generate(model, data)))
         monitor(Progress("regression of visual means", 1, 1, 1.0))
         joint_states = model.chains.transitions.product.chain_states.shape[1]
         frames = sum(int(example.valid.sum()) for example in examples)
@@ -237,13 +230,13 @@ def _estimate_regression(
     return inputs, tuple(regressions)
 
 
-def _generated(model: CoupledModel, data: Sequence[AlignedUtterance]) -> list[Array]:
+def _generate(model: CoupledModel, data: Sequence[AlignedUtterance]) -> list[Array]:
     """Return what a model generates for utterances, in the frames whose motion was observed [each shape=(N, Q)]."""
     chains = model.chains
 
-    def generated(utterance: AlignedUtterance) -> Array:
+    def generate(utterance: AlignedUtterance) -> Array:
         speech = utterance.observations.without_visual_streams()
         motion, _ = solve_mlpg(*model.motion_statistics(chains.infer(speech, chains.full_lattice)))
         return motion[utterance.observations.observed[1]]
 
-    return list(_run_threaded(generated, data))
+    return list(_run_threaded(generate, data))

@@ -28,14 +28,10 @@ from lipmotion.units.phones import FULL_FORMS
 SOUNDS = tuple(phone for phone in PHONES if not is_silent(phone) and phone not in FULL_FORMS)
 """The phones of the dictionary."""
 NUMBER = {spelling: number for number, phone in enumerate(SOUNDS) for spelling in (phone, phone.upper())}
-MAX_WORDS = 40_000
-"""So many words are searched, the most probable ones."""
-LONGEST_WORD = 20
-"""Words of more phones are not searched."""
-LANGUAGE_WEIGHT = 0.8
-"""Weight of the logarithms of the probabilities of words beside those of the posteriors."""
-MIN_LOG_PROBABILITY = -40.0
-"""Words that are less probable are not in the language model."""
+MAX_WORDS = 40_000  # so many words are searched, the most probable ones
+LONGEST_WORD = 20  # words of more phones are not searched
+LANGUAGE_WEIGHT = 0.8  # weight of the logarithms of the probabilities of words beside those of the posteriors
+MIN_LOG_PROBABILITY = -40.0  # words that are less probable are not in the language model
 NO_WORD = -1
 
 Nodes = NDArray[np.int32]
@@ -179,20 +175,15 @@ def build_word_tree(pronunciations: list[list[bytes]], scores: NDArray[np.float6
 
 BEAM, MAX_PATHS = 10.0, 1000
 """Paths that are so many nats less probable than the best one, or not among so many best ones, are given up."""
-MAX_ENDS = 60
-"""Words end in so many paths of a row at most."""
-MIN_POSTERIOR = 1e-3
-"""No posterior counts as less: the network is sure too often."""
+MAX_ENDS = 60  # words end in so many paths of a row at most
+MIN_POSTERIOR = 1e-3  # no posterior counts as less: the network is sure too often
 BLANK_LOSS = 1.0
 """Nats by which no phone is less probable than the network says: it leaves phones out rather than adding some."""
-WORD_GAIN = 1.0
-"""Nats that a path wins with every word."""
+WORD_GAIN = 1.0  # nats that a path wins with every word
 FREE_WORD_LOSS, FREE_PHONE_LOSS = 4.0, 2.5
 """Nats that a path loses with phones outside of words, and with each of them."""
-INNER_BOUNDARY_LOSS = 2.0
-"""Nats that a path loses with a boundary of words within a word."""
-SILENT_ROW = -0.02
-"""Where no phone is more probable than this, as a logarithm, paths stay where they are."""
+INNER_BOUNDARY_LOSS = 2.0  # nats that a path loses with a boundary of words within a word
+SILENT_ROW = -0.02  # where no phone is more probable than this, as a logarithm, paths stay where they are
 NEVER = -1e9
 
 Scores = NDArray[np.float64]
@@ -241,12 +232,10 @@ def score_stretch(posteriors: PhonePosteriors) -> Scored:
 
 @dataclass
 class _Paths:
-    """The paths that are followed, P of them: the best one for each node and each two last words.
+    """The P paths that are followed: the best one for each node and each two last words [each shape=(P,)].
 
-    node    : of the tree [shape=(P,)]
-    context : number of the two last words [shape=(P,)]
-    blank, sound : score of the path whose last row said nothing, and whose last row said the phone of the node
-    origin  : the last word that ended, by number in the history; -1: none
+    ``blank`` and ``sound`` score the path whose last row said nothing, and said the phone of the node; ``origin`` is
+    the last word that ended, by number in the history, or -1.
     """
 
     node: Indices
@@ -279,11 +268,7 @@ class _Paths:
 
 @dataclass
 class _BeamSearch:
-    """The search through one stretch.
-
-    history  : words that ended: the number of the word before in this list, the word, the row after it
-    contexts : the two last words of a path, the last one first, with their numbers
-    """
+    """The search through one stretch: words that ended (the one before, the word, the row after it), and contexts."""
 
     english: EnglishWords
     history: list[tuple[int, int, int]] = field(default_factory=list)

@@ -1,6 +1,6 @@
-"""Phone recognisers: networks that say in every frame how probable each phone is, whoever speaks.
+"""The phone recogniser: a network that says in every frame how probable each phone is, whoever speaks.
 
-They are trained with connectionist temporal classification (CTC): a token is probable in a frame or two of the time in
+It is trained with connectionist temporal classification (CTC): a token is probable in a frame or two of the time in
 which its phone is said, ``BLANK`` in all others.
 """
 
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import platform
 import sys
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
@@ -16,13 +15,11 @@ from hashlib import sha256
 from importlib import metadata, resources
 from importlib.util import find_spec
 from itertools import pairwise
-from typing import Any, ClassVar, NamedTuple, final
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import MissingDependencyError
-from lipmotion.extensions import Registry
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.voice_activity import Stretch, find_sound, read_stretch
 from lipmotion.types import Audio, JoinedRows, ParallelMap, TokenPosteriors
@@ -30,69 +27,59 @@ from lipmotion.types.audio import from_sixteen_bits
 from lipmotion.units import PHONES
 from lipmotion.units.ipa_phones import read_tokens
 
-POSTERIOR_STEP = 2
-"""Frames of 10 ms from one row of posteriors to the next."""
+POSTERIOR_STEP = 2  # frames of 10 ms from one row of posteriors to the next
 BLANK, WORD_BOUNDARY = "<blank>", "<wb>"
-MIN_LOG_POSTERIOR = -16.0
-"""The logarithm of what is taken to be impossible."""
-SHORT_FRAMES = 1500
-"""So little sound is recognised in this process: to start another one would take as long."""
+MIN_LOG_POSTERIOR = -16.0  # the logarithm of what is taken to be impossible
+SHORT_FRAMES = 1500  # so little sound is recognised in this process: to start another one would take as long
 
 
-class PhoneRecogniser(ABC):
-    """A network that gives posteriors of tokens.
+LIBRARIES = {("linux", "x86_64"), ("linux", "aarch64"), ("darwin", "x86_64"), ("darwin", "arm64")}
+"""Systems and processors that the package has a library for."""
+PACKAGE, WEIGHTS = "hama", "asr_waveform.hama"
+MIN_SAMPLES = 1600  # shorter sound is filled up with silence: the network has no row for it
 
-    name   : under which it is registered
-    tokens : phones in the International Phonetic Alphabet, ``BLANK`` and, if it has one, ``WORD_BOUNDARY``
+
+class PhoneRecogniser:
+    """The network of the package ``hama`` (Apache-2.0), which gives posteriors of tokens.
+
+    tokens : phones in the International Phonetic Alphabet, ``BLANK`` and ``WORD_BOUNDARY``
     source : name and version, which ``pip install NAME==VERSION`` takes, and a digest of its weights: posteriors of
              another source are not what a model was trained on
     """
 
-    name: ClassVar[str]
-    tokens: tuple[str, ...]
-    source: str
+    def __init__(self) -> None:
+        from hama.asr import ASRModel
 
-    @classmethod
-    @abstractmethod
-    def is_installed(cls) -> bool:
-        """Return whether the network can be used on this machine."""
+        self._model = ASRModel()
+        self.tokens = tuple(self._model.decoder_tokens)
+        weights = (resources.files(PACKAGE) / "assets" / WEIGHTS).read_bytes()
+        self.source = f"{PACKAGE} {metadata.version(PACKAGE)} {sha256(weights).hexdigest()[:12]}"
 
-    @abstractmethod
     def log_posteriors(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return natural logarithms of the posteriors of all tokens, every 20 ms [shape=(N, K)].
 
         samples : at 16 kHz, at most 10 s of them
         """
-
-
-PHONE_RECOGNISERS: Registry[type[PhoneRecogniser]] = Registry(
-    "phone recogniser",
-    "lipmotion.phone_recognisers",
-    {"hama": "lipmotion.speech.recognition.network.posteriors:Hama"},
-    PhoneRecogniser,
-    named=True,
-)
-
-
-@cache
-def load_phone_recogniser(name: str) -> PhoneRecogniser:
-    """Return a phone recogniser of this process; it is loaded once.
-
-    Raises InputError: there is none of this name. Raises MissingDependencyError: it is not installed.
-    """
-    chosen = PHONE_RECOGNISERS.load(name)
-    if not chosen.is_installed():
-        raise MissingDependencyError(
-            f"the phone recogniser {name!r} is not installed: pip install {name}; or leave the recogniser to 'auto', "
-            "which does without it"
+        filled = np.pad(samples, (0, max(0, MIN_SAMPLES - len(samples)))).astype(np.float32)
+        values, rows = self._model.session.run(
+            ["log_probs", "out_lengths"],
+            {"waveform": filled[None], "waveform_lengths": np.array([len(filled)], np.int64)},
         )
-    return chosen()
+        posteriors: NDArray[np.float32] = np.asarray(values, np.float32).reshape(-1, len(self.tokens))
+        return posteriors[: int(rows[0])]
 
 
 @cache
 def find_installed_recogniser() -> str | None:
-    """Return the name of the first phone recogniser that can be used on this machine; None: there is none."""
-    return next((name for name in PHONE_RECOGNISERS.names if PHONE_RECOGNISERS.load(name).is_installed()), None)
+    """Return the name of the phone recogniser; None: it is not installed, or has no library for this machine."""
+    has_library = (sys.platform, platform.machine()) in LIBRARIES
+    return PACKAGE if has_library and find_spec(PACKAGE) is not None else None
+
+
+@cache
+def load_phone_recogniser() -> PhoneRecogniser:
+    """Return the phone recogniser of this process, where it is installed; it is loaded once."""
+    return PhoneRecogniser()
 
 
 class FoundToken(NamedTuple):
@@ -150,19 +137,15 @@ class PosteriorStretch(NamedTuple):
     posteriors: PhonePosteriors
 
 
-def find_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> list[PosteriorStretch]:
-    """Return the posteriors in all stretches of sound of a recording; they are computed once.
-
-    Raises InputError, MissingDependencyError: as ``load_phone_recogniser``.
-    """
-    key = f"posteriors of {name}"
+def find_stretches(audio: AnalysedAudio, each: ParallelMap = map) -> list[PosteriorStretch]:
+    """Return the posteriors in all stretches of sound of a recording; they are computed once."""
 
     def compute() -> list[PosteriorStretch]:
-        tokens = load_phone_recogniser(name).tokens
+        tokens = load_phone_recogniser().tokens
         places = [(part, stretch) for part in audio.passages for stretch in find_sound(part.audio.log_energy)]
         chosen = each if sum(stretch.end - stretch.first for _, stretch in places) > SHORT_FRAMES else map
         sounds = (read_stretch(part.audio, stretch) for part, stretch in places)
-        rows = chosen(partial(infer_stretch, name), sounds)
+        rows = chosen(infer_stretch, sounds)
         by_passage: dict[int, list[PosteriorStretch]] = {part.first: [] for part in audio.passages}
         for (part, stretch), values in zip(places, rows, strict=True):
             posteriors = PhonePosteriors(values.astype(np.float32), tokens)
@@ -171,7 +154,7 @@ def find_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> 
             return by_passage[0]
         placed = []
         for part in audio.passages:
-            part.audio.cached(key, partial(by_passage.__getitem__, part.first))
+            part.audio.cached("posteriors", partial(by_passage.__getitem__, part.first))
             for (first, end), posteriors in by_passage[part.first]:
                 start, stop = max(part.first + first, part.own.start), min(part.first + end, part.own.stop)
                 skipped = -(-(start - part.first - first) // POSTERIOR_STEP)
@@ -180,7 +163,7 @@ def find_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> 
                     placed.append(PosteriorStretch(Stretch(start, stop), PhonePosteriors(values, tokens)))
         return placed
 
-    return audio.cached(key, compute)
+    return audio.cached("posteriors", compute)
 
 
 def mean_posterior(stretches: Sequence[PosteriorStretch]) -> float:
@@ -190,24 +173,21 @@ def mean_posterior(stretches: Sequence[PosteriorStretch]) -> float:
     return float(np.dot(counts, means) / max(sum(counts), 1))
 
 
-def read_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> PhonePosteriors:
-    """Return the posteriors in the whole of a recording; where there is no sound, nothing is said.
-
-    name, each : as of ``find_stretches``, whose errors it raises
-    """
+def read_posteriors(audio: AnalysedAudio, each: ParallelMap = map) -> PhonePosteriors:
+    """Return the posteriors in the whole of a recording; where there is no sound, nothing is said."""
 
     def joined() -> PhonePosteriors:
-        return PhonePosteriors(np.asarray(_join_posteriors(name, audio, each)), load_phone_recogniser(name).tokens)
+        return PhonePosteriors(np.asarray(_join_posteriors(audio, each)), load_phone_recogniser().tokens)
 
-    return audio.cached(f"all posteriors of {name}", joined)
+    return audio.cached("all posteriors", joined)
 
 
-def _join_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap) -> JoinedRows:
-    tokens = load_phone_recogniser(name).tokens
+def _join_posteriors(audio: AnalysedAudio, each: ParallelMap) -> JoinedRows:
+    tokens = load_phone_recogniser().tokens
     silence = np.full(len(tokens), MIN_LOG_POSTERIOR, np.float16)  # as stretches are computed
     silence[tokens.index(BLANK)] = 0
     rows, end, parts = -(-audio.frames // POSTERIOR_STEP), 0, list[NDArray[np.float16]]()
-    for stretch, posteriors in find_stretches(name, audio, each):
+    for stretch, posteriors in find_stretches(audio, each):
         first = stretch.first // POSTERIOR_STEP
         if first < end:  # the last row of the one before
             parts[-1] = parts[-1][: first - end]
@@ -217,26 +197,24 @@ def _join_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap) -> Join
     return JoinedRows([*parts, np.broadcast_to(silence, (rows - end, len(tokens)))])
 
 
-def infer_posteriors(name: str, audio: Audio, each: ParallelMap = map, *, dense: bool = True) -> TokenPosteriors:
+def infer_posteriors(audio: Audio, each: ParallelMap = map, *, dense: bool = True) -> TokenPosteriors:
     """Return the posteriors in a recording as the input of an engine.
 
-    audio      : an ``AnalysedAudio`` shares them with what recognises its phones
-    name, each : as of ``find_stretches``, whose errors it raises
-    dense      : whether the values are an array; False: ``JoinedRows``
+    audio : an ``AnalysedAudio`` shares them with what recognises its phones
+    dense : whether the values are an array; False: ``JoinedRows``
     """
     audio = analysed(audio)
-    values: Any = read_posteriors(name, audio, each).values if dense else _join_posteriors(name, audio, each)
-    mean = mean_posterior(find_stretches(name, audio, each))
-    return TokenPosteriors(values, load_phone_recogniser(name).source, mean)
+    values: Any = read_posteriors(audio, each).values if dense else _join_posteriors(audio, each)
+    return TokenPosteriors(values, load_phone_recogniser().source, mean_posterior(find_stretches(audio, each)))
 
 
-def infer_stretch(name: str, samples: bytes) -> NDArray[np.float16]:
+def infer_stretch(samples: bytes) -> NDArray[np.float16]:
     """Return natural logarithms of the posteriors of a stretch of sound [shape=(N, K)].
 
     samples : 16-bit integers at 16 kHz
     """
     numbers = from_sixteen_bits(np.frombuffer(samples, "<i2"))
-    return load_phone_recogniser(name).log_posteriors(numbers).astype(np.float16)
+    return load_phone_recogniser().log_posteriors(numbers).astype(np.float16)
 
 
 @cache
@@ -250,45 +228,3 @@ def _sum_phones(tokens: tuple[str, ...]) -> NDArray[np.float32]:
         if not phones:
             table[number, -1] = 1
     return table
-
-
-LIBRARIES = {("linux", "x86_64"), ("linux", "aarch64"), ("darwin", "x86_64"), ("darwin", "arm64")}
-"""Systems and processors that the package has a library for."""
-WEIGHTS = "asr_waveform.hama"
-MIN_SAMPLES = 1600
-"""Shorter sound is filled up with silence: the network has no row for it."""
-
-
-@final
-class Hama(PhoneRecogniser):
-    """The phone recogniser of the package ``hama`` (Apache-2.0)."""
-
-    name: ClassVar[str] = "hama"
-
-    def __init__(self) -> None:
-        self.tokens = tuple(_model().decoder_tokens)
-        weights = (resources.files("hama") / "assets" / WEIGHTS).read_bytes()
-        self.source = f"{self.name} {metadata.version(self.name)} {sha256(weights).hexdigest()[:12]}"
-
-    @classmethod
-    def is_installed(cls) -> bool:
-        """Return whether the package is installed, and has a library for this machine."""
-        return (sys.platform, platform.machine()) in LIBRARIES and find_spec("hama") is not None
-
-    def log_posteriors(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return natural logarithms of the posteriors, as ``PhoneRecogniser.log_posteriors``."""
-        filled = np.pad(samples, (0, max(0, MIN_SAMPLES - len(samples)))).astype(np.float32)
-        values, rows = _model().session.run(
-            ["log_probs", "out_lengths"],
-            {"waveform": filled[None], "waveform_lengths": np.array([len(filled)], np.int64)},
-        )
-        posteriors: NDArray[np.float32] = np.asarray(values, np.float32).reshape(-1, len(self.tokens))
-        return posteriors[: int(rows[0])]
-
-
-@cache
-def _model() -> Any:
-    """Return the network of this process; it is loaded once."""
-    from hama.asr import ASRModel
-
-    return ASRModel()
