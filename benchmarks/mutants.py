@@ -34,13 +34,11 @@ PARTS = """.ci CHANGELOG.md CITATION.cff CONTRIBUTING.md LICENSE Makefile README
 extras pyproject.toml requirements scripts src tests""".split()
 """What tests may look at, as far as the tree has it."""
 ALL = ("tests",)
-SHARED = "shared"
-"""Recordings beside the tree; the copy gets a link to them."""
+SHARED = "shared"  # recordings beside the tree; the copy gets a link to them
 PASSED, FAILED, BROKEN, NOTHING = 0, 1, 2, 5
 """Exit codes of pytest; ``BROKEN``: a test file cannot be imported, ``NOTHING``: no test was left to run."""
 DID_NOT_END = "(did not end)"
-PATIENCE_S = 60
-"""How long pytest may take to tell what failed so far."""
+PATIENCE_S = 60  # how long pytest may take to tell what failed so far
 FAILURE = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
 
 

@@ -20,16 +20,12 @@ Pictures = NDArray[np.uint8] | NDArray[np.floating[Any]]
 Mask = NDArray[np.bool_]
 Curve = NDArray[np.float64]
 
-WHITE = 255
-"""The largest level of a colour."""
-EQUAL_DB = 100.0
-"""Stated for equal pictures."""
-WINDOW_PX = 1.5
-"""Standard deviation of the window of ``structural_similarity``. Source: Wang et al. 2004."""
+WHITE = 255  # the largest level of a colour
+EQUAL_DB = 100.0  # stated for equal pictures
+WINDOW_PX = 1.5  # standard deviation of the window of ``structural_similarity``. Source: Wang et al. 2004
 STABLE = (0.01, 0.03)
 """Constants of ``structural_similarity`` that keep its fractions stable, as shares of the largest grey level."""
-NEAR_PX = 1.0
-"""The outline of a region is where its edge is at most this far away: interpolation spreads a step so far."""
+NEAR_PX = 1.0  # the outline of a region is where its edge is at most this far away: interpolation spreads a step so far
 APART_PX, BESIDE_PX = 2.0, 6.0
 """The skin beside an outline is from the first to the second of these distances from it, on either side."""
 

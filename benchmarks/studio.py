@@ -56,8 +56,7 @@ from studio.served import Served, lost_edits, served  # noqa: E402
 from studio.two_clients import walk  # noqa: E402
 from testing.toy import toy_sentences  # noqa: E402
 
-RECOGNISED_S = 100.0
-"""In longer recordings phones are repeated, not recognised."""
+RECOGNISED_S = 100.0  # in longer recordings phones are repeated, not recognised
 STEPS_OF_A_WALK = 80
 EDITS, FEW_EDITS = 40, 10
 """Edits of which the time is taken, after some that load what they need; of longer recordings fewer."""

@@ -66,10 +66,8 @@ from lipmotion.units.phones import count_phone_edits
 from lipmotion_faces.corpus.folder import spell_name
 
 RATE_HZ, NOISE_DB, LONGEST_PAUSE_S, LOST_S = 16_000, -30, 3.0, 0.5
-Row = tuple[str, float, float]
-"""A word, its start and its end in seconds."""
-Said = tuple[NDArray[np.float32], tuple[str, ...]]
-"""Samples, and the words that are said."""
+Row = tuple[str, float, float]  # a word, its start and its end in seconds
+Said = tuple[NDArray[np.float32], tuple[str, ...]]  # samples, and the words that are said
 Hearing = Callable[[NDArray[np.float32]], NDArray[np.float64]]
 """Samples to log posteriors of phones and blank [shape=(T, 48)]."""
 HEARD_S, PIECE_S = POSTERIOR_STEP / FRAME_RATE_HZ, 25

@@ -77,10 +77,8 @@ from lipmotion_lab.evaluation.evaluate import BILABIAL
 
 Array = NDArray[np.float64]
 Span = tuple[float, float]
-LIPS = (slice(None), slice(16, 40), slice(16, 56))
-"""The part of the mouth region in which lips and teeth are."""
-UNTOUCHED_FRAMES = 30
-"""Rows of pixels from the top that no way changes."""
+LIPS = (slice(None), slice(16, 40), slice(16, 56))  # the part of the mouth region in which lips and teeth are
+UNTOUCHED_FRAMES = 30  # rows of pixels from the top that no way changes
 DISTANCES = ("opening", "width", "outer")
 INTERVALS = ("psnr_db", "ssim", "sharpness", "flicker", "seam_ratio", "acc_opening", "driver_opening", "landmarks")
 

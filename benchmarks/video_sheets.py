@@ -18,12 +18,9 @@ Pictures = NDArray[np.uint8]
 Pair = tuple[Pictures, Pictures]
 BOX = (-75, -45, 75, 135)
 """Left, upper, right and lower edge of what is shown, px from the point between the eyes, which are 90 px apart."""
-SHOWN = (225, 270)
-"""Width and height of a picture in a sheet, px."""
-LINE = 16
-"""Height of a line of text, px."""
-ROW = 9
-"""Pictures in a row."""
+SHOWN = (225, 270)  # width and height of a picture in a sheet, px
+LINE = 16  # height of a line of text, px
+ROW = 9  # pictures in a row
 
 
 @dataclass(eq=False)

@@ -34,14 +34,11 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Pictures = NDArray[np.uint8]
 
-AROUND_PX = 12
-"""What is seen around the lower face, so that skin beside what replaces it can be measured."""
+AROUND_PX = 12  # what is seen around the lower face, so that skin beside what replaces it can be measured
 LOWER_FACE = (lower_face.HEIGHT + 2 * AROUND_PX, lower_face.WIDTH + 2 * AROUND_PX)
 """Height and width of the aligned part of the face in which seams are measured, px; the eyes are 90 px apart."""
-MOUTH = (slice(28, 28 + MOUTH_HEIGHT), slice(40, 40 + MOUTH_WIDTH))
-"""The mouth region in it."""
-CROSSED = "crossed"
-"""What drives a way: the track of another clip."""
+MOUTH = (slice(28, 28 + MOUTH_HEIGHT), slice(40, 40 + MOUTH_WIDTH))  # the mouth region in it
+CROSSED = "crossed"  # what drives a way: the track of another clip
 LIP_CHANNELS = tuple(f"{axis}_{index}" for index in LIP_POINTS for axis in "xy")
 RIDGE = 1e-4
 """Share of the mean variance of the lip points that the ridge regression of eigenlips adds to each variance."""

@@ -87,16 +87,14 @@ SILENCE_S, MARGIN_S, MIN_S, LONGEST_S = 0.8, 0.3, 1.2, 20.0
 the longest piece of a recording."""
 GAIN_DB, LARGEST_WARP, VERSIONS = (-14.0, 6.0), 0.16, 8
 """What is heard: as loud as is drawn, as it is, by other vocal tracts, and half of the time in a condition."""
-VISEME_SCALE = 3.0
-"""What is said is learned with deviations about as large as those of the motion."""
+VISEME_SCALE = 3.0  # what is said is learned with deviations about as large as those of the motion
 MICROPHONE_DB, MICROPHONE_KNOTS = 4.0, 6
 LARGEST_GAIN, CURVE_CLIPS, BABBLE = 1.6, 40, 40
 PIECE_STEPS, HELD_OUT = 250, 20
 """Steps of a piece for training; and one in so many recordings measures the errors instead."""
 WEIGHTS_OF = dict.fromkeys(ARTICULATORS, 1.0) | {"opening": 4.0, "width": 3.0, "outer": 2.0}
 Array = NDArray[np.float32]
-Job = tuple[Audio, Track | None, str | None]
-"""A recording, its track, its words."""
+Job = tuple[Audio, Track | None, str | None]  # a recording, its track, its words
 GENERAL_STEPS, GENERAL_EVERY = 3500, 2
 """Of the optimiser for the general network, and steps of lessons from one of its own steps to the next."""
 

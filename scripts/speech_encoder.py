@@ -36,8 +36,7 @@ from lipmotion.types import Audio
 NETWORK = "pipecat/audio/turn/smart_turn/data/smart-turn-v3.2-cpu.onnx"
 DIGEST = "2bb026316b14a660486a75b1733cd3fbab8c2fd0314dc9af7be49f8cca967e4f"
 OUTPUT = Path(__file__).parents[1] / "src" / "lipmotion" / "models" / WEIGHTS
-QUERY_SCALE = 1 / 8
-"""Scores of attention are divided by the root of the 64 values of a head."""
+QUERY_SCALE = 1 / 8  # scores of attention are divided by the root of the 64 values of a head
 VOICE_S, CONDITIONS, OTHERS, SHRINKAGE = 6, 4, 6, 0.1
 """Seconds and conditions of each, voices in its noise, and the weight of the identity in the covariance."""
 Arrays = dict[str, NDArray[Any]]

@@ -18,8 +18,7 @@ from typing import Any
 
 import numpy as np
 
-SHARD_S = 192.0
-"""Speech of a shard: 16 utterances of 12 s."""
+SHARD_S = 192.0  # speech of a shard: 16 utterances of 12 s
 
 
 def measure_stages(options: argparse.Namespace) -> dict[str, Any]:

@@ -20,10 +20,8 @@ from pathlib import Path
 from typing import IO
 
 LIPMOTION = (sys.executable, "-m", "lipmotion.cli.main")
-LIMIT_S = 600.0
-"""A test that hangs fails after this time; none takes a tenth of it, however much else the machine does."""
-ORPHANED_S = 30
-"""How long a process may go on after its limit where nobody is left who kills it."""
+LIMIT_S = 600.0  # a test that hangs fails after this time; none takes a tenth of it, however much else the machine does
+ORPHANED_S = 30  # how long a process may go on after its limit where nobody is left who kills it
 PIPE, NOWHERE, TO_STDOUT = subprocess.PIPE, subprocess.DEVNULL, subprocess.STDOUT
 Child = subprocess.Popen[str]
 Done = subprocess.CompletedProcess[str]

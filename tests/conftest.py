@@ -45,8 +45,7 @@ MAX_HEARD, MAX_HEARD_BYTES = 40, 1_000_000
 """How many sounds are those of which is kept what models said: of the toy, and some before; all of them short."""
 FIXED, EXPLORE = "fixed", "explore"
 """Profiles of Hypothesis: the same examples every time; and ``--hypothesis-profile=explore``: others, and more."""
-MORE_SENTENCES = 10
-"""How many times the examples of a test are tried by ``explore``."""
+MORE_SENTENCES = 10  # how many times the examples of a test are tried by ``explore``
 # How long an example takes depends on what else the machine does; a fixture that examples share is never changed here.
 ANYWHERE = settings(
     deadline=None,

@@ -26,10 +26,8 @@ from lipmotion_faces.tracking.trackers import LIP_POINTS
 Source = str | Path | Motion | Track | Generation
 Array = NDArray[np.float64]
 OPENING = "opening"
-HIGHEST_RATE_HZ = 120.0
-"""Motion of a higher rate is compared at this one."""
-MIN_FRAMES = 4
-"""Without them there is no third difference."""
+HIGHEST_RATE_HZ = 120.0  # motion of a higher rate is compared at this one
+MIN_FRAMES = 4  # without them there is no third difference
 UPPER_FACE = tuple(name for name in ARKIT_OTHERS if name.startswith(("brow", "eyeBlink", "eyeSquint", "eyeWide")))
 
 

@@ -28,8 +28,7 @@ from lipmotion_studio.web.replies import ERRORS, FRESH, HEADERS, Guard, Security
 TOKEN_HEADER = "x-lipmotion-token"  # noqa: S105 # its name
 API = "/api"
 KEY_DIGITS = 32
-FIRST = "studio.html"
-"""The page itself, whose address is empty."""
+FIRST = "studio.html"  # the page itself, whose address is empty
 PAGE_POLICY = HEADERS["content-security-policy"] + (
     "; img-src 'self' blob: data:; media-src 'self' blob:; worker-src 'self' blob:; connect-src 'self' blob:"
 )

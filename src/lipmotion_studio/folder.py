@@ -47,8 +47,7 @@ SUFFIX = ".studio"
 """How the folder of a project ends, beside the recording or the folder of recordings that it was made of."""
 UNTITLED = Path(f"untitled{SUFFIX}")
 MAX_PROJECT_BYTES = 1 << 28
-MAX_NAME = 80
-"""Most characters of the name of a recording that was dropped."""
+MAX_NAME = 80  # most characters of the name of a recording that was dropped
 
 
 class RevisionError(LipMotionError):

@@ -23,8 +23,7 @@ from lipmotion_faces.registry import FACES
 
 HEAD, HEAD_OF_MOODS = "head", "head-moods"
 """The 3D head, and the same with the shapes of moods: motion that has moods moves the second one."""
-TURN = tuple(f"head.rotation.{axis}" for axis in "xyzw")
-"""Names of the numbers of a quaternion that turns the head."""
+TURN = tuple(f"head.rotation.{axis}" for axis in "xyzw")  # names of the numbers of a quaternion that turns the head
 
 
 class Faces:

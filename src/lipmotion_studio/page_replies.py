@@ -45,8 +45,7 @@ MAX_NAMES = 20_000
 BEGINNING = "bytes=0-"
 NUMBERS = ("motion", "delivered", "deviation", "confidence")
 Changed = dict[str, Any]
-Change = Callable[[OpenRecording, int], Changed]
-"""Changes a recording at a revision; returns what moved."""
+Change = Callable[[OpenRecording, int], Changed]  # changes a recording at a revision; returns what moved
 Handler = Callable[[Request], Awaitable[Response]]
 
 
@@ -327,8 +326,7 @@ def _reply_numbers(motion: Motion, first: int, more: dict[str, str]) -> Response
 
 
 MAX_UPLOAD_BYTES = 1 << 29
-UPLOAD_S = 600.0
-"""How long a recording may take to arrive."""
+UPLOAD_S = 600.0  # how long a recording may take to arrive
 MAX_WORD, MAX_PHONES = 60, 60
 ALL = "all"
 NUMBER = values.whole(0, 1 << 31)

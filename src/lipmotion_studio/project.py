@@ -20,8 +20,7 @@ HEADER = ("format", "version", "made_by")
 NO_MARK, APPROVED, REDO = MARKS = ("none", "approved", "redo")
 MAX_RECORDINGS, MAX_TEXT = 100_000, 1 << 24
 MAX_VERSIONS = 100
-EDITS_SUFFIX = "edits.json"
-"""How files of edits end, after the name of the recording and a dot."""
+EDITS_SUFFIX = "edits.json"  # how files of edits end, after the name of the recording and a dot
 
 
 @dataclass(frozen=True)

@@ -39,8 +39,7 @@ from lipmotion_studio.folder import ProjectFolder, check_revision, compute_revis
 from lipmotion_studio.meshes import TURN
 from lipmotion_studio.project import ProjectRecording, digest_edits
 
-MIN_MOVE = 5e-4
-"""Frames whose values differ by less, in the units of the channels, have not moved: 0.03 mm of a mouth."""
+MIN_MOVE = 5e-4  # frames whose values differ by less, in the units of the channels, have not moved: 0.03 mm of a mouth
 MAX_DOUBTS = 200
 LONG_S = 30.0
 """In longer recordings an edit moves the mouth around it at once; the full motion is made when it is asked for."""

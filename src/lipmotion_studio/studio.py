@@ -61,8 +61,7 @@ PLAYED = {
 }
 """What browsers play as it is: the kind of a file by its suffix, and the codecs in it."""
 MP4 = "video/mp4"
-IN_STEP_S = 0.005
-"""Sound and pictures that begin further apart do not begin together."""
+IN_STEP_S = 0.005  # sound and pictures that begin further apart do not begin together
 LOUDNESS_HZ = 100
 """Rate of the loudness by which two sounds are compared: encoders move samples a little, which it hardly shows."""
 
@@ -124,8 +123,7 @@ def write_playable(video: Path, sound: Path, path: Path) -> None:
 
 
 LOG = logging.getLogger("lipmotion")
-OTHER = "other"
-"""What requests call the model that the project's is compared with."""
+OTHER = "other"  # what requests call the model that the project's is compared with
 DIGEST_DIGITS = 8
 
 

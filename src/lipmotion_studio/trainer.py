@@ -29,15 +29,12 @@ from lipmotion_studio.training import FACE, KINDS, VOICE, TrainingOrder, Trainin
 LOG = logging.getLogger("lipmotion")
 TRAINING, STATE = "training", "state.json"
 VOICES, FACES = "voices", "faces"
-PLACES = {VOICE: (VOICES, ".lipmotion"), FACE: (FACES, FACE_SUFFIX)}
-"""Folder and suffix of what is made, by its kind."""
+PLACES = {VOICE: (VOICES, ".lipmotion"), FACE: (FACES, FACE_SUFFIX)}  # folder and suffix of what is made, by its kind
 WORKING, DONE, FAILED, STOPPED, INTERRUPTED = "working", "done", "failed", "stopped", "interrupted"
 FORMAT, VERSION = "lipmotion.training", 1
-MAX_WARNINGS = 200
-"""Warnings, and recordings that are not used, that the page shows."""
+MAX_WARNINGS = 200  # warnings, and recordings that are not used, that the page shows
 MAX_LISTED = 500
-MAX_UNFINISHED = 0.99
-"""The share of the work that is shown, at most, until it is done."""
+MAX_UNFINISHED = 0.99  # the share of the work that is shown, at most, until it is done
 
 
 @dataclass(frozen=True)

@@ -32,10 +32,8 @@ ResultT = TypeVar("ResultT")
 NEW, WAITING, WORKING, READY, FAILED = STATUSES = ("new", "waiting", "working", "ready", "failed")
 MAX_OPEN, MAX_OPEN_S = 12, 3600.0
 """Recordings that stay open, and the seconds of sound in them together: what was used last is closed last."""
-SAVED_EACH = 50
-"""Recordings after which the project is written during analysis; and after the last one."""
-RECENT_S = 60.0
-"""How long a recording that is done, or failed, is listed among those at work."""
+SAVED_EACH = 50  # recordings after which the project is written during analysis; and after the last one
+RECENT_S = 60.0  # how long a recording that is done, or failed, is listed among those at work
 
 
 class NotReadyError(HTTPException):

@@ -14,8 +14,7 @@ import numpy as np
 from pipeline.made import read_welcome
 
 STEP_S = 0.02
-MAMA_S, CLOSED_S = (0.5, 1.1), (0.56, 0.86)
-"""When the tests say "mama", and when the lips are closed in it."""
+MAMA_S, CLOSED_S = (0.5, 1.1), (0.56, 0.86)  # when the tests say "mama", and when the lips are closed in it
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 
 

@@ -10,8 +10,7 @@ from pathlib import Path
 from portable.run import NUMERIC
 
 SOURCE = Path(__file__).parents[2] / "src"
-EMPTY_NAMES = {"utils", "util", "helpers", "helper", "common", "core", "misc"}
-"""Module names without meaning."""
+EMPTY_NAMES = {"utils", "util", "helpers", "helper", "common", "core", "misc"}  # module names without meaning
 PICKLES = {"pickle", "shelve", "marshal", "dill"}
 Rule = Callable[[str], Iterator[int]]
 

@@ -15,8 +15,7 @@ from lipmotion.types import Generation, Speech
 
 Array = NDArray[Any]
 Damage = Callable[[Array], Array]
-LARGEST_DIFFERENCE = 30.0
-"""Spans of what the whole model generates, beyond which motion is absurd."""
+LARGEST_DIFFERENCE = 30.0  # spans of what the whole model generates, beyond which motion is absurd
 
 
 def _one(value: float) -> Damage:

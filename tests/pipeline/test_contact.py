@@ -36,8 +36,7 @@ from testing.toy import ToySentence
 Mask = NDArray[np.bool_]
 Reader = Callable[[Generation, float], Mask]
 RATES = (24.0, 25.0, 30.0, 60.0, 100.0)
-FILES = ("a.vmd", "a.vrma")
-"""Files of vowels that can be read, of one frame rate or any."""
+FILES = ("a.vmd", "a.vrma")  # files of vowels that can be read, of one frame rate or any
 OWN_VOWELS = {"jawOpen": "A", "mouthPucker": "O", "mouthStretchLeft": "E"}
 TOUCHING_GAP = MIN_GAP / 2
 

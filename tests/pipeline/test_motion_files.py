@@ -182,8 +182,7 @@ def _values(rows: list[RigRow] | tuple[RigRow, ...], sources: dict[str, list[flo
     return [sum(row.offset + row.gain * sources.get(row.source, nothing)[n] for row in ours) for n in range(len(POSES))]
 
 
-LEFT_CORNER = "y_291"
-"""A channel of one side of the mouth: an edit may be of that side alone."""
+LEFT_CORNER = "y_291"  # a channel of one side of the mouth: an edit may be of that side alone
 PHONE_FILES = ("a.TextGrid", "a.json", "a.npz")
 
 

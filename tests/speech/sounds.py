@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 LEVEL = 0.25
 ONSET_S = 0.3
-LAYOUTS = ("", "mono", "stereo", "2.1", "quad", "5.0", "5.1", "6.1", "7.1")
-"""By number of channels."""
+LAYOUTS = ("", "mono", "stereo", "2.1", "quad", "5.0", "5.1", "6.1", "7.1")  # by number of channels
 
 
 def tone(rate_hz: int, duration_s: float = 1.0, channels: int = 1) -> NDArray[np.float32]:
@@ -167,8 +166,7 @@ def _crc(content: bytes, polynomial: int, bits: int) -> int:
     return value
 
 
-OPENED = 0x20
-"""``IN_OPEN`` of ``inotify``."""
+OPENED = 0x20  # ``IN_OPEN`` of ``inotify``
 HEADER = struct.Struct("iIII")
 
 

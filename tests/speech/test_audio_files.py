@@ -205,8 +205,7 @@ def test_the_high_byte_first_and_headers_that_end_too_early_are_refused(tmp_path
 
 
 Samples = NDArray[np.float32]
-MS = 16
-"""Samples a millisecond."""
+MS = 16  # samples a millisecond
 
 EXACT = [
     # suffix, codec: no delay, no padding, nothing lost but bits

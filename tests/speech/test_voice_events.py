@@ -12,8 +12,7 @@ def found(audio: Audio, units: Timeline[Unit]) -> list[tuple[str, float, float]]
     return [(event.kind, event.start_s, event.end_s) for event in find_voice_events(audio, units)]
 
 
-PHRASE = (0.5, vowels(pulses(1.5, 120)))
-"""One and a half seconds of plain voice."""
+PHRASE = (0.5, vowels(pulses(1.5, 120)))  # one and a half seconds of plain voice
 
 
 def test_laughter_is_heard_by_its_calls_and_phones_recognised_in_it_become_silence():

@@ -30,8 +30,7 @@ from testing.toy import ToySentence
 EDITS = ("phone 2 is p", "pin opening 0.1 at 0.2", "set intensity 1.1", "remove phone 3", "phone 99 is p")
 """The last one is refused: there is no such phone."""
 MAX_RECORDINGS = 4
-TWO_WORDS_S = 0.4, 1.24
-"""Where the first two words of the sentence are said."""
+TWO_WORDS_S = 0.4, 1.24  # where the first two words of the sentence are said
 
 
 @dataclass

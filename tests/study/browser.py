@@ -21,13 +21,11 @@ PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
 BROWSER = next(filter(None, map(shutil.which, PROGRAMS)), None)
 DRIVER = shutil.which("chromedriver")
 MISSING = "no Chromium with its driver: apt install chromium chromium-driver"
-NEEDED = pytest.mark.skipif(not (BROWSER and DRIVER), reason=MISSING)
-"""For tests of pages."""
+NEEDED = pytest.mark.skipif(not (BROWSER and DRIVER), reason=MISSING)  # for tests of pages
 SPACE, ENTER, LEFT, RIGHT = " ", "\ue007", "\ue012", "\ue014"
 ESCAPE, TAB, SHIFT, CONTROL, UP, DELETE = "\ue00c", "\ue004", "\ue008", "\ue009", "\ue013", "\ue017"
 """Keys, as WebDriver names them."""
-WINDOW_S = 3600.0
-"""A window may stay open that long: all tests of a page share one."""
+WINDOW_S = 3600.0  # a window may stay open that long: all tests of a page share one
 
 
 class Browser:

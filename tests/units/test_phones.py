@@ -11,8 +11,7 @@ from lipmotion.units.phones import CLASSES
 
 SPOKEN = tuple(phone for phone in PHONES if not is_silent(phone))
 VOWELS = frozenset("aa ae ah ao aw ax axr ay eh er ey ih ix iy ow oy uh uw el em en".split())
-UNSAID_IN_GRID = ("er", "hh", "ng", "oy", "sh", "uh", "zh")
-"""What a model of GRID's speaker s1 must borrow."""
+UNSAID_IN_GRID = ("er", "hh", "ng", "oy", "sh", "uh", "zh")  # what a model of GRID's speaker s1 must borrow
 
 
 def steps_to(phone: str) -> dict[str, int]:

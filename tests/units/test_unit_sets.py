@@ -8,8 +8,7 @@ from lipmotion import errors, types
 from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, UnitSet, is_silent, list_phone_classes, load_unit_set
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "unit-sets.md"
-PRINTED = {"2vis": 2, "pbVis": 9, "sVis": 6, "eVis": 19, "phone": 46}
-"""Hofer 2008, Table 1."""
+PRINTED = {"2vis": 2, "pbVis": 9, "sVis": 6, "eVis": 19, "phone": 46}  # Hofer 2008, Table 1
 SPOKEN = tuple(phone for phone in PHONES if not is_silent(phone))
 DIPHTHONGS = {"aw", "ay", "ey", "ow", "oy"}
 VOWELS = set("aa ae ah ao ax axr eh er ih ix iy uh uw".split()) | DIPHTHONGS

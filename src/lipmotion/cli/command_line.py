@@ -31,8 +31,7 @@ VERBS: Registry[Callable[[Any], None]] = Registry("verb", "lipmotion.verbs", _PL
 """What adds each verb to the parser; those of faces, studio and lab are entry points."""
 MIN_LIKENESS = 0.7
 """So alike must an option be to one that does not exist to be suggested: ``--force`` is not meant by ``--voice``."""
-NUMBER = re.compile(r"-\d+|-\d*\.\d+")
-"""A negative number, which is no option."""
+NUMBER = re.compile(r"-\d+|-\d*\.\d+")  # a negative number, which is no option
 EXIT_CODES = """exit codes: 0 done, 1 a bug (doctor: a broken part), 2 wrong command line, 3 unusable input, 4 corpus,
 5 alignment, 6 model file, 7 output, 8 missing package, 130 interrupted, 143 terminated"""
 

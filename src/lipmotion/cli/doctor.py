@@ -44,8 +44,7 @@ LOUDNESS = ((0.3, 0.0), (0.09, 0.25), (0.16, 1.0), (0.09, 0.25), (0.1, 1.0), (0.
 """Durations in seconds, and levels, of a made-up second of speech: silence, m, a, m, a, silence."""
 CLOSED, OPEN = ((260, 70),), ((730, 70), (1090, 100), (2440, 160))
 """Resonances of the mouth in m and in a: their frequencies and widths, Hz (Klatt 1980)."""
-MIN_OPENING = 0.03
-"""Opening of the lips that *mama* has at least, in distances between the outer eye corners."""
+MIN_OPENING = 0.03  # opening of the lips that *mama* has at least, in distances between the outer eye corners
 OPENCV = "opencv-python-headless"
 OPENCV_HINT = (
     "another OpenCV lies over it, as pip installs with MediaPipe; without it: requirements/video.txt (docs/start.md)"

@@ -111,8 +111,7 @@ LAGS = (-1, 2, 6, 14, 30)
 """How many steps ago the answers of a step are about: for look-aheads of 0, 80, 160, 320 and 640 ms."""
 HEARD_S = (STEP_FRAMES - 1) / FRAME_RATE_HZ + WINDOW / 2 / SPEECH_RATE_HZ
 """So much after its time the sound of a step has come."""
-OUTPUTS = len(ARTICULATORS) + len(VISEMES_15)
-"""Values of an answer: articulators, and how probable each viseme is."""
+OUTPUTS = len(ARTICULATORS) + len(VISEMES_15)  # values of an answer: articulators, and how probable each viseme is
 SHAPE = ConvolutionalShape("live", "live-network", STEP_FRAMES * (SPECTRUM_BANDS + 1), 256, (1, 2, 4, 8, 16, 1, 2, 4))
 """It hears the last 1.5 s."""
 START_LEVEL, QUIETEST_LEVEL = 1.0, -2.0

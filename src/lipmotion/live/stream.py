@@ -40,8 +40,7 @@ from lipmotion.units.lexicon import Lexicon
 
 Array = NDArray[np.float64]
 LONGEST_LOOK_AHEAD_MS = 640.0
-SPOKEN, SILENT = 0.8, 0.82
-"""Probability of silence under which the mouth speaks, and from which on it goes to rest."""
+SPOKEN, SILENT = 0.8, 0.82  # probability of silence under which the mouth speaks, and from which on it goes to rest
 AHEAD_STEPS = 8
 """Lips part before they are heard: as far as so many steps are known, 160 ms, it rests only if all are silent."""
 REST_STEPS, START_STEPS = 5, 3  # steps in which it rests, 100 ms, and in which it begins to speak
@@ -50,8 +49,7 @@ CLOSING_STEPS, OPENING_STEPS = 2, 4
 """Steps in which they close, also where it is seen late, and in which they open again: 40 and 80 ms."""
 LARGEST_MOVE = 0.08
 """The opening changes by at most so much in a step, eye distances: GRID's s1 is faster in one of 10,000 steps."""
-TIMED_SHARE = 0.3
-"""Weight of phones that are given with their times in the articulators; the rest is what is heard."""
+TIMED_SHARE = 0.3  # weight of phones that are given with their times in the articulators; the rest is what is heard
 CORRELATED_STEPS = 0.02  # the network's errors are alike for about so many steps
 ANSWER_STEPS, POSE_FRAMES = LAGS[-1] + 3, 500
 OPENING_ROW, SILENT_ROW = ARTICULATORS.index("opening"), VISEMES_15.index("sil")

@@ -15,8 +15,7 @@ from lipmotion.types.delivery import Delivery, MoodKey, Staging, format_moods, p
 from lipmotion.types.values import describe_value, parse_number, parse_whole
 from lipmotion.units import PHONES, Pronunciation, describe_unknown_phone, is_silent, split_words
 
-MIN_PHONE_S = 0.01
-"""Shortest phone that an edit may leave."""
+MIN_PHONE_S = 0.01  # shortest phone that an edit may leave
 
 
 class Text(str):
@@ -271,8 +270,7 @@ class WordsSaidSo(WordsSaid):
         return {word: tuple(phones) for word, *phones in filter(None, parts)}
 
 
-WordStep = WordIs | WordSaid | WordsSaid
-"""Edits of words, whose phones are aligned with the sound."""
+WordStep = WordIs | WordSaid | WordsSaid  # edits of words, whose phones are aligned with the sound
 
 
 @dataclass(frozen=True)

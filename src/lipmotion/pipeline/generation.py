@@ -64,14 +64,10 @@ trained. 0.80 of the phones of espeak-ng's sentences in nine languages are phone
 (docs/results/languages.md)."""
 RAMP_FRAMES = 12
 """Frames beside a passage in which the mouth comes from rest, or goes there; within it, where another one is near."""
-NOWHERE_S = 1e6
-"""Nothing that is detected or pinned lies so long before a recording."""
-LONG_SILENCE_S = 10.0
-"""A passage has silence before and after it; it counts as so much more."""
-REST_FRAMES = 100
-"""So much silence is animated to know the rest between passages."""
-REACH_FRAMES = 10
-"""Frames on both sides of a pin over which a value is reached that motion does not take by itself."""
+NOWHERE_S = 1e6  # nothing that is detected or pinned lies so long before a recording
+LONG_SILENCE_S = 10.0  # a passage has silence before and after it; it counts as so much more
+REST_FRAMES = 100  # so much silence is animated to know the rest between passages
+REACH_FRAMES = 10  # frames on both sides of a pin over which a value is reached that motion does not take by itself
 
 
 def generate_motion(
@@ -393,12 +389,10 @@ def _join_units(
     return Timeline(tuple(spans))
 
 
-MARGIN_S = 2.5
-"""Motion is computed so far before and after an edit; a second from an edit it hardly depends on it."""
+MARGIN_S = 2.5  # motion is computed so far before and after an edit; a second from an edit it hardly depends on it
 GRID_S = 2.0
 """Excerpts begin and end at multiples of this, so that those of edits that are near to one another are the same."""
-LONGEST_S = 40.0
-"""If edits lie further apart, the full motion is computed."""
+LONGEST_S = 40.0  # if edits lie further apart, the full motion is computed
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.outputs.output import Output, OutputSettings, ShownFace
     from lipmotion.types import Audio, Generation
 
-RECOGNITION = 0.3
-"""The share of the work that is recognition, where a video is drawn, too."""
+RECOGNITION = 0.3  # the share of the work that is recognition, where a video is drawn, too
 
 
 @dataclass(frozen=True)
@@ -222,8 +221,7 @@ def write_outputs(
     write_files(performance, job.outputs.files, temporary=temporary)
 
 
-NAME = "{name}"
-"""In the path of an output, the name of the recording without its suffix."""
+NAME = "{name}"  # in the path of an output, the name of the recording without its suffix
 
 
 def list_recordings(paths: Sequence[Path]) -> list[Path]:

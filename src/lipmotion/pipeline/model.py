@@ -191,8 +191,7 @@ _OPTIONAL: dict[str, tuple[Any, Any]] = {
     "speakers": (speakers_to_arrays, speakers_from_arrays),
 }
 """Parts that a model may lack, each with what makes arrays of it, and it of arrays."""
-_FOLDERS = ("phones", "engine", "prior", *_OPTIONAL)
-"""Prefixes of the names of all arrays."""
+_FOLDERS = ("phones", "engine", "prior", *_OPTIONAL)  # prefixes of the names of all arrays
 _OWN_KEYS = ("format", "version", "engine", "configuration", "recogniser", "prior")
 """Keys of the header that are not part of ``Model.about``."""
 

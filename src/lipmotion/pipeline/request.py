@@ -34,8 +34,7 @@ Overlay = Literal["inset", "mouth"]
 Refinement = Literal["steady", "paper"]
 Mark = Literal["metadata", "visible", "none"]
 
-RATE = Rule(1, most=1000, unit=" a second")
-"""Frame rates of a file; a mistyped rate must not fill the memory."""
+RATE = Rule(1, most=1000, unit=" a second")  # frame rates of a file; a mistyped rate must not fill the memory
 
 
 def _file(reads: str, metavar: str, help: str, **more: Any) -> Any:
@@ -190,8 +189,7 @@ class Request(Configuration):
                     raise InputError(f"a unit is {shorten(repr(span.label))}, required a Unit: Unit('p')")
 
 
-SpeechInput: TypeAlias = "str | Path | Audio | Request"
-"""A recording alone, or a request."""
+SpeechInput: TypeAlias = "str | Path | Audio | Request"  # a recording alone, or a request
 
 
 def as_request(

@@ -71,8 +71,7 @@ if TYPE_CHECKING:
 
 ResultT = TypeVar("ResultT")
 
-ANALYSIS = 0.9
-"""The share of the work that is recognition, in reports; the rest is the generation of motion."""
+ANALYSIS = 0.9  # the share of the work that is recognition, in reports; the rest is the generation of motion
 MODELLED = ("opening", "width", "outer")
 """Channels, beside weights, that models generate as they are, so that motion runs smoothly through their pins."""
 USUAL_CACHED, MIN_CACHED = 4, 2
@@ -82,13 +81,11 @@ MAX_CACHED = {"aligned": 1000, "locked": 1000}
 it and is used again after every edit."""
 MAX_CACHED_FRAMES = 60_000
 """Frames of motion that a stage holds together, as long as these are more than ``MIN_CACHED`` results."""
-INTERACTIVE = 3
-"""A session that generates motion for the third time will do so often: kernels are loaded that pay then."""
+INTERACTIVE = 3  # a session that generates motion for the third time will do so often: kernels are loaded that pay then
 NO_EDITS = Edits()
 MotionKey = tuple[tuple[Step, ...], tuple[Pin, ...]]
 """Edits of phones and words, and pins that the model takes: what the engine's motion depends on."""
-UnitStep = PhoneStep | WordStep | LockStep | UnlockStep
-"""Edits that change phones, or keep others from changing them."""
+UnitStep = PhoneStep | WordStep | LockStep | UnlockStep  # edits that change phones, or keep others from changing them
 
 
 class Cache:

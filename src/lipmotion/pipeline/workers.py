@@ -277,11 +277,9 @@ def _work_alone(function: Callable[[ItemT], ResultT], numbered: tuple[int, ItemT
 
 
 LOG = logging.getLogger("lipmotion")
-UTTERANCES_PER_WORKER = 32
-"""Smallest number of utterances for which a further process is started."""
+UTTERANCES_PER_WORKER = 32  # smallest number of utterances for which a further process is started
 CONNECT_S = 20
-ITEMS_AHEAD = 4
-"""Items a worker of a cluster that are sent ahead, so that none waits, and memory is flat."""
+ITEMS_AHEAD = 4  # items a worker of a cluster that are sent ahead, so that none waits, and memory is flat
 
 
 Pool: TypeAlias = ParallelMap

@@ -25,8 +25,7 @@ from lipmotion_lab.report.html import Html, add_caption, build_page, element, jo
 from lipmotion_lab.report.section import Section, write_text
 
 FPS = 25.0
-MOUTH_SCALE = 4
-"""Mouth pictures of a corpus are enlarged by this factor."""
+MOUTH_SCALE = 4  # mouth pictures of a corpus are enlarged by this factor
 STAGING = Staging(size=640, blinks=False, gaze=False, brows=False, head=False)
 """Only the mouth moves, so that nothing else differs between systems."""
 LOWER_FACE = (slice(340, 340 + MOUTH_SCALE * MOUTH_HEIGHT), slice(176, 176 + MOUTH_SCALE * MOUTH_WIDTH))

@@ -25,13 +25,11 @@ if TYPE_CHECKING:
     from websockets.http11 import Request, Response
 
 PORT = 8765
-QUEUED = 1000
-"""Messages that wait for a slow client; beyond these the oldest are dropped."""
+QUEUED = 1000  # messages that wait for a slow client; beyond these the oldest are dropped
 CLOSE_S, REPLY_S = 1.0, 600.0
 """How long a client may take what was sent, and close, when the stream ends; and how long a reply may take: a busy
 machine makes the head in minutes."""
-MAX_BYTES = 1 << 12
-"""The longest message that a client may send."""
+MAX_BYTES = 1 << 12  # the longest message that a client may send
 LOCAL = r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?"
 """Origins of pages that may listen: those of this machine. Any other site could overhear a microphone."""
 LOG = logging.getLogger("lipmotion")

@@ -24,15 +24,12 @@ from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
 from lipmotion_studio.live.servers import Server, open_server, to_pcm_16
 
 PORT = 8766
-RATES_HZ = (8_000, 96_000)
-"""Sampling rates that ``streamStart`` takes."""
+RATES_HZ = (8_000, 96_000)  # sampling rates that ``streamStart`` takes
 STEP_MS = 1000 * STEP_S
-AHEAD = 10
-"""Frames that are sent before any is heard, so that no gap is heard where one comes late: 200 ms."""
+AHEAD = 10  # frames that are sent before any is heard, so that no gap is heard where one comes late: 200 ms
 PAUSE = 50
 """Silent frames after which the next speech begins anew, so that the clocks of sound and mouth stay together: 1 s."""
-SILENT = 0.5
-"""Weight of the viseme of silence from which on a frame is silent."""
+SILENT = 0.5  # weight of the viseme of silence from which on a frame is silent
 
 
 class TalkingHead:

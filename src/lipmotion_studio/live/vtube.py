@@ -28,10 +28,8 @@ from lipmotion_studio.live.servers import CLOSE_S, check_installed, run_in_backg
 
 PORT = 8001
 PLUGIN = {"pluginName": "lipmotion", "pluginDeveloper": "lipmotion"}
-AGAIN_S = 1.0
-"""How long after it was not there VTube Studio is looked for again."""
-OPEN_JAW = 0.5
-"""Weight of ``jawOpen`` at which ``MouthOpen`` is 1: nobody opens the jaw wider while speaking."""
+AGAIN_S = 1.0  # how long after it was not there VTube Studio is looked for again
+OPEN_JAW = 0.5  # weight of ``jawOpen`` at which ``MouthOpen`` is 1: nobody opens the jaw wider while speaking
 MADE = {
     "JawOpen": (0, 1),
     "MouthFunnel": (0, 1),

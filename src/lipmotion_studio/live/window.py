@@ -34,15 +34,12 @@ if TYPE_CHECKING:
     from websockets.http11 import Request, Response
 
 PORT = 8767
-FIRST = "live/live.html"
-"""The page, whose address is empty."""
+FIRST = "live/live.html"  # the page, whose address is empty
 HEAD_FILE = "head.glb"
-READY = "ready"
-"""What the page says when it shows what comes."""
+READY = "ready"  # what the page says when it shows what comes
 TURN = tuple(f"head.rotation.{axis}" for axis in "xyzw")
 """Names of the quaternion that turns the head, as the page knows them."""
-REJOIN_S = 1.5
-"""A page that is open from before connects again within this time, and no other one is opened."""
+REJOIN_S = 1.5  # a page that is open from before connects again within this time, and no other one is opened
 FILE_HEADERS = {
     "content-security-policy": "default-src 'self'; img-src 'self' blob: data:; connect-src 'self' ws: blob:; "
     "base-uri 'none'; form-action 'none'; object-src 'none'",

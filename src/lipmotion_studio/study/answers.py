@@ -15,10 +15,8 @@ from lipmotion.storage.text_table import as_field, from_field
 from lipmotion.types.values import parse_number, parse_whole
 
 PAIRED, MOS = KINDS = ("paired", "mos")
-FIRST, SECOND = "first", "second"
-"""Values of a paired comparison: which of the two videos was preferred."""
-RECORDING = "recording"
-"""The condition that is the real recording, hidden among the others."""
+FIRST, SECOND = "first", "second"  # values of a paired comparison: which of the two videos was preferred
+RECORDING = "recording"  # the condition that is the real recording, hidden among the others
 ANCHOR = "anchor"
 """The condition whose lips are out of step with the sound on purpose: who does not see that does not watch."""
 HIGHEST_MOS = 5

@@ -92,12 +92,9 @@ def check_sheet(study: Study, trials: list[StudyTrial], rater: int, content: Any
     return AnswerSheet(rater, sheet["trial"], values, seconds, sum(sheet["plays"]))
 
 
-FIRST = "study.html"
-"""The page itself, whose address is empty."""
-ANSWER_HZ, ANSWER_BURST = 5.0, 60
-"""Requests a second of one rater: nobody judges videos faster."""
-JOIN_HZ, JOIN_BURST = 5.0, 200
-"""New raters a second, of all addresses together: a class that begins at once fits in."""
+FIRST = "study.html"  # the page itself, whose address is empty
+ANSWER_HZ, ANSWER_BURST = 5.0, 60  # requests a second of one rater: nobody judges videos faster
+JOIN_HZ, JOIN_BURST = 5.0, 200  # new raters a second, of all addresses together: a class that begins at once fits in
 WELL_KEPT = {"cache-control": "private, max-age=86400, immutable"}
 
 

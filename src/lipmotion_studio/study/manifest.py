@@ -156,8 +156,7 @@ _STUDY = value_of(Study, _MEMBERS, _MEMBERS)
 
 
 PlaceT = TypeVar("PlaceT")
-VideoNumbers = Mapping[tuple[str, str], int]
-"""The number of the video of a sentence and a condition."""
+VideoNumbers = Mapping[tuple[str, str], int]  # the number of the video of a sentence and a condition
 
 
 def shuffle(items: Iterable[PlaceT], *key: object) -> list[PlaceT]:

@@ -9,8 +9,7 @@ from lipmotion.errors import InputError
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion_studio.study.answers import MOS, PAIRED
 
-PREFERENCE = "preference"
-"""The question of a paired comparison."""
+PREFERENCE = "preference"  # the question of a paired comparison
 SCALES = {
     "smoothness": "Does the mouth move smoothly, without jumps or trembling?",
     "closure": "Do the lips close where they should, as in m, b and p, and only there?",

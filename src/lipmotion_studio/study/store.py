@@ -25,10 +25,8 @@ Work = Callable[[sqlite3.Connection], Any]
 ANSWERS = "answers.sqlite"
 SCHEMA_VERSION = 1
 MAX_RATERS = 100_000
-MAX_TOGETHER = 256
-"""Most pieces of work that are committed together."""
-BUSY_S = 30.0
-"""How long another process, such as ``forget``, is waited for."""
+MAX_TOGETHER = 256  # most pieces of work that are committed together
+BUSY_S = 30.0  # how long another process, such as ``forget``, is waited for
 _SCHEMA = """
 CREATE TABLE study (manifest_sha256 TEXT NOT NULL);
 CREATE TABLE raters (number INTEGER PRIMARY KEY AUTOINCREMENT, token_sha256 TEXT NOT NULL UNIQUE);

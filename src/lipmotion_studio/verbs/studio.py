@@ -10,8 +10,7 @@ from lipmotion.cli.arguments.declared import add_input, add_output
 from lipmotion.cli.terminal.printing import flush_output, print_line
 
 TOKEN_BYTES = 24
-NAMES = ("127.0.0.1", "localhost")
-"""What browsers on this machine may call the server; it listens at the first."""
+NAMES = ("127.0.0.1", "localhost")  # what browsers on this machine may call the server; it listens at the first
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -13,8 +13,7 @@ HEADERS_S, IDLE_S, STALLED_S = 5.0, 20, 30.0
 """How long the headers of a request may take; a connection is kept after a reply; and a reply may wait for its client,
 before that is asked to have taken ``MIN_BYTES_S`` meanwhile."""
 MIN_BYTES_S = 4096.0
-FIRST_READ_S = 0.1
-"""After which the request of a new connection has been read, where it came with it."""
+FIRST_READ_S = 0.1  # after which the request of a new connection has been read, where it came with it
 
 
 class PunctualConnection(H11Protocol):

@@ -129,8 +129,7 @@ def reply_json(content: Any, status: int = 200) -> Response:
 
 
 MAX_JSON_BYTES = 1 << 14
-BODY_S = 10.0
-"""How long the body of a request may take to arrive."""
+BODY_S = 10.0  # how long the body of a request may take to arrive
 
 
 async def read_json(request: Request, largest: int = MAX_JSON_BYTES) -> Any:

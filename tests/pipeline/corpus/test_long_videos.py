@@ -30,8 +30,7 @@ from lipmotion_faces.tracking.track import VideoScan
 from pipeline.made import features_of, read_sound, replace_tracking
 
 RATE = 16_000
-SENTENCES = [(1.0 + 4.5 * n, 4.0 + 4.5 * n) for n in range(10)]
-"""Three seconds of sound, and a pause of 1.5 s."""
+SENTENCES = [(1.0 + 4.5 * n, 4.0 + 4.5 * n) for n in range(10)]  # three seconds of sound, and a pause of 1.5 s
 DURATION_S = 46.0
 
 

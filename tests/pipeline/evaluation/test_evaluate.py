@@ -27,8 +27,7 @@ from pipeline import made
 from pipeline.made import corpus_of
 from testing.toy import toy_motion, toy_sentences
 
-evaluate = partial(evaluated, recogniser="own")
-"""The toy's voice is that of its model."""
+evaluate = partial(evaluated, recogniser="own")  # the toy's voice is that of its model
 CONDITIONS = ["audio only", "with transcript"]
 FIGURES = "channels acc amse leading lag_ms opening_acc_95 closures closures_p_b_m silence".split()
 

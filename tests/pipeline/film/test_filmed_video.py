@@ -25,8 +25,7 @@ from speech.sounds import tone, write_sound
 from testing.toy import ToySentence, toy_motion, toy_sentences
 from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, SCALE, toy_chin_px, toy_places
 
-MIDDLE = (slice(150, 230), slice(70, 154))
-"""Rows and columns of the background in which the mouth is."""
+MIDDLE = (slice(150, 230), slice(70, 154))  # rows and columns of the background in which the mouth is
 
 
 @pytest.fixture(scope="module")

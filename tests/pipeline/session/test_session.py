@@ -309,10 +309,8 @@ def test_single_pictures_are_those_of_the_video(session, request_):
         pictures.draw(9)
 
 
-TIMES = 12
-"""How often the sentence is said in the long recording."""
-UNSEEN = 0.01
-"""Most by which the opening may be off until the whole is made, in eye distances: 0.6 mm."""
+TIMES = 12  # how often the sentence is said in the long recording
+UNSEEN = 0.01  # most by which the opening may be off until the whole is made, in eye distances: 0.6 mm
 
 
 @pytest.fixture(scope="module")

@@ -102,10 +102,8 @@ def _declare(parser: argparse.ArgumentParser, kind: str, argument: InputArgument
 
 
 PIPE = "-"
-OPENED = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")
-"""Where pipes are that the shell has opened for this process."""
-LARGEST_RECORDING_BYTES = 1 << 32
-"""Most bytes of a recording from a pipe."""
+OPENED = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")  # where pipes are that the shell has opened for this process
+LARGEST_RECORDING_BYTES = 1 << 32  # most bytes of a recording from a pipe
 BLOCK = 1 << 20
 FORMATS = ("json", "csv")
 

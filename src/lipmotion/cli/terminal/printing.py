@@ -17,8 +17,7 @@ from lipmotion.errors import ExportError
 from lipmotion.printable import printable
 from lipmotion.storage.json_text import as_json, replace_nan
 
-LINE_START = "\r\x1b[K"
-"""Terminal control characters that erase the rest of a progress bar."""
+LINE_START = "\r\x1b[K"  # terminal control characters that erase the rest of a progress bar
 
 
 def print_line(text: object) -> None:

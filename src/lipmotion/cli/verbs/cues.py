@@ -18,13 +18,11 @@ from lipmotion.storage.files import as_text
 from lipmotion.storage.sources import Source, check_apart, is_file
 from lipmotion.types.delivery import Delivery
 
-RECOGNISERS = {"pocketsphinx": "auto", "phonetic": "fast"}
-"""The recogniser that takes the place of each of Rhubarb's."""
+RECOGNISERS = {"pocketsphinx": "auto", "phonetic": "fast"}  # the recogniser that takes the place of each of Rhubarb's
 VERSION = "; takes the options of Rhubarb Lip Sync version 1.14.0"
 """What programs look for that ask whether Rhubarb is there, and which."""
 BLANK = b" \t\r\n\0\xef\xbb\xbf\xfe\xff"
-NO_WORDS = re.compile(rb"\[[^\[\]]*\]|[^\w\x80-\xff]")
-"""Sounds in brackets, and what is no letter."""
+NO_WORDS = re.compile(rb"\[[^\[\]]*\]|[^\w\x80-\xff]")  # sounds in brackets, and what is no letter
 SHEET = re.compile(rb"\s*(\d+\.\d+\t|MohoSwitch1|lipsync version|<\?xml|{|\Z)")
 """How a file of cues begins, or an empty one."""
 

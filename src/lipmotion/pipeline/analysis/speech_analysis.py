@@ -70,8 +70,7 @@ if TYPE_CHECKING:
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
 
-UNHEARD_S = 0.05
-"""Phones may last so long outside of all passages, and half of their time: alignment is no surer."""
+UNHEARD_S = 0.05  # phones may last so long outside of all passages, and half of their time: alignment is no surer
 LATE_S = 0.1  # seconds by which given units may end after the sound; editing programs round times
 TIME_UNITS = {"milliseconds": 1e3, "samples": 16e3, "samples of 48 kHz": 48e3, "ticks of 100 ns": 1e7}
 """How many of them a second has: given times that end near so many times the recording are in this unit."""

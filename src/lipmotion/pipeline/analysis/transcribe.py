@@ -41,18 +41,13 @@ from lipmotion.units import Lexicon, Pronunciation, check_words, is_silent
 from lipmotion.units.phones import count_phone_edits
 
 LOG = logging.getLogger("lipmotion")
-MAX_WARNINGS = 20
-"""Largest number of guessed pronunciations that are reported one by one."""
+MAX_WARNINGS = 20  # largest number of guessed pronunciations that are reported one by one
 FOREIGN_SHARE, MIN_FOREIGN = 0.25, 3
 """A text of which so large a share, and so many different words, are not in the dictionary is not English."""
-MAX_STRETCHES = 3
-"""Largest number of stretches without words that are named in one warning."""
-REACH_S = 0.1
-"""A phone of a word may be heard so far from the middle that its recognition has."""
-MIN_INSERTED = 2
-"""Fewer phones between words than this belong to them: recognition errs by one."""
-ALIKE_SHARE = 0.34
-"""Words are said all the same where recognition finds their phones, but for so small a share."""
+MAX_STRETCHES = 3  # largest number of stretches without words that are named in one warning
+REACH_S = 0.1  # a phone of a word may be heard so far from the middle that its recognition has
+MIN_INSERTED = 2  # fewer phones between words than this belong to them: recognition errs by one
+ALIKE_SHARE = 0.34  # words are said all the same where recognition finds their phones, but for so small a share
 MAX_REPLACED = 2
 """So few words are said in place of others; more are of another sentence, which may have words of this one."""
 

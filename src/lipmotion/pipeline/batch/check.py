@@ -30,10 +30,8 @@ from lipmotion.units.lexicon import COMMON_WORDS, detect_language
 from lipmotion.units.spoken_text import parse_tagged_text
 from lipmotion.units.text_normalisation import find_words, split_written_words
 
-SILENT_DB = -60.0
-"""A recording that is nowhere louder, in dB of full scale, is silent."""
-MIN_SPOKEN_S = 0.1
-"""A recording with less sound above its quiet level has nothing said in it."""
+SILENT_DB = -60.0  # a recording that is nowhere louder, in dB of full scale, is silent
+MIN_SPOKEN_S = 0.1  # a recording with less sound above its quiet level has nothing said in it
 SHORTEST_TOLD_S, MIN_TOLD_WORDS = 8.0, 5
 """The language of shorter speech, or of fewer words, is not told: it takes a dozen long words to be sure."""
 LETTERS_OF = {"CJK": 4.0, "HANGUL": 3.0, "HIRAGANA": 2.0, "KATAKANA": 2.0}
@@ -112,15 +110,13 @@ def _read_words(line: BatchLine, request: Request) -> tuple[str, ...]:
 
 
 STAGE = "checking"
-PAUSE_S, LETTERS_PER_S = 0.3, 15.0
-"""How long words take: so long, and so many letters a second more."""
+PAUSE_S, LETTERS_PER_S = 0.3, 15.0  # how long words take: so long, and so many letters a second more
 SHORT, LONG, LONGER_S = 0.5, 2.0, 1.0
 """A recording is too short or too long for its words below and above these shares of what they take; the last is how
 much longer a drawn out word may be."""
 MIN_LINES, SLOWEST = 10, 2.0
 """From so many lines with words on, their own median rate is the measure, at most so many times slower or faster."""
-MIN_SAME_WORDS = 4
-"""Shorter lines, as "Yes, sir", may well be said twice."""
+MIN_SAME_WORDS = 4  # shorter lines, as "Yes, sir", may well be said twice
 
 
 @dataclass(frozen=True)

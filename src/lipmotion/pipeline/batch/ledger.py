@@ -35,8 +35,7 @@ from lipmotion.storage.locks import lock_folder
 from lipmotion.storage.sources import check_source, hash_file, is_file
 from lipmotion.types.values import any_members, items, members, number, one_of, optional, text, whole
 
-CUES = SHEET.removeprefix(".")
-"""Prefix of the kinds of outputs that are cue sheets: ``cues.tsv`` is Rhubarb's table."""
+CUES = SHEET.removeprefix(".")  # prefix of the kinds of outputs that are cue sheets: ``cues.tsv`` is Rhubarb's table
 
 
 def check_job(job: Job) -> None:
@@ -133,13 +132,10 @@ def list_input_files(line: BatchLine) -> list[InputFile]:
     return [InputFile(str(path), *_read_status(path), hash_file(path)) for path in list_input_paths(line)]
 
 
-Record = dict[str, Any]
-"""What is known of one line; its fields are listed in docs/batch.md."""
+Record = dict[str, Any]  # what is known of one line; its fields are listed in docs/batch.md
 DONE, FAILED = "done", "failed"
-LARGEST_RECORD_BYTES = 1 << 20
-"""Most bytes of a record; one has about a thousand."""
-LARGEST_NUMBER = 1e12
-"""No duration, level or count of a recording is larger."""
+LARGEST_RECORD_BYTES = 1 << 20  # most bytes of a record; one has about a thousand
+LARGEST_NUMBER = 1e12  # no duration, level or count of a recording is larger
 TOGETHER = (("words", "confidence"), ("closures_heard", "closures_made"))
 """Fields of which the second is there wherever the first is."""
 
@@ -178,10 +174,8 @@ def read_record(content: bytes) -> Record | None:
 
 LOG = logging.getLogger("lipmotion")
 LEDGER, RECEIPTS, WORK, RUN = "batch.jsonl", "receipts", "work", "run"
-STAGED = f"{TEMPORARY}batch-"
-"""Prefix of the names of outputs that are being written."""
-NAME = re.compile(rb'\{"name": ("(?:[^"\\]|\\.)*")')
-"""How every row begins."""
+STAGED = f"{TEMPORARY}batch-"  # prefix of the names of outputs that are being written
+NAME = re.compile(rb'\{"name": ("(?:[^"\\]|\\.)*")')  # how every row begins
 
 
 @dataclass(frozen=True)

@@ -20,16 +20,13 @@ from lipmotion.storage.text_table import read_table
 LOG = logging.getLogger("lipmotion")
 FILE_COLUMNS = ("file", "path", "recording", "audio", "wav")
 """Names of the column with the recording; the first row of a table is a header if it has one of them."""
-COLUMNS = ("transcript", "output", "speaker")
-"""Names of the other columns that are read."""
+COLUMNS = ("transcript", "output", "speaker")  # names of the other columns that are read
 OWN_FILES = ("batch.jsonl", "report.csv", "report.html", "marks.csv")
 """Files of the batch itself, in the folder of its lines' outputs."""
-OWN_FOLDER = ".batch"
-"""Folder of unfinished work in the folder of the outputs."""
+OWN_FOLDER = ".batch"  # folder of unfinished work in the folder of the outputs
 LARGEST_LIST_BYTES, MAX_LINES = 1 << 27, 200_000
 """Maximum bytes of a list, and lines of a batch: the words of a very long game."""
-LONGEST_PART_BYTES = 255
-"""Maximum bytes of the name of a file or a folder, on usual file systems."""
+LONGEST_PART_BYTES = 255  # maximum bytes of the name of a file or a folder, on usual file systems
 MAX_NAMED_LINES = 3
 CONTROL = re.compile(r"[\x00-\x1f]")
 

@@ -26,8 +26,7 @@ from lipmotion.types.generation import FULL_FIT_SHARE, SURE_CONFIDENCE
 
 APPROVE, REDO, NO_MARK = "approve", "redo", ""
 KINDS = (APPROVE, REDO, NO_MARK)
-MARKS = "marks.csv"
-"""Where a folder of outputs has its marks."""
+MARKS = "marks.csv"  # where a folder of outputs has its marks
 MARK_COLUMNS = ("name", "mark", "when")
 
 
@@ -90,8 +89,7 @@ UNSURE_WORDS, UNSURE_PHONES = 80.0, 25.0
 ROWS, BETWEEN = "/*ROWS*/", " | "
 """Where the page has its rows; what stands between several texts in a field of the CSV file."""
 SHARED_COLOURS = "/*COLOURS*/"
-BASIS = "/*BASIS*/"
-"""Where the page has the digest of the marks that it shows."""
+BASIS = "/*BASIS*/"  # where the page has the digest of the marks that it shows
 
 
 def write_reports(

@@ -63,8 +63,7 @@ from lipmotion.units.phone_timelines import group_words
 
 LOG = logging.getLogger("lipmotion")
 MAX_WARNINGS = 10
-SILENCE_S = 0.5
-"""Seconds of silence with which the settings are tried out."""
+SILENCE_S = 0.5  # seconds of silence with which the settings are tried out
 
 
 @dataclass(frozen=True)
@@ -272,8 +271,7 @@ def open_local_pool(jobs: int) -> Iterator[Pool]:
 
 
 STAGE = "animating"
-MAX_DEATHS = 3
-"""After so many deaths of workers in a row that no line explains, the batch ends."""
+MAX_DEATHS = 3  # after so many deaths of workers in a row that no line explains, the batch ends
 
 
 @dataclass(frozen=True)

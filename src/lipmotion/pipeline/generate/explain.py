@@ -24,10 +24,8 @@ from lipmotion.pipeline.session import NO_EDITS, Session
 from lipmotion.printable import printable
 from lipmotion.types import FRAME_RATE_HZ, ChannelValue, Explanation, Generation, NamedProbability, SpeechPart, frame_of
 
-LINE = 110
-"""Width of the text of a row, without its name, and of a state in a list, in characters."""
-SHOWN_CHANNELS = 6
-"""Largest number of channels in a text; points are left out if there are other channels."""
+LINE = 110  # width of the text of a row, without its name, and of a state in a list, in characters
+SHOWN_CHANNELS = 6  # largest number of channels in a text; points are left out if there are other channels
 
 
 def explain(

@@ -31,10 +31,8 @@ from lipmotion.units.phones import SHORT_PAUSE_S
 from lipmotion.units.spoken_text import parse_tagged_text, time_moods
 from lipmotion.units.text_normalisation import MAX_CHARACTERS, split_sentences
 
-BETWEEN_S = 0.35
-"""Silence between two sentences that a corpus says."""
-FEATURES = 13
-"""The static acoustic features, whose differences joins cost."""
+BETWEEN_S = 0.35  # silence between two sentences that a corpus says
+FEATURES = 13  # the static acoustic features, whose differences joins cost
 
 
 @limit_threads()
@@ -128,20 +126,15 @@ def _find_starts(count: int, pieces: Sequence[SourcePiece], joined: JoinedPieces
 
 
 LOG = logging.getLogger("lipmotion")
-CORPUS_VOICE = "corpus"
-"""The name of the voice that is a corpus."""
-REST_S = 0.25
-"""Silence before the first and after the last sound."""
+CORPUS_VOICE = "corpus"  # the name of the voice that is a corpus
+REST_S = 0.25  # silence before the first and after the last sound
 FLOOR_DB = 50.0
 """Noise under the speech, in decibels of what lies under 8 kHz, as in training: a synthesiser's silence has no sound at
 all, which would shift features that are normalised over the recording. The sound that is returned has it, too: what
 the model takes in is what a ``.wav`` of it holds, so that its motion comes again from that file and the phones."""
-SENTENCES_PER_RUN = 20
-"""Sentences that one run of a synthesiser speaks; only their files are on the disk at a time."""
-BLOCK = 1 << 20
-"""Samples of noise that are drawn at a time."""
-LARGEST_TEXT_BYTES = 4 * MAX_CHARACTERS
-"""Most bytes of a text file: a character takes up to four."""
+SENTENCES_PER_RUN = 20  # sentences that one run of a synthesiser speaks; only their files are on the disk at a time
+BLOCK = 1 << 20  # samples of noise that are drawn at a time
+LARGEST_TEXT_BYTES = 4 * MAX_CHARACTERS  # most bytes of a text file: a character takes up to four
 
 
 @limit_threads()

@@ -20,8 +20,7 @@ from lipmotion.storage.files import as_text, check_distinct, check_target
 from lipmotion.types import Generation
 from lipmotion.units.phones import OPTIONAL, SHAPES
 
-SHEET = ".cues."
-"""What the name of a cue sheet among other outputs has before its format."""
+SHEET = ".cues."  # what the name of a cue sheet among other outputs has before its format
 FASTEST_FPS = 100.0
 """Largest frame rate: times in cue files are in hundredths of a second, and two frames must not share one."""
 

@@ -50,8 +50,7 @@ from lipmotion.types.edits import Locked
 
 ARKIT, WHOLE_FACE, VOWELS = "arkit", "face", "vowels"
 VISEMES, HELD_VISEMES = "visemes", "held-visemes"
-LIVING_SETS = (WHOLE_FACE, VOWELS)
-"""Sets of curves with eyes, brows and head, which move on their own."""
+LIVING_SETS = (WHOLE_FACE, VOWELS)  # sets of curves with eyes, brows and head, which move on their own
 WEIGHTS = (*ARKIT_MOUTH, *ARKIT_OTHERS, *VISEME_CHANNELS, *VRM_VOWELS)
 FAPS = {name: NAMES[number] for number, name, *_ in PARAMETERS}
 KNOWN_CURVES = (*WEIGHTS, *FAPS)
@@ -59,8 +58,7 @@ KNOWN_CURVES = (*WEIGHTS, *FAPS)
 LIP_POINT = re.compile(r"[xyz]_\d+")
 SETS_OF = {WHOLE_FACE: (*ARKIT_MOUTH, *ARKIT_OTHERS), VISEMES: VISEME_CHANNELS, VOWELS: VRM_VOWELS}
 """The curves that are edited in each set (``show_edited_curves``)."""
-GAP_CHANNELS = ("opening", "outer", GAP, EDITED["opening"])
-"""Channels that say how far the lips are apart."""
+GAP_CHANNELS = ("opening", "outer", GAP, EDITED["opening"])  # channels that say how far the lips are apart
 PHONETIC = (*VISEME_CHANNELS, *VRM_VOWELS, CLOSED)
 """Curves that phones make, beside what they ask of the mouth (``articulation.phone_targets.SAID``)."""
 SHAPE_SETS = (ARKIT, WHOLE_FACE, VISEMES, HELD_VISEMES, VOWELS, "fap")

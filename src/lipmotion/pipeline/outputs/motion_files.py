@@ -51,10 +51,8 @@ from lipmotion.types.delivery import Staging
 from lipmotion.types.motion import RADIAN
 
 LOG = logging.getLogger("lipmotion")
-CURVES = (WEIGHT, CONTROL, RADIAN)
-"""The units of curves that drive a character."""
-MODEL_HZ = 100
-"""Frames per second of generated motion."""
+CURVES = (WEIGHT, CONTROL, RADIAN)  # the units of curves that drive a character
+MODEL_HZ = 100  # frames per second of generated motion
 SAME_HZ = 1e-6
 OPENING = "opening"
 
@@ -253,15 +251,12 @@ def _blendshapes(motion: Motion) -> Motion | None:
     return Motion(motion.values[:, [column for _, column in columns]], motion.rate_hz, channels)
 
 
-TOLERATED_S = 0.1
-"""Sound and motion may differ so much in length without a warning."""
+TOLERATED_S = 0.1  # sound and motion may differ so much in length without a warning
 SLOWEST_HZ, FASTEST_HZ = 1.0, 10_000.0
 """Smallest and largest frame rate of motion that is read: a mistyped one must not fill the memory."""
-LONGEST_S = 86_400.0
-"""Longest motion that is read."""
+LONGEST_S = 86_400.0  # longest motion that is read
 CUE_SUFFIXES = (".dat", ".tsv", ".xml", ".pgo")
-STATE = "file"
-"""The state of every frame of motion that was read."""
+STATE = "file"  # the state of every frame of motion that was read
 
 
 def read_generation(

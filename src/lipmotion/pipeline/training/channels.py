@@ -35,8 +35,7 @@ from lipmotion.types import (
 )
 
 LOG = logging.getLogger("lipmotion")
-PICTURES = 980
-"""Number of mouth pictures that eigenlips are trained on. Source: Xie & Liu 2007, §5."""
+PICTURES = 980  # number of mouth pictures that eigenlips are trained on. Source: Xie & Liu 2007, §5
 
 
 def check_visual(visual: str) -> None:
@@ -133,10 +132,8 @@ def _crops(utterance: Utterance) -> NDArray[np.uint8]:
     return np.asarray(crops)
 
 
-BLOCK = 16
-"""Recordings of which progress is reported at once, and that are given to a process at once."""
-VOICES = 32
-"""Largest number of recordings whose voices make the babble."""
+BLOCK = 16  # recordings of which progress is reported at once, and that are given to a process at once
+VOICES = 32  # largest number of recordings whose voices make the babble
 LONGEST_VOICE_S = 10.0
 
 

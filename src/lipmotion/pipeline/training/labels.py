@@ -32,8 +32,7 @@ from lipmotion.types import Item, Monitor, Progress, Span, Timeline, Unit, Utter
 from lipmotion.units import Lexicon
 
 LOG = logging.getLogger("lipmotion")
-MAX_NAMED_RECORDINGS = 10
-"""Largest number of recordings that one warning names."""
+MAX_NAMED_RECORDINGS = 10  # largest number of recordings that one warning names
 
 
 def warn_of_doubtful_transcripts(
@@ -86,12 +85,10 @@ def _listed(names: Sequence[str]) -> str:
     return printable(", ".join(names[:MAX_NAMED_RECORDINGS])) + (f" and {more} more" if more > 0 else "")
 
 
-UTTERANCES_PER_CHECKPOINT = 32
-"""Utterances that are labelled between two checkpoints."""
+UTTERANCES_PER_CHECKPOINT = 32  # utterances that are labelled between two checkpoints
 Labeller = Callable[[Utterance], Timeline[Unit]]
 """A function that returns phones in time; raises AlignmentError or InputError if it cannot."""
-PhonesOrReason = Timeline[Unit] | str
-"""Phones in time of an utterance, or the reason why it has none."""
+PhonesOrReason = Timeline[Unit] | str  # phones in time of an utterance, or the reason why it has none
 
 
 def label_utterances(
@@ -156,8 +153,7 @@ def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> list[PhonesOrReason]:
     ]
 
 
-PICTURES = "crops.npy"
-"""File of the mouth pictures of an utterance: large, and needed for eigenlips only."""
+PICTURES = "crops.npy"  # file of the mouth pictures of an utterance: large, and needed for eigenlips only
 
 
 def fingerprint_training(

@@ -28,8 +28,7 @@ from lipmotion.storage.sources import AUDIO_SUFFIXES, check_listable
 from lipmotion.types import Audio, Item, Monitor, Span, Timeline, Unit, silent_monitor
 from lipmotion.units import SILENCE, Lexicon, is_silent
 
-SENTENCES = 60
-"""Number of sentences that every synthetic voice speaks by default."""
+SENTENCES = 60  # number of sentences that every synthetic voice speaks by default
 PAUSE_S, FLOOR_DB = 0.25, 50.0
 """Seconds of silence before and after a synthetic sentence, and its noise in decibels under the speech. Synthesisers
 begin at once, and after digital silence: both would shift features that are normalised per recording."""

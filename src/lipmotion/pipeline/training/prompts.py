@@ -23,8 +23,7 @@ WEIGHTS = {PHONE: 8.0, DIPHONE: 2.0, CONTEXT: 1.0}
 """Weight of the first occurrence of each kind of unit: a phone; a phone after a phone; a phone beside a viseme class.
 The engines back off from the last kind to the first, so the more general kinds must be covered."""
 
-UnitName = tuple[str, ...]
-"""The kind of a unit, and its phones or classes."""
+UnitName = tuple[str, ...]  # the kind of a unit, and its phones or classes
 
 
 @dataclass(frozen=True)

@@ -66,8 +66,7 @@ from lipmotion.types import (
 )
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent
 
-WARP_CYCLE = (1.0, 0.88, 1.0, 0.94, 1.12, 1.06)
-"""Warps of the frequencies, of one recording after the other."""
+WARP_CYCLE = (1.0, 0.88, 1.0, 0.94, 1.12, 1.06)  # warps of the frequencies, of one recording after the other
 MIN_WARPED_RECORDINGS = 60
 """Fewer recordings than this are not warped: they are too few to train models of one speaker on, let alone several."""
 

@@ -27,8 +27,7 @@ COMPONENTS = 64
 ROW_FRAMES = 2  # frames of 10 ms from one row of the network to the next
 WINDOW_ROWS, OVERLAP_ROWS = 400, 100
 """The network takes 8 s at a time; windows overlap by 2 s, over which one fades into the next."""
-LEVEL = 25.0
-"""Factor from samples at the level of all passages to that of speech in the training of the network."""
+LEVEL = 25.0  # factor from samples at the level of all passages to that of speech in the training of the network
 BANDS, HEADS, LAYERS = 80, 6, 2
 FLOOR = -4.5  # the smallest logarithm of a power, eight powers of ten beneath loud speech, as in Whisper
 

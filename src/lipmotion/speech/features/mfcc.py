@@ -27,8 +27,7 @@ DYNAMIC_RANGE = 1e-8
 ROUNDING_SHARE = 1e-5
 """Features that deviate by less than this share of the largest log power are constant but for rounding. In silence and
 in a constant they deviate by up to 4e-7 of it, on every processor by another amount; in speech by 8e-4 or more."""
-LARGEST_SAMPLE = 1e6
-"""Samples beyond are damage, whatever their full scale was; their squares would not be finite."""
+LARGEST_SAMPLE = 1e6  # samples beyond are damage, whatever their full scale was; their squares would not be finite
 KNEE_HZ = 6500.0  # frequencies are warped in full up to here, or until they are as high as this
 BLOCK = 256  # frames transformed at a time: they fit into the cache, and memory stays bounded for any length
 

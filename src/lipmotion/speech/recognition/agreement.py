@@ -28,8 +28,7 @@ MIN_VOICE_S = 1.0
 MIN_IDLE_S = 0.3  # given phones in silence for so long are doubted
 MIN_FITTING_SHARE = 0.9  # a transcript that fits less of the speech is worth a remark
 JOINED_S = 0.5  # places nearer than this are one stretch
-Place = tuple[float, float]
-"""Start and end in seconds."""
+Place = tuple[float, float]  # start and end in seconds
 
 
 @dataclass(frozen=True)

@@ -22,10 +22,8 @@ WIDENING_FACTORS, MIN_IMPROVEMENT = (2, 4, 8, 16), 0.2
 wider where the words then fit better by this many nats a frame."""
 BAD_FIT, WORST_FIT = -3.5, -6.0
 """Words that fit worse than the first, in nats a frame, may be elsewhere; worse than the second, they are not there."""
-FREE_FRAMES = 60_000
-"""Recordings of up to ten minutes are aligned without times where these belong to something else."""
-NEIGHBOURS = 3
-"""Words on each side of one without room whose windows are widened too, with all that share its time."""
+FREE_FRAMES = 60_000  # recordings of up to ten minutes are aligned without times where these belong to something else
+NEIGHBOURS = 3  # words on each side of one without room whose windows are widened too, with all that share its time
 MAX_WIDENINGS = 40  # doublings of windows without room; then every word may lie anywhere
 
 

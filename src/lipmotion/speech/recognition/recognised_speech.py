@@ -159,8 +159,7 @@ class LabelledFrames(NamedTuple):
     word: int = -1
 
 
-LabelledStretch = tuple[Stretch, list[LabelledFrames]]
-"""Frames, and the phones in them."""
+LabelledStretch = tuple[Stretch, list[LabelledFrames]]  # frames, and the phones in them
 
 
 @dataclass(frozen=True, eq=False)

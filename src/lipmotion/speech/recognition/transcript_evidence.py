@@ -30,8 +30,7 @@ WORD_COSTS, SURE_COSTS = (WORD_COST, PHONE_COST), (4.0, 0.5)
 """The last two; and where a recogniser is sure of what it hears, so that a single wrong word is noticed."""
 MIN_HEARD = 1.0  # something is said in a frame in which any phone is so many nats more probable than none
 MIN_GAP_S = 0.1  # where something else is said for a shorter time, no speech is missing
-MIN_SAID_SHARE = 0.25
-"""A transcript of which so small a share of the phones is said is not that of the recording."""
+MIN_SAID_SHARE = 0.25  # a transcript of which so small a share of the phones is said is not that of the recording
 MIN_LOG_POSTERIOR = -23.0
 """No frame counts for less: what the network holds for impossible is as good as any other mistake."""
 LARGEST_SEARCH = 20_000_000  # frames times phones that are searched at once, about three minutes of speech
@@ -148,8 +147,7 @@ def _divide(units: Timeline[Unit], divided: bool) -> Iterator[tuple[float, float
     yield start_s, None, words
 
 
-Range = tuple[int, int]
-"""The first of some frames or words, and the one after the last."""
+Range = tuple[int, int]  # the first of some frames or words, and the one after the last
 Path = tuple[list[Range | None], list[tuple[Range, Range]]]
 """The frames of each word, None where it is left out; and those in which anything is said, with the words left out."""
 BLANK, PHONE, FREE, INSTEAD = range(4)

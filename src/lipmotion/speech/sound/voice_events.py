@@ -24,13 +24,11 @@ from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Unit, VoiceEvent
 from lipmotion.types.audio import BREATH, LAUGHTER
 from lipmotion.units import is_silent
 
-APART_FRAMES = (11, 40)
-"""Calls of one bout are so far apart, least and most."""
+APART_FRAMES = (11, 40)  # calls of one bout are so far apart, least and most
 MIN_CALLS = 4
 RISE_DB, LOWEST_DB = 6.0, -35.0
 """A call is so much louder than what is beside it, and its level beside the loudest one is at least the second."""
-EDGE_FRAMES = 5
-"""A bout begins and ends so many frames beside its first and its last call."""
+EDGE_FRAMES = 5  # a bout begins and ends so many frames beside its first and its last call
 VOICED_SHARES = (0.15, 0.75)
 """Share of the frames of a bout that is voiced; with less it is a cough, or clicks of tongue or teeth."""
 WEIGHTS = (14.8, 0.122, -7.09, -2.93, 3.85, -16.5)
@@ -70,32 +68,23 @@ def _find_fall(heights: Curve, lowest: Curve) -> Curve:
     return np.array(falls)
 
 
-SMOOTHING_FRAMES = 2.0
-"""Standard deviation of the window that levels are smoothed with."""
+SMOOTHING_FRAMES = 2.0  # standard deviation of the window that levels are smoothed with
 WORD_CONFIDENCE, MAX_WORD_SHARE = 0.5, 0.2
 """Phones of this confidence, and those that are known, are words; in laughter they have at most this share."""
 BREATH_S, BREATH_PAUSE_S = (0.16, 1.2), 0.25
 """Least and most duration of a breath, and the least one of the pause that it is in."""
 BREATH_RISE_DB = (7.0, 15.0)
 """A breath is so much louder from 1 to 7.6 kHz than the quiet around it: where it begins, and where it is clear."""
-BREATH_EDGE_DB, BREATH_EDGE_FRAMES = 6.0, 12
-"""It rises and falls by so much within so many frames beside it."""
+BREATH_EDGE_DB, BREATH_EDGE_FRAMES = 6.0, 12  # it rises and falls by so much within so many frames beside it
 BREATH_FROM_SPEECH = (7, 4)
 """Frames from the last voiced one before a breath, and to the first one after it: nearer is the end of a phone."""
-BREATH_LEVEL_DB = -12.0
-"""The level of a breath beside the loud frames of the recording is at most this."""
-BREATH_TILT_DB = (-8.0, 6.0)
-"""Level from 3.5 to 7.6 kHz beside that from 1 to 3.5 kHz: s and sh are brighter."""
-BREATH_LOW_DB = -4.0
-"""Level under 1 kHz beside that from 1 to 3.5 kHz, at most: rumble and plosives have more."""
-PAUSE_PIECE_S = 600.0
-"""Longer pauses are searched in pieces: silence may last for hours."""
-QUIET_REACH_S = 2.0
-"""The quiet around a pause is looked for so far beside it."""
-QUIET_SHARE = 0.08
-"""Share of the frames around one that are at most as loud as the quiet there."""
-BLOCK_FRAMES = 2000
-"""Frames whose surroundings are in memory at once."""
+BREATH_LEVEL_DB = -12.0  # the level of a breath beside the loud frames of the recording is at most this
+BREATH_TILT_DB = (-8.0, 6.0)  # level from 3.5 to 7.6 kHz beside that from 1 to 3.5 kHz: s and sh are brighter
+BREATH_LOW_DB = -4.0  # level under 1 kHz beside that from 1 to 3.5 kHz, at most: rumble and plosives have more
+PAUSE_PIECE_S = 600.0  # longer pauses are searched in pieces: silence may last for hours
+QUIET_REACH_S = 2.0  # the quiet around a pause is looked for so far beside it
+QUIET_SHARE = 0.08  # share of the frames around one that are at most as loud as the quiet there
+BLOCK_FRAMES = 2000  # frames whose surroundings are in memory at once
 
 
 def find_voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
@@ -127,8 +116,7 @@ def silence_units(units: Timeline[Unit], others: Sequence[tuple[float, float]]) 
     return Timeline(tuple(spans))
 
 
-DB = 10 / np.log(10)
-"""Decibels of a natural logarithm of power."""
+DB = 10 / np.log(10)  # decibels of a natural logarithm of power
 
 
 def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:

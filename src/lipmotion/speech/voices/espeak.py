@@ -44,8 +44,7 @@ from lipmotion.units.lexicon import SpokenForm
 
 CLOSING = list_phone_classes()["stop"] | list_phone_classes()["affricate"]
 VOWELS = list_phone_classes()["vowel"]
-CLOSURE_SHARE = 0.03
-"""Share of the largest sample that no sample of a closure exceeds: some variants have breath in it."""
+CLOSURE_SHARE = 0.03  # share of the largest sample that no sample of a closure exceeds: some variants have breath in it
 LONGEST_CLOSURE_S = 0.06
 LATE_L_S, L_SHARE = 0.045, 0.45
 """An l that is reported so shortly before its end is late: it gets this share of vowel and l, as in our alignments."""

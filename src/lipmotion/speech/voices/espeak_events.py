@@ -20,8 +20,7 @@ from typing import Any
 SYNCHRONOUS, PHONEME_EVENTS, IPA, UTF_8 = 2, 1, 2, 1
 END, WORD, PHONEME = 0, 1, 7
 DIVIDER = "|"
-SILENCE, PART = "_", ";"
-"""The mnemonics of a silence, and of a part of the phone before. Both have no IPA."""
+SILENCE, PART = "_", ";"  # the mnemonics of a silence, and of a part of the phone before. Both have no IPA
 
 
 class _Event(ctypes.Structure):

@@ -19,8 +19,7 @@ from lipmotion.units import PHONES, SILENCE
 from lipmotion.units.ipa_phones import read_ipa
 from lipmotion.units.spelling import read_table
 
-PhoneMap = Mapping[str, tuple[str, ...]]
-"""A synthesiser's label to phones of the inventory."""
+PhoneMap = Mapping[str, tuple[str, ...]]  # a synthesiser's label to phones of the inventory
 
 ARPABET_PHONES: PhoneMap = {phone: (phone,) for phone in PHONES} | {"pau": (SILENCE,)}
 """Flite and Festival (phone set ``radio``). They have their own ax; their er and ih are stressed and unstressed."""

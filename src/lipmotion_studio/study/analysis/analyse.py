@@ -13,12 +13,9 @@ from lipmotion.printable import printable
 from lipmotion_studio.study.analysis import crossed, paired
 from lipmotion_studio.study.answers import ANCHOR, FIRST, MOS, PAIRED, RECORDING, Answer, read_answers
 
-MIN_ATTENTION = 2 / 3
-"""Share of the checks of attention that must be right."""
-MAX_ANCHOR = 0.5
-"""Share of the comparisons with the anchor in which it may be preferred."""
-MIN_CHANCE = 0.01
-"""A rater whose answers to both orders disagree more than by so small a chance presses the same side."""
+MIN_ATTENTION = 2 / 3  # share of the checks of attention that must be right
+MAX_ANCHOR = 0.5  # share of the comparisons with the anchor in which it may be preferred
+MIN_CHANCE = 0.01  # a rater whose answers to both orders disagree more than by so small a chance presses the same side
 RULES = {
     "attention": f"at least {MIN_ATTENTION:.0%} of the checks of attention right",
     "anchor": f"the anchor rated below the recording (without one: below the mean of the others); preferred in at "
@@ -79,16 +76,12 @@ def _check_sides(mine: Sequence[Answer]) -> str:
     return ""
 
 
-MAX_RATERS = 1000
-"""No search goes beyond."""
-DIFFERENCES = (0.1, 0.2, 0.3, 0.5, 1.0)
-"""Differences of means whose numbers of raters are given."""
-SHARES = (0.55, 0.6, 0.65, 0.7, 0.75)
-"""Preferences whose numbers of raters are given."""
+MAX_RATERS = 1000  # no search goes beyond
+DIFFERENCES = (0.1, 0.2, 0.3, 0.5, 1.0)  # differences of means whose numbers of raters are given
+SHARES = (0.55, 0.6, 0.65, 0.7, 0.75)  # preferences whose numbers of raters are given
 USUAL_POWER = 0.8
 DRAWS, SEED = 1000, 0
-MAX_DEGREES = 1e6
-"""Degrees of freedom from which on Student's t is normal."""
+MAX_DEGREES = 1e6  # degrees of freedom from which on Student's t is normal
 Figures = dict[str, Any]
 
 

@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 from lipmotion_studio.study.answers import ANCHOR, HIGHEST_MOS, RECORDING, Answer
 
 Array = NDArray[np.float64]
-CONFIDENCE = 0.95
-"""Share of studies whose intervals shall cover the truth."""
-ROUNDING = 1e-9
-"""A standard error below this share of the scale is rounding: all judgements are equal."""
+CONFIDENCE = 0.95  # share of studies whose intervals shall cover the truth
+ROUNDING = 1e-9  # a standard error below this share of the scale is rounding: all judgements are equal
 BOTH, RATERS, SENTENCES, NOTHING = "raters and sentences", "raters", "sentences", "nothing"
 """What an interval generalises over."""
 
@@ -171,8 +169,7 @@ def correct_p_values(p_values: list[float]) -> list[float]:
     return corrected
 
 
-SCALE = 1.0, float(HIGHEST_MOS)
-"""Lowest and highest judgement."""
+SCALE = 1.0, float(HIGHEST_MOS)  # lowest and highest judgement
 WIDTH = SCALE[1] - SCALE[0]
 Figures = dict[str, Any]
 

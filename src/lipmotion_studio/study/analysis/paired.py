@@ -15,10 +15,8 @@ from lipmotion_studio.study.analysis import crossed
 from lipmotion_studio.study.answers import FIRST, Answer
 
 MAX_STEPS = 20_000
-SMALLEST_STEP = 1e-12
-"""Iteration ends when no strength changes by a larger share."""
-HALF_WIN = 0.5
-"""Given to both sides of every comparison that was made, in its order, where a strength were infinite."""
+SMALLEST_STEP = 1e-12  # iteration ends when no strength changes by a larger share
+HALF_WIN = 0.5  # given to both sides of every comparison that was made, in its order, where a strength were infinite
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +116,7 @@ def compute_deviations(model: Strengths, pairs: NDArray[np.intp], is_first: NDAr
 
 Indices = NDArray[np.intp]
 Figures = dict[str, Any]
-ALL_EQUAL = "raters, all agree"
-"""What an interval of a share of 0 or 1 is over: each rater counts once."""
+ALL_EQUAL = "raters, all agree"  # what an interval of a share of 0 or 1 is over: each rater counts once
 
 
 @dataclass(frozen=True, eq=False)

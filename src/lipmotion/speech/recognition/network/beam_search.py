@@ -180,8 +180,7 @@ MIN_POSTERIOR = 1e-3  # no posterior counts as less: the network is sure too oft
 BLANK_LOSS = 1.0
 """Nats by which no phone is less probable than the network says: it leaves phones out rather than adding some."""
 WORD_GAIN = 1.0  # nats that a path wins with every word
-FREE_WORD_LOSS, FREE_PHONE_LOSS = 4.0, 2.5
-"""Nats that a path loses with phones outside of words, and with each of them."""
+FREE_WORD_LOSS, FREE_PHONE_LOSS = 4.0, 2.5  # nats that a path loses with phones outside of words, and with each of them
 INNER_BOUNDARY_LOSS = 2.0  # nats that a path loses with a boundary of words within a word
 SILENT_ROW = -0.02  # where no phone is more probable than this, as a logarithm, paths stay where they are
 NEVER = -1e9
