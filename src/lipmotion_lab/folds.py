@@ -31,7 +31,7 @@ _ABOUT = "about"
 
 @dataclass(frozen=True, eq=False)
 class _GeneratedFold:
-    """What a model of the other ``used`` recordings generates for a part of them."""
+    """What a model of ``used`` recordings generates for the part left out."""
 
     clips: Mapping[str, Sequence[ComparedClip]]
     speakers: Sequence[str]

@@ -106,7 +106,7 @@ def find_number(studio: Studio, request: Request) -> int:
 
 
 class RecordingReplies:
-    """Replies to requests for one recording; what it does is done in its own thread.
+    """Replies to requests for one recording; work on it is done in its own thread.
 
     make_key : returns the key that allows to load one address
     """

@@ -40,6 +40,12 @@ def test_a_resource_has_the_tracks_of_the_motion(tmp_path: Path) -> None:
     assert keys[1][:, 2].tolist() == [0.25, 0.75, 0.5, 0.5]
 
 
+def test_times_after_three_hours_stay_apart(tmp_path: Path) -> None:
+    late = of_motion(Motion(np.array([[0.0], [1.0]]), 1 / 10800.04, (Channel("jawOpen", WEIGHT),)))
+    assert "length = 10800.04\n" in (text := written(tmp_path / "a.tres", late).read_text(encoding="utf-8"))
+    assert "PackedFloat32Array(0, 1, 0, 10800.04, 1, 1)" in text
+
+
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_godot_parser_reads_the_same_tracks(tmp_path: Path) -> None:
     godot_parser = pytest.importorskip("godot_parser")

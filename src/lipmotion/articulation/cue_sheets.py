@@ -1,4 +1,4 @@
-"""Cue sheets for 2D animation: the mouth shape of every span of time (``units.mouth_chart``), chosen from motion.
+"""Cue sheets for 2D animation: the mouth shape of every span of time (``units.phones``), chosen from motion.
 
 Of all sequences of held shapes the one with the least total cost is chosen. Which shapes suit a phone says a table of
 our own; cue files of other programs name shapes by one of four charts.

@@ -149,7 +149,7 @@ def intensify(
     in_place  : whether the motion is nobody else's: hours of it would not fit twice
     Each frame has one factor for the whole face, so that distances and points agree. The factor is the intensity where
     the mouth is open, and 1 where the lips touch or are as close as at rest (silence, p b m); without an opening it is
-    the intensity everywhere. Openings beyond the largest of the motion approach twice that. Weights stay in 0 to 1.
+    the intensity everywhere. Openings above the motion's largest level off at twice that. Weights stay in 0 to 1.
     """
     motion = generation.motion
     factor = intensity = np.broadcast_to(np.asarray(intensity, np.float64), len(motion.values))

@@ -50,7 +50,7 @@ def with_moods(motion: Motion, keys: Sequence[MoodKey]) -> Motion:
     """Return motion with the channels of moods over time after its own, instead of those that it had.
 
     keys : in the order of their times; before the first one the face is neutral, unless it is at 0. Without any mood
-           the motion is as it is; manners do not count (``articulation.manner``)
+           the motion is as it is; manners do not count
     The sum of all moods is at most 1 in every frame; each change is a smooth step around its time (``CHANGE_S``).
     """
     keys = [key for key in keys if not key.is_manner]

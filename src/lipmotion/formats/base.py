@@ -48,8 +48,8 @@ class MotionFormat:
     min_frames : so many frames it must have, at least one where it needs channels
     check   : raises ExportError for motion that does not fit into such a file otherwise
     units   : returns the units of a file that holds units alone, and None of other files; None: there are no such files
-    curves  : the set of curves that such a file holds, as of ``pipeline.outputs.curve_sets.curves_of`` (``arkit``, for
-              instance): the pipeline computes them from the motion; empty: the channels of the motion
+    curves  : the set of curves that such a file holds, as of ``pipeline.outputs.curve_sets.make_curves``, like
+              ``arkit``: the pipeline computes them from the motion; empty: the channels of the motion
     rate_hz : frames per second where the user asks for none; None: those of the motion
     mouth   : whether the file shows how the mouth itself moves: the pipeline keeps the channel ``opening`` for it,
               whatever channels or curves the user asks for

@@ -115,12 +115,12 @@ def write_godot(path: Path, generation: Generation, _source: Mapping[str, str], 
     motion = generation.motion
     lines = [
         *('[gd_resource type="Animation" format=3]', "", "[resource]", 'resource_name = "speech"'),
-        *(f"length = {float(motion.time_s[-1]):.6g}", f"step = {1 / motion.rate_hz:.6g}"),
+        *(f"length = {float(motion.time_s[-1]):.9g}", f"step = {1 / motion.rate_hz:.6g}"),
     ]
     for number, name in enumerate(_list_weights(motion)):
         times_s, values, steps = _choose_keys(generation, name, 1.0, GODOT_DECIMALS, GODOT_TOLERANCE)
         rows = zip(times_s, values, strict=True)
-        keys = ", ".join(f"{time_s:.6g}, 1, {value:.{GODOT_DECIMALS}g}" for time_s, value in rows)
+        keys = ", ".join(f"{time_s:.9g}, 1, {value:.{GODOT_DECIMALS}g}" for time_s, value in rows)
         track = f"tracks/{number}"
         lines += [
             *(f'{track}/type = "blend_shape"', f"{track}/imported = false", f"{track}/enabled = true"),

@@ -15,7 +15,7 @@ LEVEL_FRAMES = 25  # the loud level is that of the loudest quarter of a second: 
 NOISE_FRAMES = 201  # within half as many frames of speech there is a closure or a pause, in which the noise is heard
 SMOOTHING_FRAMES = 11  # the energy is averaged over so many frames
 SOUND_DROP, QUIET_DROP = 20 * DECIBEL, 35 * DECIBEL
-"""Sound lies less than the first below the loud level: too loud for silence; below the second one is no speech."""
+"""Sound within the first of the loud level is too loud for silence; beyond the second, too quiet for speech."""
 ABOVE_NOISE, NOISE_SHARE = 6 * DECIBEL, 0.3
 """Sound is louder than the noise by so much, or by this share of the way to the loud level where that is less."""
 MIN_RANGE = 6 * DECIBEL

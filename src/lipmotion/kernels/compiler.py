@@ -153,7 +153,7 @@ def _warn_once() -> None:
 
 @cache
 def _open_disk_cache() -> Any:
-    """Return the class of numba's caches on disk; what is damaged is compiled again, what cannot be stored is not."""
+    """Return the class of numba's caches on disk; damaged code is compiled again, failure to store is ignored."""
     from numba.core.caching import FunctionCache
 
     class Cache(FunctionCache):  # type: ignore[misc] # of a package without types

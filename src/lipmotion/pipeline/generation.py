@@ -65,7 +65,7 @@ trained. 0.80 of the phones of espeak-ng's sentences in nine languages are phone
 RAMP_FRAMES = 12
 """Frames beside a passage in which the mouth comes from rest, or goes there; within it, where another one is near."""
 NOWHERE_S = 1e6  # nothing that is detected or pinned lies so long before a recording
-LONG_SILENCE_S = 10.0  # a passage has silence before and after it; it counts as so much more
+LONG_SILENCE_S = 10.0  # silence before and after a passage counts as so much longer
 REST_FRAMES = 100  # so much silence is animated to know the rest between passages
 REACH_FRAMES = 10  # frames on both sides of a pin over which a value is reached that motion does not take by itself
 
@@ -417,7 +417,7 @@ class Excerpt:
 def find_excerpt(before: Timeline[Unit], after: Timeline[Unit], pins: Collection[Pin], frames: int) -> Excerpt | None:
     """Return the excerpt outside of which motion is the same; None: it is too long, outside, or nothing has changed.
 
-    pins   : that are there before or after, but not both
+    pins   : those before or after the edit, not both
     frames : of the recording at 100 Hz
     """
     shorter = min(len(before), len(after))

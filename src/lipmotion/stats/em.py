@@ -1,4 +1,4 @@
-"""Expectation–maximisation: the loop that all trainers of the package share, and its E-step over shards of the data."""
+"""Expectation–maximisation: the loop that training and EM conversion share, and its E-step over shards of the data."""
 
 from __future__ import annotations
 

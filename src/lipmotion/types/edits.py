@@ -84,7 +84,7 @@ class Gain:
 class DrawnCurve:
     """Values that a curve takes over a stretch, as somebody has drawn them.
 
-    start_s, end_s : seconds; before and after them the curve goes over into them within 0.1 s
+    start_s, end_s : seconds; within 0.1 s before and after, the curve blends into the values
     channel : name of a channel or curve
     values  : at equal distances from the start to the end, in the unit of the channel
     Raises InputError: fewer than 2 values, or more than ``MAX_DRAWN``; no numbers; or an end that is not after the
@@ -104,7 +104,7 @@ class DrawnCurve:
 
 @dataclass(frozen=True)
 class Hold:
-    """The whole mouth stays for a time as it is at the start; it goes over into that within 0.05 s.
+    """The whole mouth stays for a time as at the start; it blends into that within 0.05 s.
 
     start_s, end_s : seconds
     Raises InputError: an end that is not after the start.

@@ -32,7 +32,7 @@ VISEMES: dict[str, tuple[str, ...]] = {
 VISEME_OF: dict[str, str] = {phone: viseme for viseme, phones in VISEMES.items() for phone in phones}
 
 VOWELS = frozenset(phone for viseme in ("lr1", "lr2", "lr3", "lr4") for phone in VISEMES[viseme]) - {"hh", "em"}
-"""The phones of the visemes of vowels that are vowels."""
+"""The vowels among the phones of the vowel visemes."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ def describe_unknown_phone(phone: str, where: str = "") -> str:
 
 
 def find_similar_phone(phone: str, known: Collection[str]) -> str:
-    """Return a known phone, the same or most similar: ``SIMILAR_PHONES``, those of these, its viseme, or any."""
+    """Return the phone if known, else a known one: by ``SIMILAR_PHONES`` in turn, its viseme, or any."""
     queue = [phone]
     for candidate in queue:
         if candidate in known:

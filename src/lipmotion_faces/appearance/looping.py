@@ -105,7 +105,7 @@ def describe_frames(frames: Iterable[NDArray[np.uint8]], face_to_image: Array) -
 
 
 def compare_rows(rows: Array) -> Array:
-    """Return the distance between every two rows, such as of ``FrameDescriptors.standardised`` [shape=(T, T)]."""
+    """Return the distance between every two rows, such as of ``FrameDescriptors.standardise`` [shape=(T, T)]."""
     rows = rows - rows.mean(axis=0)
     power = np.square(rows).sum(axis=1)
     return np.sqrt(np.maximum(power[:, None] + power - 2 * rows @ rows.T, 0))
@@ -321,7 +321,7 @@ class _Plan:
         return worst + REPEATS_COST * float(again.sum()) / len(order)
 
     def _count_room(self, at: int, way: int) -> int:
-        """Return how many frames there are behind a frame, in its scene."""
+        """Return how many frames of its scene follow a frame that way."""
         start, stop = self.scenes[int(self._scene_of[at])]
         return stop - 1 - at if way > 0 else at - start
 

@@ -349,7 +349,7 @@ class GltfArrays:
         return np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
 
     def read_view(self, number: int) -> tuple[memoryview, int]:
-        """Return the bytes of a buffer view, and the distance of its elements (0: none apart).
+        """Return the bytes of a buffer view, and the stride of its elements (0: packed).
 
         Raises InputError: it leads out of its buffer.
         """

@@ -77,7 +77,7 @@ _FULL = np.where(SIDE > 0, _BOW, _LOWER_BOW)
 def place_sections(pose: CharacterPose, base_z: Real) -> Real:
     """Return the eight points of the cross-section of every column [shape=(8, COLUMNS, 3); stacked: (T, 8, ...)].
 
-    pose   : one, or several of ``pose.stacked``
+    pose   : one, or several of ``pose.stack_poses``
     base_z : depth of the skin under the outer contour at rest [shape=(COLUMNS,)]
     The fifth point is where the lips meet; the first is the contour, where the skin begins.
     """
@@ -350,7 +350,7 @@ class Skin:
     def place_both(self, pose: CharacterPose, binding: Binding) -> tuple[Real, Real]:
         """Return the places of the rings of the lips [shape=(..., RINGS, COLUMNS, 3)] and of vertices of the face.
 
-        pose    : one, or several of ``pose.stacked``
+        pose    : one, or several of ``pose.stack_poses``
         binding : of the vertices beside the lips [shape of their places=(..., N, 3)]
         """
         lips = place_lips(place_sections(pose, self.base_z))

@@ -43,7 +43,7 @@ def _dialogue(path: str) -> str | None:
 
 
 def _find_words(recording: Path) -> list[Source]:
-    """Return the words beside a recording, which no output may replace; none where they are cues made of it."""
+    """Return the words beside a recording, which outputs replace by --force only; none: they are cues of it."""
     beside = recording.parent / f"{recording.stem}.txt"
     if not is_file(beside):
         return []

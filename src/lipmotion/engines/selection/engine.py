@@ -43,7 +43,7 @@ ROUNDING_S = 1e-6
 
 
 def with_sources(units: Timeline[Unit], starts_s: Array, sources: Sequence[str]) -> Timeline[Unit]:
-    """Return the timeline with the source of the unit of every phone as the name of its unit."""
+    """Return the timeline with the unit of every phone named by its recorded source."""
     return Timeline(
         tuple(
             replace(span, label=replace(span.label, unit=sources[int(np.argmin(np.abs(starts_s - span.start_s)))]))

@@ -1,4 +1,4 @@
-"""Requests from files: what a request names is read here, and nowhere else.
+"""Requests from files: its sound, words, phones and lexicon are read here.
 
 Formats of labels and of motion are imported where such a file is read: most requests have none.
 """
@@ -25,7 +25,7 @@ _SUFFIX = re.compile(r"\.[A-Za-z]{1,10}")
 
 
 def read_request(request: Request, *, words_beside: bool = False, is_typed: bool = True) -> Request:
-    """Return a request with the content of the files that it names; what is a value already stays.
+    """Return a request with its words, phones and lexicon read; what is a value already stays.
 
     words_beside : use the text, subtitles or labels beside the recording, where no words and no phones are given
     is_typed     : whether a transcript that is a text may be the name of a file, as what a user types

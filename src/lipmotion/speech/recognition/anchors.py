@@ -33,7 +33,7 @@ class Anchors:
 
     start_s, end_s : NaN where they are not known
     tolerance_s    : by how much the word may be earlier or later
-    groups         : the number of the time that it has, which it may share with other words of its line
+    groups         : number of the word's time, which other words of its line may share
     """
 
     start_s: NDArray[np.float64]
@@ -82,7 +82,7 @@ def leave_out_late_lines(transcript: TimedTranscript, duration_s: float) -> Time
 def make_windows(anchors: Anchors, tolerance_s: NDArray[np.float64], frames: int) -> Windows:
     """Return the frames in which each word may lie.
 
-    A word without a time has those between the words with times around it. No word may begin before those ahead of it
+    An untimed word may lie from the timed word before to the one after. No word may begin before those ahead of it
     may, nor end after those behind it may; out of order, times leave no room (``find_windows``).
     """
     first = np.floor((anchors.start_s - tolerance_s) * FRAME_RATE_HZ)

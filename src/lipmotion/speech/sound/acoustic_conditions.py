@@ -64,9 +64,8 @@ def make_babble(voices: Sequence[Audio], samples: int, seed: int = 0) -> NDArray
 def mark_spoken(audio: Audio) -> NDArray[np.bool_]:
     """Return which samples are speech [shape=(N,)]: the 10 ms around each frame that is loud for this recording.
 
-    A frame is loud where its log energy (25 ms), averaged over 11 frames, lies above the middle between the 10th and
-    the 95th percentile of the recording (``hmm.loudness.loud_frames``). Pauses do not count, so that a
-    signal-to-noise ratio does not depend on how long they are.
+    Which frames are loud says ``hmm.loudness.find_loud_frames``. Pauses do not count, so that a signal-to-noise ratio
+    does not depend on how long they are.
     Raises InputError: not one channel of finite samples at 16 kHz, shorter than 25 ms, or silent.
     """
     samples = check_samples(audio)

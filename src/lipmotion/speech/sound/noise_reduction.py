@@ -14,12 +14,12 @@ from lipmotion.speech.features.mfcc import HOP
 from lipmotion.types import SPEECH_RATE_HZ
 
 NOISY_DB = (13.0, 17.0)
-"""Noise is reduced fully where the louder half of a recording is so far above its quietest tenth, and from the second
-one on not at all. Clear recordings have 23 to 50 dB, white noise of 10 dB and a noisy office 9 to 11."""
+"""How far a recording's louder half is above its quietest tenth: up to the first, noise is reduced fully, from the
+second on not at all. Clear recordings have 23 to 50 dB, white noise of 10 dB and a noisy office 9 to 11."""
 STEADY_DB = (3.0, 6.0)
 """By so much a band's 40th percentile is above its 10th where its noise is steady, and where it is not: 1.5 in white
 noise, 2 in an office, 5 to 8 in a babble of voices, which stays."""
-BIAS = 1.3  # the mean power of steady noise beside its 20th percentile, of averages over so many bins and frames:
+BIAS = 1.3  # mean power of steady noise over its 20th percentile, in averages over ``AVERAGED`` bins and frames
 AVERAGED = (3, 9)
 SMOOTHED = (3, 5)  # over which power is averaged where it is filtered: single values are mostly chance
 LEAST_REST = 5e-3  # of the power: less is not a voice, but what is left of a tone
