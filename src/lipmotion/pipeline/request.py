@@ -132,7 +132,7 @@ class Request(Configuration):
         help="of labels with several tiers or speakers, the tier or the speaker that is read (default: all speakers)",
     )
     edits: Path | None = _file(
-        "edits", "FILE", "what is changed of the motion: of lipmotion edit (docs/edit.md)", replaceable=True
+        "edits", "FILE", "file of edits from lipmotion edit (docs/edit.md)", replaceable=True
     )
     recogniser: str = option(
         "auto",

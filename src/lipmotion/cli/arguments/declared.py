@@ -217,7 +217,7 @@ def add_detail(parser: argparse.ArgumentParser) -> None:
 
 def add_job_file(parser: argparse.ArgumentParser) -> None:
     """Add ``--job``: options from a file. What the command line says is ahead of it."""
-    text = "options from a TOML file; those that are given here are ahead of it (docs/api.md)"
+    text = "options from a TOML file; those given here override it (docs/api.md)"
     add_input(parser, "--job", what="job file", action=_Defaults, metavar="FILE.toml", help=text)
     parser.set_defaults(start=Job())
 
