@@ -125,7 +125,7 @@ def test_what_cannot_be_compared(adapters, toy_corpus, tmp_path):
         hold(adapters, toy_corpus, {"good": does("follows")}, only=["other"])
     with pytest.raises(InputError, match="to choose on and is reported"):
         hold(adapters, toy_corpus, {"good": does("follows")}, choosing=toy_corpus)
-    single = toy_corpus.part(toy_corpus.names("train")[:1])
+    single = toy_corpus.divided({"train": toy_corpus.names("train")[:1]})
     with pytest.raises(InputError, match="two or more"):
         hold(adapters, single, {"good": does("follows")})
     unmeasured = Corpus.create(tmp_path / "unmeasured")

@@ -16,6 +16,7 @@ import pytest
 
 from experiments.conftest import SETTINGS, few_sets, renamed
 from lipmotion import errors, units
+from lipmotion.corpora import SPLITS
 from lipmotion_lab import hofer2008, minnis2000, runner
 from lipmotion_lab.report import report
 from lipmotion_lab.report.section import Column, PaperOrder, PaperPair, Section, Table
@@ -133,10 +134,11 @@ def test_what_fails_is_told_and_stops_nothing_else(ran, toy_corpus, tmp_path, mo
 @pytest.mark.long
 def test_other_recordings_or_settings_are_run_again(ran, toy_corpus, tmp_path):
     run: Callable[..., report.WrittenReport] = partial(report.write_report, folder=tmp_path / "r", only=["folds"])
+    lists = {split: toy_corpus.names(split) for split in SPLITS}
     run(toy_corpus)
     assert run(toy_corpus, quick=True).made == ["folds"]
     assert "quick run" in Links(tmp_path / "r" / report.PAGE).text
-    assert run(toy_corpus.part(toy_corpus.names()[1:]), quick=True).made == ["folds"]
+    assert run(toy_corpus.divided(lists | {"train": lists["train"][1:]}), quick=True).made == ["folds"]
     assert run(toy_corpus, quick=True, settings=replace(SETTINGS, seed=1)).made == ["folds"]
     assert run(toy_corpus, settings=replace(SETTINGS, lexicon=units.Lexicon({"a": (("ax",),)}))).made == ["folds"]
     assert "-o r --only folds --lexicon FILE" in Links(tmp_path / "r" / report.PAGE).text
@@ -146,16 +148,16 @@ def test_other_recordings_or_settings_are_run_again(ran, toy_corpus, tmp_path):
 @pytest.mark.long
 @pytest.mark.usefixtures("ran")
 def test_a_corpus_without_a_list_has_what_can_be_run(toy_corpus, tmp_path):
-    without_val = toy_corpus.part([*toy_corpus.names("train"), *toy_corpus.names("test")])
+    train, val, test = (toy_corpus.divided({split: toy_corpus.names(split)}) for split in SPLITS)
+    without_val = toy_corpus.divided({"train": train.names(), "test": test.names()})
     found = report.write_report(without_val, tmp_path / "r")
     assert set(found.left_out) == {"hofer2008"}
     assert "left out: the corpus has no recordings of the list val" in Links(tmp_path / "r" / report.PAGE).text
     with pytest.raises(errors.CorpusError, match="hofer2008 is left out: the corpus has no recordings of the list val"):
         report.write_report(without_val, tmp_path / "other", only=["hofer2008"])
-    train_alone = toy_corpus.part(toy_corpus.names("train"))
-    assert set(report.write_report(train_alone, tmp_path / "s").verdicts) == {"folds"}
+    assert set(report.write_report(train, tmp_path / "s").verdicts) == {"folds"}
     with pytest.raises(errors.CorpusError, match="the list train"):
-        report.write_report(toy_corpus.part(toy_corpus.names("val")), tmp_path / "other")
+        report.write_report(val, tmp_path / "other")
     assert not (tmp_path / "other").exists()
 
 
