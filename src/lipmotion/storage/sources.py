@@ -219,10 +219,9 @@ _NO_MISTAKE = {
 @cache
 def _read_kinds() -> list[tuple[str, str, int, bytes]]:
     """Return group and name of each kind of file, and its mark at a byte; -1: anywhere in the tail, -2: in the head."""
-    lines = resources.files(__package__).joinpath("file_kinds.csv").read_text(encoding="ascii").splitlines()
-    rows = csv.reader(lines[1:])
-    marks = ((group, name, int(at), mark.encode().decode("unicode_escape")) for group, name, at, mark in rows)
-    return [(group, name, at, mark.encode("latin-1")) for group, name, at, mark in marks]
+    rows = read_shipped_table("lipmotion.storage", "file_kinds.csv")
+    marks = (row["mark"].encode().decode("unicode_escape").encode("latin-1") for row in rows)
+    return [(row["group"], row["name"], int(row["at"]), mark) for row, mark in zip(rows, marks, strict=True)]
 
 
 def check_kind(path: Path, wanted: str, kind: str = "") -> None:
