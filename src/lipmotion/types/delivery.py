@@ -102,7 +102,6 @@ def sort_moods(keys: Sequence[MoodKey]) -> tuple[MoodKey, ...]:
     return tuple(latest[place] for place in sorted(latest))
 
 
-MAX_INTENSITY = 3.0
 USUAL_HOLD_MS = 2000 / 24
 """Held poses last as long as two frames of an animation at 24 frames a second, if nothing else is asked for."""
 
@@ -134,9 +133,7 @@ class Delivery(Configuration):
     (0.0, True, 120)
     """
 
-    intensity: float = option(
-        1.0, Rule(0, most=MAX_INTENSITY), metavar="X", help="movements of the mouth X times as large, 0 to 3"
-    )
+    intensity: float = option(1.0, Rule(0, most=3), metavar="X", help="movements of the mouth X times as large, 0 to 3")
     anticipation_ms: float = _milliseconds(-1000, 1000, "anticipation", "the mouth moves N ms before the sound")
     offset_ms: float = _milliseconds(
         -600_000, 600_000, "offset", "everything in motion, label and cue files comes N ms later; negative: earlier"
