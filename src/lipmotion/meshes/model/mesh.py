@@ -192,9 +192,9 @@ class Mesh:
             raise InputError(f"triangles have shape {self.triangles.shape}, required (F, 3)")
         corners, vertices = (*self.triangles.shape, 2), self.vertices.shape
         required = (("uv has", self.uv, corners), ("colours have", self.colours, vertices))
-        for what, array, shape in (*required, ("tints have", self.tints, (len(self.vertices), 4))):
-            if array is not None and array.shape != shape:
-                raise InputError(f"{what} shape {array.shape}, required {shape}")
+        for what, array, fitting in (*required, ("tints have", self.tints, (len(self.vertices), 4))):
+            if array is not None and array.shape != fitting:
+                raise InputError(f"{what} shape {array.shape}, required {fitting}")
         if not self.parts:
             object.__setattr__(self, "parts", (MeshPart("", 0, len(self.triangles)),))
         edges = [0, *(part.stop for part in self.parts)]
