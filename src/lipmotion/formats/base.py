@@ -83,7 +83,7 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
     "motion format",
     "lipmotion.exporters",
     {
-"json": "lipmotion.formats.motion_document:JSON", "csv": "lipmotion.formats.tables:TABLE",
+        "json": "lipmotion.formats.motion_document:JSON", "csv": "lipmotion.formats.tables:TABLE",
         "npz": "lipmotion.formats.motion_document:NPZ", "livelink.csv": "lipmotion.formats.tables:LIVE_LINK",
         "blender.py": "lipmotion.formats.game_engines:BLENDER", "c3d": "lipmotion.formats.c3d:MOTION_FORMAT",
         "fap": "lipmotion.formats.fap:MOTION_FORMAT", "anim": "lipmotion.formats.game_engines:UNITY",

@@ -7,10 +7,8 @@ parameters 1 (viseme) and 2 (expression) have four and six values; they are pass
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from functools import partial
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +19,7 @@ from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import MotionFormat
 from lipmotion.formats.steady_rate import exact_rate
 from lipmotion.meshes.fitting.blendshape_motion import move_points
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 
 FAP = "fap"  # the unit of these channels: whole steps of a 1024th of a distance in the face, of either sign
@@ -28,9 +27,9 @@ STEPS = 1024.0
 MOUTH_TO_NOSE = 0.30
 """The distance from the nose to where the lips meet (MNS0) in a mean face, in eye distances; the width of the mouth
 (MW0) is the template's."""
-_TABLE = resources.files(__package__).joinpath("fap.csv").read_text(encoding="ascii").splitlines()[1:]
 PARAMETERS = tuple(
-    (int(n), name, int(point), int(axis), int(sign), unit) for n, name, point, axis, sign, unit in csv.reader(_TABLE)
+    (int(row["number"]), row["name"], int(row["point"]), int(row["axis"]), int(row["sign"]), row["unit"])
+    for row in read_shipped_table("lipmotion.formats", "fap.csv")
 )
 """The parameters of lips and jaw that points show, left and right the speaker's own: number, name, point, axis (x left,
 y up, z out), sign, unit (N: mouth to nose, W: width of the mouth)."""

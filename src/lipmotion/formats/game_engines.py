@@ -71,10 +71,14 @@ def write_unity(path: Path, generation: Generation, source: Mapping[str, str], _
     motion, name = generation.motion, Path(source.get("path", "")).stem or "speech"
     end_s = float(motion.time_s[-1])
     curves = [line for weight in _list_weights(motion) for line in _list_curve(generation, weight)]
-    template = resources.files(__package__).joinpath("unity_clip.yaml").read_text(encoding="ascii")
     members = {"name": _quote(name), "curves": "\n".join(curves), "rate_hz": f"{motion.rate_hz:.9g}"}
-    text = Template(template).substitute(members, end_s=f"{end_s:.6f}")
+    text = _fill_shipped("unity_clip.yaml", **members, end_s=f"{end_s:.6f}")
     path.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _fill_shipped(file: str, /, **members: str) -> str:
+    """Return the text of a file of this package, with the members that it names."""
+    return Template(resources.files(__package__).joinpath(file).read_text(encoding="ascii")).substitute(members)
 
 
 def _quote(name: str) -> str:
@@ -209,34 +213,9 @@ ADDON_PLACES = (Path(__file__).parents[1] / "addons", Path(__file__).parents[3] 
 MODULES = ("__init__.py", "curves.py", "keying.py", "panel.py", "takes.py")
 OLDEST = (1980, 1, 1, 0, 0, 0)  # the time of every file in an archive: the same version gives the same bytes
 NO_VERSION = "0.0.0"  # the version where lipmotion is not installed; Blender takes three numbers
-MANIFEST = """schema_version = "1.0.0"
-id = "lipmotion"
-version = "{version}"
-name = "lipmotion"
-tagline = "Keys shape keys and bones from files of lip motion"
-maintainer = "lipmotion"
-type = "add-on"
-blender_version_min = "4.2.0"
-license = ["SPDX:MIT"]
-
-[permissions]
-files = "Reads the motion file and the sound that you choose"
-"""
-"""What makes the archive an extension; as an add-on of the older kind, Blender reads ``bl_info``."""
 SCRIPT_DECIMALS = 5
 _BEGINNING = re.compile(r'\A""".*?"""\n', re.DOTALL)
 _IMPORT = re.compile(r"^from (\.\w*|__future__) import .*\n", re.MULTILINE)
-_HEAD = '''"""Lip motion for Blender, written by lipmotion.
-
-Select the face or the rig and run this script: in the text editor (Alt P), or
-    blender FILE.blend --python THIS_FILE
-It keys shape keys by their names (as ARKit's, in any spelling), bones (Bone.rotation.x, degrees) and custom
-properties (Bone[name]), from the start frame of the scene, and adds the sound to the sequencer.
-"""
-
-from __future__ import annotations
-
-'''
 
 
 def write_blender(path: Path, generation: Generation, source: Mapping[str, str], _model: Mapping[str, str]) -> None:
@@ -245,7 +224,7 @@ def write_blender(path: Path, generation: Generation, source: Mapping[str, str],
     texts = read_addon(SCRIPT_MODULES).values()
     *code, main = (_IMPORT.sub("", _BEGINNING.sub("", text)) for text in texts)
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(_HEAD + "".join(each.strip() + "\n\n\n" for each in code))
+        file.write(_fill_shipped("blender_script_head.txt") + "".join(each.strip() + "\n\n\n" for each in code))
         file.write(f"RATE_HZ = {motion.rate_hz!r}\nSOUND = {source.get('path', '')!a}\n")
         file.write(f"SOUND_S = {float(source.get('start_s', 0.0))!r}\n")
         stepped = "".join(f"{name!a}, " for name in motion.names if name in generation.stepped)
@@ -277,7 +256,8 @@ def write_addon(program: str, path: str | Path) -> None:
     check_target(path)
     texts = read_addon(MODULES)
     version = re.match(r"\d+\.\d+\.\d+", find_version())
-    texts["blender_manifest.toml"] = MANIFEST.format(version=version[0] if version else NO_VERSION)
+    shown = version[0] if version else NO_VERSION
+    texts["blender_manifest.toml"] = _fill_shipped("blender_manifest.toml", version=shown)  # makes it an extension
     with atomic_file(path) as unfinished, zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in texts.items():
             archive.writestr(zipfile.ZipInfo(f"{FOLDER}/{name}", OLDEST), text.encode(), zipfile.ZIP_DEFLATED)

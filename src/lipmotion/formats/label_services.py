@@ -9,7 +9,6 @@ Source: the public documentation of each service; figures and names of fields al
 
 from __future__ import annotations
 
-import csv
 import json
 import logging
 import math
@@ -18,8 +17,6 @@ from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cache
-from importlib import resources
 from itertools import accumulate
 from typing import Any, NamedTuple
 
@@ -39,6 +36,7 @@ from lipmotion.formats.label_tiers import (
     holds_phones,
     split_ipa,
 )
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import values
 from lipmotion.types.values import parse_clock, parse_number, require
 from lipmotion.units import SILENCE
@@ -74,15 +72,10 @@ class Times(NamedTuple):
 
 UNTIMED, POLLY = Times(""), Times("time", usual=1000, kind="event")
 SPEECHIFY = Times("starttime", "endtime", "duration", 1000)  # of marks, whose start and end are places in the text
-
-
-@cache
-def _list_times() -> tuple[Times, ...]:
-    lines = resources.files(__package__).joinpath("label_times.csv").read_text(encoding="ascii").splitlines()
-    rows = csv.reader(lines[1:])
-    return tuple(Times(start, end, length, int(a), int(b), kind) for start, end, length, a, b, kind, _ in rows)
-
-
+KNOWN_TIMES = tuple(
+    Times(row["start"], row["end"], row["duration"], int(row["per_s"]), int(row["usual"]), row["kind"])
+    for row in read_shipped_table("lipmotion.formats", "label_times.csv")
+)
 TEXTS = (
     "punctuatedword word alignedword text content value transcript sentence display lexical markname token lines "
     "displaytext segs alternatives nbest label phone phoneme symbol char"
@@ -278,7 +271,7 @@ def _find_times(item: dict[str, Any], where: str) -> tuple[float, float, Times]:
     for name in ("time", "offsets"):  # an object of both
         if isinstance(item.get(name), dict):
             members = {**members, **{f"{name}{edge}": time for edge, time in item[name].items()}, name: None}
-    times = next((row for row in _list_times() if (row.start or row.end) in members), UNTIMED)
+    times = next((row for row in KNOWN_TIMES if (row.start or row.end) in members), UNTIMED)
     if item.get("type") in POLLY_KINDS and not {"offsetsfrom", "timestampstart"} & members.keys():
         is_speechify = {"start", "starttime"} <= members.keys()
         times = POLLY if members.get("time") is not None else SPEECHIFY if is_speechify else times

@@ -196,17 +196,6 @@ def check_listable(folder: Path) -> None:
 
 HEAD, TAIL = 4096, 1 << 16
 """Bytes of the beginning and of the end of a file, that say what it is; a .zip has its names at the end."""
-_NEXT = {
-    "document": "save it as plain text (.txt); a recording is given first, its words with --transcript",
-    "project": "it holds no sound: export the track as .wav or .flac",
-    "scene": "export a character as .glb with its blendshapes, motion as .csv, speech as .wav",
-    "drawing": "export its layers as .png, a drawing for each mouth shape, into a folder for --face",
-    "picture": "give a recording, and the picture as a face: --face",
-    "archive": "unpack it, and give the file that is in it",
-    "stand-in": "it stands for the file: fetch the file itself",
-    "sound": "motion is made of it by: lipmotion animate FILE -o OUT; its words by: -o WORDS.vtt",
-}
-"""What to do with a file that is given in the place of another, by group."""
 _NO_MISTAKE = {
     "recording": {"sound"},
     "video": {"sound", "picture", "archive"},
@@ -217,12 +206,14 @@ _NO_MISTAKE = {
 
 
 @cache
-def _read_kinds() -> list[tuple[str, str, int, bytes]]:
-    """Return group and name of each kind of file, and its mark at a byte; -1: anywhere in the tail, -2: in the head."""
-    lines = resources.files(__package__).joinpath("file_kinds.csv").read_text(encoding="ascii").splitlines()
-    rows = csv.reader(lines[1:])
-    marks = ((group, name, int(at), mark.encode().decode("unicode_escape")) for group, name, at, mark in rows)
-    return [(group, name, at, mark.encode("latin-1")) for group, name, at, mark in marks]
+def _read_kinds() -> list[tuple[str, str, str, int, bytes]]:
+    """Return each kind of file: its group, its name, what to do with one that is given in the place of another, its
+    mark, and at which byte that is; -1: anywhere in the tail, -2: in the head."""
+    steps = {row["group"]: row["next"] for row in read_shipped_table("lipmotion.storage", "next_steps.csv")}
+    rows = read_shipped_table("lipmotion.storage", "file_kinds.csv")
+    marks = (row["mark"].encode().decode("unicode_escape").encode("latin-1") for row in rows)
+    kinds = ((row["group"], row["name"], steps[row["group"]], int(row["at"])) for row in rows)
+    return [(*kind, mark) for kind, mark in zip(kinds, marks, strict=True)]
 
 
 def check_kind(path: Path, wanted: str, kind: str = "") -> None:
@@ -237,11 +228,11 @@ def check_kind(path: Path, wanted: str, kind: str = "") -> None:
         with suppress(zlib.error):
             unpacked = unpacked or zlib.decompressobj(31).decompress(head, HEAD)
         fine = _NO_MISTAKE.get(wanted, {"archive", "picture", "sound"})
-        for group, name, at, mark in _read_kinds():
+        for group, name, next_step, at, mark in _read_kinds():
             beginnings = (head[at : at + len(mark)], unpacked[at : at + len(mark)])
             is_there = mark in (tail if at == -1 else unpacked) if at < 0 else mark in beginnings
             if is_there and group not in fine:
-                raise InputError(f"{path}: is {name}, required a {kind or wanted}; {_NEXT[group]}")
+                raise InputError(f"{path}: is {name}, required a {kind or wanted}; {next_step}")
 
 
 def is_text(path: Path) -> bool:

@@ -122,9 +122,7 @@ class Configuration:
                     stated = f"{name} is {value!r}; this option no longer exists"
                     raise InputError(f"{stated}, required {cls.removed[name]!r}")
                 continue
-            present = cls.aliases.get(name, name)
-            if present not in known:
-                raise InputError(cls._unknown(name))
+            present = cls._find_present(name)
             if issubclass(known[present], Configuration) and isinstance(value, Mapping):
                 try:
                     value = known[present].parsed(value)  # noqa: PLW2901
@@ -142,9 +140,7 @@ class Configuration:
             name, equals, text = setting.partition("=")
             if not equals:
                 raise InputError(f"the setting {setting!r} has no value; required NAME=VALUE")
-            present = cls.aliases.get(name, name)
-            if present not in kinds:
-                raise InputError(cls._unknown(name))
+            present = cls._find_present(name)
             kind = kinds[present]
             if kind is int:
                 values[present] = parse_whole(text, f"{present} is")
@@ -157,14 +153,15 @@ class Configuration:
         return values
 
     @classmethod
-    def _unknown(cls, name: str) -> str:
-        """Return the message that there is no option of this name."""
-        if name in cls.hints:
-            return f"no option {name!r}; {cls.hints[name]}"
-        for option_field in fields(cls):
-            if f"--{name.replace('_', '-')}" in option_field.metadata.get("flags", ()):
-                return f"no option {name!r}; here it is called {option_field.name!r}"
-        return f"no option {name!r}; there are: {', '.join(option_field.name for option_field in fields(cls))}"
+    def _find_present(cls, name: str) -> str:
+        """Return the present name of an option. Raises InputError: there is none of this name."""
+        present, flag = cls.aliases.get(name, name), f"--{name.replace('_', '-')}"
+        options = {each.name: each for each in fields(cls)}
+        if present in options:
+            return present
+        flagged = next((other for other, each in options.items() if flag in each.metadata.get("flags", ())), None)
+        called = f"here it is called {flagged!r}" if flagged else f"there are: {', '.join(options)}"
+        raise InputError(f"no option {name!r}; {cls.hints.get(name, called)}")
 
     def as_mapping(self) -> dict[str, Any]:
         """Return the values of all options, by name, as the header of a model stores them."""

@@ -102,12 +102,13 @@ def sort_moods(keys: Sequence[MoodKey]) -> tuple[MoodKey, ...]:
     return tuple(latest[place] for place in sorted(latest))
 
 
-MAX_INTENSITY = 3.0
-MAX_ANTICIPATION_MS = 1000.0
-MAX_HOLD_MS = 10_000.0
-MAX_OFFSET_MS = 600_000.0
 USUAL_HOLD_MS = 2000 / 24
 """Held poses last as long as two frames of an animation at 24 frames a second, if nothing else is asked for."""
+
+
+def _milliseconds(least: float, most: float, what: str, shown: str) -> Any:
+    """Return an option in milliseconds, usually 0; ``what``: it is called, and ``shown`` of it to users."""
+    return option(0.0, Rule(least, most=most, unit=" ms"), what=what, metavar="N", help=shown)
 
 
 @dataclass(frozen=True)
@@ -132,30 +133,12 @@ class Delivery(Configuration):
     (0.0, True, 120)
     """
 
-    intensity: float = option(
-        1.0, Rule(0, most=MAX_INTENSITY), metavar="X", help="movements of the mouth X times as large, 0 to 3"
+    intensity: float = option(1.0, Rule(0, most=3), metavar="X", help="movements of the mouth X times as large, 0 to 3")
+    anticipation_ms: float = _milliseconds(-1000, 1000, "anticipation", "the mouth moves N ms before the sound")
+    offset_ms: float = _milliseconds(
+        -600_000, 600_000, "offset", "everything in motion, label and cue files comes N ms later; negative: earlier"
     )
-    anticipation_ms: float = option(
-        0.0,
-        Rule(-MAX_ANTICIPATION_MS, most=MAX_ANTICIPATION_MS, unit=" ms"),
-        what="anticipation",
-        metavar="N",
-        help="the mouth moves N ms before the sound",
-    )
-    offset_ms: float = option(
-        0.0,
-        Rule(-MAX_OFFSET_MS, most=MAX_OFFSET_MS, unit=" ms"),
-        what="offset",
-        metavar="N",
-        help="everything in motion, label and cue files comes N ms later; negative: earlier",
-    )
-    min_hold_ms: float = option(
-        0.0,
-        Rule(0, most=MAX_HOLD_MS, unit=" ms"),
-        what="least hold",
-        metavar="N",
-        help="hold every pose for at least N ms",
-    )
+    min_hold_ms: float = _milliseconds(0, 10_000, "least hold", "hold every pose for at least N ms")
     stepped: bool = option(False, help="hold poses instead of moving smoothly, each for at least 83 ms")
     mood: str = option(
         "",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import unicodedata
+from importlib import resources
 from typing import NamedTuple
 
 ENGLISH, AUTO = "en", "auto"
@@ -12,21 +14,12 @@ class Language(NamedTuple):
     """A language: its name, the scripts that it is written in, as Unicode names them, and espeak-ng's name of it."""
 
     name: str
-    scripts: tuple[str, ...] = ("LATIN",)
-    voice: str = ""
+    scripts: tuple[str, ...]
+    voice: str
 
 
-LANGUAGES: dict[str, Language] = {
-    ENGLISH: Language("English", voice="en-us"), "es": Language("Spanish"), "fr": Language("French"),
-    "de": Language("German"), "it": Language("Italian"), "pt": Language("Portuguese"), "nl": Language("Dutch"),
-    "ja": Language("Japanese", ("HIRAGANA", "KATAKANA")), "ko": Language("Korean", ("HANGUL",)),
-    "zh": Language("Mandarin", ("CJK",), "cmn"), "ca": Language("Catalan"), "cs": Language("Czech"),
-    "da": Language("Danish"), "el": Language("Greek", ("GREEK",)), "fi": Language("Finnish"),
-    "hr": Language("Croatian"), "hu": Language("Hungarian"), "id": Language("Indonesian"),
-    "nb": Language("Norwegian"), "pl": Language("Polish"), "ro": Language("Romanian"),
-    "ru": Language("Russian", ("CYRILLIC",)), "sk": Language("Slovak"), "sv": Language("Swedish"),
-    "tr": Language("Turkish"), "uk": Language("Ukrainian", ("CYRILLIC",)), "vi": Language("Vietnamese"),
-}  # fmt: skip
+_ROWS = csv.reader(resources.files(__package__).joinpath("languages.csv").read_text(encoding="ascii").splitlines()[1:])
+LANGUAGES = {code: Language(name, tuple(scripts.split()), voice) for code, name, scripts, voice in _ROWS}
 """By their code of ISO 639-1. Not in it: languages whose script espeak-ng was not tried on."""
 
 

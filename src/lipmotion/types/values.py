@@ -150,15 +150,7 @@ def items(schema: Schema, least: int = 0, most: int | None = None) -> Schema:
             raise SchemaError(describe_value(value), "a list")
         if len(value) < least or (most is not None and len(value) > most):
             raise SchemaError(f"a list of {len(value)}", required if most is not None else f"at least {least} items")
-        kept = []
-        for place, item in enumerate(value):
-            try:
-                one = schema(item)
-            except SchemaError as error:
-                raise error.within(f"[{place}]") from None
-            if one is not _LEFT_OUT:
-                kept.append(one)
-        return kept
+        return list(_checked(dict(enumerate(value)), lambda _: schema).values())
 
     return checked
 
@@ -219,15 +211,16 @@ def if_fits(schema: Schema) -> Schema:
     return checked
 
 
-def _checked(content: Mapping[str, Any], schema_of: Callable[[str], Schema]) -> dict[str, Any]:
+def _checked(content: Mapping[Any, Any], schema_of: Callable[[Any], Schema]) -> dict[Any, Any]:
+    """Return the members of an object, or the items of a list by their numbers, as their schemas do."""
     kept = {}
-    for name, member in content.items():
+    for key, member in content.items():
         try:
-            one = schema_of(name)(member)
+            one = schema_of(key)(member)
         except SchemaError as error:
-            raise error.within(f".{shorten(name)}") from None
+            raise error.within(f"[{key}]" if type(key) is int else f".{shorten(key)}") from None
         if one is not _LEFT_OUT:
-            kept[name] = one
+            kept[key] = one
     return kept
 
 

@@ -85,10 +85,8 @@ def _solve_with_table(
 ) -> Motion:
     """Return the weights of all blendshapes of a mouth, ``offset + gain · solved``, within their limits.
 
-    rows   : of a table, one a blendshape; the source is the name of the solved shape (``FaceShapes.names``)
-    parted : how far each blendshape parts the lips at weight 1, eye distances [shape=(R,)]
-    Where the lips touch in solved weights they touch with these gains, too; elsewhere they are as far apart as the
-    gains make them. Offsets act in every frame. If the motion already has weights by the mesh's names, they stay.
+    Rows are those of ``_mouth_rows``. Where the lips touch in solved weights they touch with these gains, too.
+    Offsets act in every frame. If the motion already has weights by the mesh's names, they stay.
     """
     parting = np.zeros(len(shapes.names))
     for row, parts in zip(rows, parted.tolist(), strict=True):

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +18,11 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.blendshape_motion import find_own_weights, move_points, with_mouth
 from lipmotion.meshes.model.face_shapes import NOT_FROM_POINTS, FaceShapes
 from lipmotion.meshes.model.shape_names import SIDES, VISEMES_15
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
-_TABLE = resources.files(__package__).joinpath("visemes.csv").read_text(encoding="ascii")
-_VISEMES = list(csv.DictReader(_TABLE.splitlines()))
+_VISEMES = read_shipped_table("lipmotion.meshes.fitting", "visemes.csv")
 VISEME_OF_PHONE = {phone: row["viseme"] for row in _VISEMES for phone in row["phones"].split()}
 """The groups of the Oculus LipSync reference, in the project's phones."""
 VISEME_CHANNELS = tuple(f"viseme_{name}" for name in VISEMES_15)

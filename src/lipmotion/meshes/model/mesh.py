@@ -190,12 +190,11 @@ class Mesh:
         _check_rows("triangles", self.triangles, len(self.vertices))
         if self.triangles.ndim != 2 or self.triangles.shape[1] != 3:
             raise InputError(f"triangles have shape {self.triangles.shape}, required (F, 3)")
-        if self.uv is not None and self.uv.shape != (*self.triangles.shape, 2):
-            raise InputError(f"uv has shape {self.uv.shape}, required {(*self.triangles.shape, 2)}")
-        if self.colours is not None and self.colours.shape != self.vertices.shape:
-            raise InputError(f"colours have shape {self.colours.shape}, required {self.vertices.shape}")
-        if self.tints is not None and self.tints.shape != (len(self.vertices), 4):
-            raise InputError(f"tints have shape {self.tints.shape}, required {(len(self.vertices), 4)}")
+        corners, vertices = (*self.triangles.shape, 2), self.vertices.shape
+        required = (("uv has", self.uv, corners), ("colours have", self.colours, vertices))
+        for what, array, fitting in (*required, ("tints have", self.tints, (len(self.vertices), 4))):
+            if array is not None and array.shape != fitting:
+                raise InputError(f"{what} shape {array.shape}, required {fitting}")
         if not self.parts:
             object.__setattr__(self, "parts", (MeshPart("", 0, len(self.triangles)),))
         edges = [0, *(part.stop for part in self.parts)]

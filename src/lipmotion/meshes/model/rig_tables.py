@@ -61,13 +61,11 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
         try:
             if not texts["control"]:
                 raise ValueError("a row without a control")
-            numbers = {
-                name: _number(texts[name], default)
-                for name, default in (("gain", 1.0), ("offset", 0.0), ("low", -np.inf), ("high", np.inf))
-            }
-            if numbers["low"] > numbers["high"]:
-                raise ValueError(f"{texts['control']!r} goes from {numbers['low']:g} to {numbers['high']:g}")
-            rows.append(RigRow(texts["control"], texts["source"], **numbers))
+            numbers = {name: _number(texts[name]) for name in COLUMNS[2:] if texts[name]}
+            row = RigRow(texts["control"], texts["source"], **numbers)
+            if row.low > row.high:
+                raise ValueError(f"{row.control!r} goes from {row.low:g} to {row.high:g}")
+            rows.append(row)
         except ValueError as error:
             raise InputError(f"{path}: line {line}: {shorten(str(error))}") from error
     if not rows or len(rows) > MAX_CONTROLS:
@@ -109,9 +107,7 @@ def apply_rig(rows: Sequence[RigRow], sources: Mapping[str, NDArray[np.float64]]
     return Motion(np.stack(columns, axis=1), rate_hz, tuple(Channel(name, CONTROL) for name in curves))
 
 
-def _number(text: str, default: float) -> float:
-    if not text:
-        return default
+def _number(text: str) -> float:
     value = parse_number(text.replace(",", "."))
     if not abs(value) <= LARGEST_NUMBER:
         raise ValueError(f"the number {text}, required at most {LARGEST_NUMBER:g}")

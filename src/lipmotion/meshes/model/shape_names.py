@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Mapping
-from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import Motion
 
-_ARKIT_TABLE = resources.files(__package__).joinpath("arkit.csv").read_text(encoding="ascii").splitlines()[1:]
-_GROUPS = dict(line.split(",") for line in _ARKIT_TABLE)
+_GROUPS = {row["name"]: row["group"] for row in read_shipped_table("lipmotion.meshes.model", "arkit.csv")}
 ARKIT_52 = tuple(_GROUPS)  # in the order of ARKit's documentation: eyes, jaw and mouth, brows, cheeks, nose, tongue
 ARKIT_MOUTH = tuple(name for name, group in _GROUPS.items() if group == "mouth")  # lips, jaw and tongue
 ARKIT_OTHERS = tuple(name for name, group in _GROUPS.items() if group != "mouth")  # the other 24
@@ -77,10 +75,9 @@ CLOSED = "closed"  # the name of lips that are pressed together, beside the vowe
 def _read_sets() -> dict[str, Sources]:
     """Return the sets of ``shape_sets.csv``, by their names; their gains were set by eye."""
     sets: dict[str, dict[str, tuple[tuple[str, float], ...]]] = {}
-    text = resources.files(__package__).joinpath("shape_sets.csv").read_text(encoding="ascii")
-    for name, known, source, gain in csv.reader(text.splitlines()[1:]):
-        shapes = sets.setdefault(name, {})
-        shapes[known] = (*shapes.get(known, ()), (source, float(gain)))
+    for row in read_shipped_table("lipmotion.meshes.model", "shape_sets.csv"):
+        shapes, known = sets.setdefault(row["set"], {}), row["arkit"]
+        shapes[known] = (*shapes.get(known, ()), (row["source"], float(row["gain"])))
     return dict(sets)
 
 
