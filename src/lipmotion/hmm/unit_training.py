@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.hmm.align import StateSequence, align_states, expand_states, place_words
 from lipmotion.hmm.loudness import smooth_level
-from lipmotion.hmm.model import HmmConfig, StateTable, UnitHmm, hmm_from_arrays, hmm_to_arrays, make_plain_states
+from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_from_arrays, hmm_to_arrays, make_plain_states
 from lipmotion.hmm.network import compute_log_likelihoods
 from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors
 from lipmotion.stats.bigram import estimate_bigram
@@ -25,6 +25,7 @@ from lipmotion.types import Monitor, Progress
 
 CELLS = 1_000_000
 """Frames × utterances × states of a batch whose posteriors are computed together: 8 MB an array, some fifty arrays."""
+MIN_STAY_PROBABILITY = 0.05  # smallest probability of staying in a state
 MIN_POSTERIOR = 1e-3  # smaller state posteriors are left out of the statistics of densities
 LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES = 200.0, 12.0
 """Largest mean duration, in frames, of a state of silence, and of a state of any other unit. Without the second limit
@@ -41,8 +42,8 @@ def reestimate_states(model: UnitHmm, statistics: UnitStatistics) -> UnitHmm:
     """
     measured = statistics.stay / np.maximum(statistics.occupied, 1e-9)
     stay = np.where(statistics.occupied > 0, measured, np.exp(model.log_stay))
-    longest = limit_durations(model.table)[: len(stay)]
-    log_stay = np.log(np.clip(stay, 0.05, 1 - 1 / longest)).astype(np.float32)
+    longest = limit_stay(np.repeat(model.table.units, model.table.counts), model.table.free)
+    log_stay = np.log(np.clip(stay, MIN_STAY_PROBABILITY, longest)).astype(np.float32)
     return replace(model, mixtures=reestimate_mixtures(model, statistics), log_stay=log_stay)
 
 
@@ -101,20 +102,39 @@ def accumulate_statistics(
 def _shard_sums(job: tuple[UnitHmm, tuple[list[NDArray[np.float32]], list[tuple[str, ...]]]]) -> Sums:
     hmm, (data, sequences) = job
     chains = [expand_states(hmm, sequence) for sequence in sequences]
-    frames = np.array([len(x) for x in data], np.intp)
-    states = np.array([len(chain.densities) for chain in chains], np.intp)
-    log_emission = np.zeros((frames.max(), len(chains), states.max()))
-    log_stay = np.full((len(chains), states.max()), -1.0)
-    for u, (x, chain) in enumerate(zip(data, chains, strict=True)):
+    log_emissions = []
+    for x, chain in zip(data, chains, strict=True):
         used, local = np.unique(chain.densities, return_inverse=True)
-        log_emission[: len(x), u, : states[u]] = hmm.mixtures.log_likelihood(x, used)[:, local]
-        log_stay[u, : states[u]] = hmm.log_stay[chain.plain]
-    log_move = np.log(-np.expm1(log_stay))
-    posterior, stay, log_likelihood = chain_posteriors(log_emission, log_stay, log_move, frames, states)
-    cut = [(posterior[: frames[u], u, : states[u]], stay[u, : states[u]]) for u in range(len(chains))]
-    possible = log_likelihood > LOG_ZERO / 2
+        log_emissions.append(hmm.mixtures.log_likelihood(x, used)[:, local])
+    posteriors = infer_chains(log_emissions, [hmm.log_stay[chain.plain] for chain in chains])
+    log_likelihood = np.array([each.log_likelihood for each in posteriors])
+    possible, frames = log_likelihood > LOG_ZERO / 2, np.array([len(x) for x in data])
     total = {"log likelihood": log_likelihood[possible].sum(), "frames": frames[possible].sum()}
-    return {**add_up(hmm, data, chains, cut), **total}
+    return {**add_up(hmm, data, chains, [(each.states, each.stay) for each in posteriors]), **total}
+
+
+class StatePosteriors(NamedTuple):
+    """The posteriors of an utterance's states [shape=(T, S)], and expected transitions to themselves [shape=(S,)]."""
+
+    states: NDArray[np.float64]
+    stay: NDArray[np.float64]
+    log_likelihood: float
+
+
+def infer_chains(
+    log_emissions: Sequence[NDArray[np.floating]], log_stays: Sequence[NDArray[np.floating]]
+) -> list[StatePosteriors]:
+    """Return the posteriors of states in a row, for several utterances [each shape=(T, S), (S,)], computed together."""
+    frames, states = np.array([each.shape for each in log_emissions], np.intp).T
+    log_emission = np.zeros((frames.max(), len(frames), states.max()))
+    log_stay = np.full((len(frames), states.max()), -1.0)
+    for u, (emission, stay) in enumerate(zip(log_emissions, log_stays, strict=True)):
+        log_emission[: frames[u], u, : states[u]], log_stay[u, : states[u]] = emission, stay
+    found = chain_posteriors(log_emission, log_stay, np.log(-np.expm1(log_stay)), frames, states)
+    return [
+        StatePosteriors(posterior[: frames[u], : states[u]], stay[: states[u]], float(log_likelihood))
+        for u, (posterior, stay, log_likelihood) in enumerate(zip(found[0].transpose(1, 0, 2), *found[1:], strict=True))
+    ]
 
 
 def add_up(
@@ -192,10 +212,10 @@ def sum_unit_statistics(sums: Sums) -> UnitStatistics:
     return UnitStatistics(sums["stay"], sums["occupied"], sums["components"], sums["features"], *total)
 
 
-def limit_durations(table: StateTable) -> NDArray[np.float64]:
-    """Return the largest mean duration allowed for each state, in frames [shape=(G,)]."""
-    units = [name.split(".")[0] for name in table.names]
-    return np.array([LONGEST_SILENCE_FRAMES if unit in table.free else LONGEST_STATE_FRAMES for unit in units])
+def limit_stay(units: Iterable[str], free: Collection[str]) -> NDArray[np.float64]:
+    """Return the largest probability of staying allowed in states without context, of these units [shape=(R,)]."""
+    longest = [LONGEST_SILENCE_FRAMES if unit in free else LONGEST_STATE_FRAMES for unit in units]
+    return 1 - 1 / np.array(longest)
 
 
 _CHECKPOINT = "phones"
@@ -403,7 +423,7 @@ def _make_flat_start(
     units = (*silence_and_pause, *sorted({u for s in sequences for u in s} - {inventory.silence}))
     counts = tuple(1 if unit == inventory.pause else config.states for unit in units)
     table = make_plain_states(units, counts, free=silence_and_pause)
-    log_stay = np.log(1 - 1 / limit_durations(table)).astype(np.float32)
+    log_stay = np.log(limit_stay(np.repeat(units, counts), table.free)).astype(np.float32)
     everything, count = np.concatenate(data), len(table.names)
     means, variances = (
         np.tile(values, (count, 1, 1)).astype(np.float32)

@@ -63,11 +63,9 @@ class Mixtures:
     def split(self) -> Mixtures:
         """Return mixtures of twice as many components: each is split into halves, which move apart along all axes."""
         step = SPLIT_STEP * np.sqrt(self.variances)
-        return Mixtures(
-            np.concatenate([self.log_weights, self.log_weights], axis=1) - np.float32(np.log(2)),
-            np.concatenate([self.means + step, self.means - step], axis=1),
-            np.concatenate([self.variances, self.variances], axis=1),
-        )
+        means = np.concatenate([self.means + step, self.means - step], axis=1)
+        log_weights = np.tile(self.log_weights, (1, 2)) - np.float32(np.log(2))
+        return Mixtures(log_weights, means, np.tile(self.variances, (1, 2, 1)))
 
     def select(self, chosen: NDArray[np.intp]) -> Mixtures:
         """Return copies of the chosen densities, in the given order."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import Any, ClassVar, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,9 +70,11 @@ class SequenceNetwork(ABC):
         """All weights and biases; the last two are those of ``output``."""
         return [array for layer in (*self.layers, self.output) for array in layer]
 
-    @abstractmethod
     def with_parameters(self: NetworkT, parameters: Sequence[Array]) -> NetworkT:
         """Return the network with other weights and biases, in the order of ``parameters``."""
+        arrays = iter(parameters)
+        *layers, output = (type(layer)(*islice(arrays, len(layer))) for layer in (*self.layers, self.output))
+        return cast(NetworkT, replace(cast(Any, self), layers=tuple(layers), output=output))
 
     @abstractmethod
     def forward(self, inputs: Array, inside: NDArray[np.bool_], dropout: Dropout | None) -> tuple[Array, Any]:
@@ -176,22 +179,23 @@ class _AdamW:
             np.subtract(parameter, np.float32(rate) * change, out=parameter)
 
 
+def pad_batch(sequences: Sequence[NDArray[Any]]) -> tuple[Array, NDArray[np.bool_]]:
+    """Return B sequences [each shape=(T_i, I)] as one table [shape=(B, T, I)], and where it is before their ends."""
+    inside = np.arange(max(map(len, sequences))) < np.array([len(each) for each in sequences])[:, None]
+    batch = np.zeros((*inside.shape, sequences[0].shape[1]), np.float32)
+    batch[inside] = np.concatenate(sequences)
+    return batch, inside
+
+
 def _differentiate(
     network: SequenceNetwork, batch: Sequence[TrainingSequence], weights: Array, dropout: float, seed: int
 ) -> tuple[float, list[Array]]:
     """Return the weighted squared error of some sequences, and its gradient for every parameter."""
     if not batch:
         return 0.0, [np.zeros_like(array) for array in network.parameters]
-    length = max(len(sequence.inputs) for sequence in batch)
-    inputs = np.zeros((len(batch), length, batch[0].inputs.shape[1]), np.float32)
-    targets = np.zeros((len(batch), length, len(weights)), np.float32)
-    counts = np.zeros((len(batch), length, 1), np.float32)
-    inside = np.zeros((len(batch), length), bool)
-    for number, sequence in enumerate(batch):
-        rows = len(sequence.inputs)
-        inputs[number, :rows], targets[number, :rows] = sequence.inputs, sequence.targets
-        counts[number, :rows, 0] = sequence.valid
-        inside[number, :rows] = True
+    inputs, inside = pad_batch([sequence.inputs for sequence in batch])
+    targets, _ = pad_batch([sequence.targets for sequence in batch])
+    counts, _ = pad_batch([sequence.valid[:, None] for sequence in batch])
     states, passed = network.forward(inputs, inside, Dropout(dropout, np.random.default_rng(seed)))
     error: Array = (states @ network.output.weights + network.output.biases - targets) * counts
     slope: Array = 2 * error * weights

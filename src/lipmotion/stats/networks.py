@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.network_training import Array, Dropout, LinearMap, SequenceNetwork
+from lipmotion.stats.network_training import Array, Dropout, LinearMap, SequenceNetwork, pad_batch
 
 TAPS = 3  # time steps that each unit sees of the layer below: one before, the same, one after; ``dilation`` steps apart
 BLOCK = 4096  # time steps computed at a time, so that the memory does not grow with the sequence
@@ -52,10 +52,6 @@ class ConvolutionalNetwork(SequenceNetwork):
     def reach(self) -> int:
         """How many time steps before and after a step change its output."""
         return sum(self.dilations)
-
-    def with_parameters(self, parameters: Sequence[Array]) -> ConvolutionalNetwork:  # noqa: D102
-        pairs = [LinearMap(*parameters[i : i + 2]) for i in range(0, len(parameters), 2)]
-        return replace(self, layers=tuple(pairs[:-1]), output=pairs[-1])
 
     def forward(  # noqa: D102
         self,
@@ -176,19 +172,10 @@ class RecurrentNetwork(SequenceNetwork):
         for number in range(0, len(starts), PIECES):
             pieces = [(max(start - REACH, 0), start) for start in starts[number : number + PIECES]]
             rows = [inputs[first : start + PIECE + REACH] for first, start in pieces]
-            length = max(len(each) for each in rows)
-            batch = np.zeros((len(rows), length, inputs.shape[1]), np.float32)
-            inside = np.zeros((len(rows), length), bool)
-            for place, each in enumerate(rows):
-                batch[place, : len(each)], inside[place, : len(each)] = each, True
-            states, _ = self.forward(batch, inside, None)
+            states, _ = self.forward(*pad_batch(rows), None)
             for (first, start), each, state in zip(pieces, rows, states, strict=True):
                 result[start : start + PIECE] = state[start - first : min(start - first + PIECE, len(each))]
         return result
-
-    def with_parameters(self, parameters: Sequence[Array]) -> RecurrentNetwork:  # noqa: D102
-        layers = tuple(RecurrentLayer(*parameters[i : i + 3]) for i in range(0, len(parameters) - 2, 3))
-        return replace(self, layers=layers, output=LinearMap(*parameters[-2:]))
 
     def forward(  # noqa: D102
         self, inputs: Array, inside: NDArray[np.bool_], dropout: Dropout | None

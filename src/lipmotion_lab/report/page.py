@@ -184,25 +184,14 @@ def _write_part(part: FinishedPart) -> Html:
     ]
     if len(more) > FOLDED:
         more = [element("details", element("summary", f"{len(more)} more tables"), *more)]
-    pictures = [
-        add_caption(
-            element("img", src=f"{part.name}/{each['file']}", alt=each["caption"], loading="lazy"), each["caption"]
-        )
-        for each in part.record["pictures"]
-    ]
-    videos = [
-        add_caption(
-            element(
-                "video",
-                controls=True,
-                preload="metadata",
-                src=f"{part.name}/{each['file']}",
-                aria_label=each["caption"],
-            ),
-            each["caption"],
-        )
-        for each in part.record.get("videos", ())
-    ]
+    pictures, videos = [], []
+    for each in part.record["pictures"]:
+        source, caption = f"{part.name}/{each['file']}", each["caption"]
+        pictures.append(add_caption(element("img", src=source, alt=caption, loading="lazy"), caption))
+    for each in part.record.get("videos", ()):
+        source, caption = f"{part.name}/{each['file']}", each["caption"]
+        video = element("video", controls=True, preload="metadata", src=source, aria_label=caption)
+        videos.append(add_caption(video, caption))
     made_with = {
         key: ", ".join(f"{name} {value}" for name, value in content.items() if value is not None)
         if isinstance(content, Mapping)
@@ -210,6 +199,8 @@ def _write_part(part: FinishedPart) -> Html:
         for key, content in part.record["stamp"].items()
         if content is not None
     }
+    figures = element("a", "all figures as JSON", href=f"{part.name}/figures.json")
+    beside = element("p", "Beside this page: ", figures, ".")
     return element(
         "section",
         element("h2", section.title, id=heading),
@@ -220,14 +211,7 @@ def _write_part(part: FinishedPart) -> Html:
         *more,
         *([element("h3", part.record["clip"]), element("div", *videos, class_="videos")] if videos else []),
         *([element("h3", "Pictures"), element("div", *pictures, class_="pictures")] if pictures else []),
-        element(
-            "details",
-            element("summary", "How this was made"),
-            _list(made_with),
-            element(
-                "p", "Beside this page: ", element("a", "all figures as JSON", href=f"{part.name}/figures.json"), "."
-            ),
-        ),
+        element("details", element("summary", "How this was made"), _list(made_with), beside),
         id=part.name,
         aria_labelledby=heading,
     )

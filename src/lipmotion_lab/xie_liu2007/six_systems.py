@@ -286,10 +286,8 @@ def _measure_systems(
         if name == systems.BLSTM and system.tried:
             row |= {key: getattr(systems.find_best_trial(system.tried), key) for key in ("parameters", "options")}
         if isinstance(system.model, CoupledModel):
-            row |= {
-                "parameters": system.model.chains.parameters,
-                "options": systems.list_changed_options(system.engine.config),
-            }
+            row["parameters"] = system.model.chains.parameters
+            row["options"] = systems.list_changed_options(system.engine.config)
         training[name] = row
     return {
         "training": training,

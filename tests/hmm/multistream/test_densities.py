@@ -147,7 +147,7 @@ def test_a_model_comes_back_as_it_was():
     arrays = joint_to_arrays(HMM, np.float32)
     again = joint_from_arrays(arrays, HMM.config)
     data = observed(np.random.default_rng(2), 30)
-    assert recognise.recognise_units(again, data) == recognise.recognise_units(HMM, data)
+    assert recognise.recognise_units(again, data)[0] == recognise.recognise_units(HMM, data)[0]
     found, wanted = (
         recognise.solve_trajectory(recognise.select_densities(m, recognise.align(m, data, ("sil", "a", "sil"))))
         for m in (again, HMM)

@@ -67,19 +67,13 @@ def explain_frames(
 
 def list_chain_states(chains: Chains, posteriors: LatticePosteriors, row: int) -> tuple[ChainStates, ...]:
     """Return the most probable states of each chain in a frame, and the probabilities of its asynchrony."""
-    structure = chains.structure
-    return tuple(
-        ChainStates(
-            unit_set.name,
-            _rank_by_probability(
-                [structure.state_name(number, state) for state in range(count)], posteriors.chains[number][row]
-            ),
-            dict(zip(list_leads(chains, number), lead[row].tolist(), strict=True)),
-        )
-        for number, (unit_set, count, lead) in enumerate(
-            zip(structure.chains, structure.state_counts, sum_lead_posteriors(chains, posteriors), strict=True)
-        )
-    )
+    structure, found = chains.structure, []
+    for number, lead in enumerate(sum_lead_posteriors(chains, posteriors)):
+        names = [structure.state_name(number, state) for state in range(structure.state_counts[number])]
+        ranked = _rank_by_probability(names, posteriors.chains[number][row])
+        ahead = dict(zip(list_leads(chains, number), lead[row].tolist(), strict=True))
+        found.append(ChainStates(structure.chains[number].name, ranked, ahead))
+    return tuple(found)
 
 
 def find_joint_state(chains: Chains, posteriors: LatticePosteriors, row: int) -> NamedProbability | None:
@@ -112,19 +106,12 @@ def sum_lead_posteriors(chains: Chains, posteriors: LatticePosteriors) -> list[S
 
 def infer_units(chains: Chains, posteriors: LatticePosteriors, frames: slice) -> list[ChainPosteriors]:
     """Return the posteriors of the units of each chain in some frames."""
-    structure = chains.structure
-    return [
-        ChainPosteriors(
-            unit_set.name,
-            units,
-            posteriors.chains[number][frames].reshape(-1, len(units), structure.states).sum(axis=2),
-            list_leads(chains, number),
-            lead[frames],
-        )
-        for number, (unit_set, units, lead) in enumerate(
-            zip(structure.chains, structure.units, sum_lead_posteriors(chains, posteriors), strict=True)
-        )
-    ]
+    structure, found = chains.structure, []
+    for number, lead in enumerate(sum_lead_posteriors(chains, posteriors)):
+        name, units = structure.chains[number].name, structure.units[number]
+        probability = posteriors.chains[number][frames].reshape(-1, len(units), structure.states).sum(axis=2)
+        found.append(ChainPosteriors(name, units, probability, list_leads(chains, number), lead[frames]))
+    return found
 
 
 def _rank_by_probability(names: Sequence[str], probability: NDArray[np.floating]) -> tuple[NamedProbability, ...]:

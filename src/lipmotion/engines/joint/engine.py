@@ -17,7 +17,7 @@ from lipmotion.hmm.multistream.densities import MOTION, StreamObservations, Stre
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_arrays, joint_to_arrays
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, grow_joint
 from lipmotion.hmm.multistream.recognise import StatePath, align, merge_gaussians, recognise_units, select_densities
-from lipmotion.hmm.multistream.unit_states import Inventory, RecognisedUnit, frames_to_units, units_to_frames
+from lipmotion.hmm.multistream.unit_states import Inventory, frames_to_units, units_to_frames
 from lipmotion.motion.arrays import MOTION_ARRAYS, motion_from_arrays, motion_to_arrays
 from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import Closure, fit_closure
@@ -229,10 +229,10 @@ class JointEngine(Engine[JointModel]):
         observations, duration_s = self._observations(speech), speech.features.duration_s
 
         def recognise() -> tuple[Timeline[Unit], StatePath]:
-            segments = recognise_units(model.hmm, observations)
-            units = frames_to_units(segments, duration_s, lambda unit: replace(model.units.label(unit), confidence=0.0))
-            bounds = np.array([*(segment.first for segment in segments), observations.frames])
-            return units, align(model.hmm, observations, [segment.unit for segment in segments], bounds)
+            names, bounds = recognise_units(model.hmm, observations)
+            labels = (replace(model.units.label(name), confidence=0.0) for name in names)
+            units = frames_to_units(labels, bounds, duration_s)
+            return units, align(model.hmm, observations, names, bounds)
 
         if self.config.recognise_units and not speech.units_decide:
             units, path = speech.cached(model.hmm, recognise)
@@ -296,9 +296,7 @@ def _align_times(
         bounds = align(model.hmm, observations, names).bounds(len(names))
     except AlignmentError:
         return units
-    labels = iter(span.label for span in spoken)
-    timed = [RecognisedUnit(name, int(first)) for name, first in zip(names, bounds[:-1], strict=True)]
-    return frames_to_units(timed, duration_s, lambda _: next(labels))
+    return frames_to_units((span.label for span in spoken), bounds, duration_s)
 
 
 def _align(model: JointModel, observations: StreamObservations, units: Timeline[Unit]) -> StatePath:

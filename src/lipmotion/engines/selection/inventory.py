@@ -179,17 +179,12 @@ def list_windows(timelines: Sequence[Timeline[Unit]]) -> PhoneWindows:
         for span in units:
             if span.label.phone not in PHONE_NUMBER:
                 raise InputError(describe_unknown_phone(span.label.phone, f" at {span.start_s} s"))
-        spoken = [(span.label.word, is_silent(span.label.phone)) for span in units]
-        for position, span in enumerate(units):
             recording.append(number)
             phones.append(PHONE_NUMBER[span.label.phone])
             times_s.append((span.start_s, span.end_s))
-            words.append(
-                tuple(
-                    not 0 <= other < len(spoken) or spoken[other] != spoken[position]
-                    for other in (position - 1, position + 1)
-                )
-            )
+        spoken = [(span.label.word, is_silent(span.label.phone)) for span in units]
+        around = zip([None, *spoken], spoken, [*spoken[1:], None], strict=False)
+        words += [(before != here, here != after) for before, here, after in around]
         stress += [UNKNOWN_STRESS if each is None else each for each in find_stress(units)]
     return PhoneWindows(
         np.array(recording, np.int32),

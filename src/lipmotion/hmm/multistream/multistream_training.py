@@ -33,15 +33,14 @@ from lipmotion.hmm.multistream.model import (
     list_context_questions,
 )
 from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState, expand_triphones
-from lipmotion.hmm.unit_training import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES, group_by_length
-from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors
+from lipmotion.hmm.unit_training import MIN_STAY_PROBABILITY, StatePosteriors, group_by_length, infer_chains, limit_stay
+from lipmotion.kernels.forward_backward import LOG_ZERO
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.em import Sums, run_em, sum_statistics
 from lipmotion.stats.trees import Question
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Monitor, Progress, silent_monitor, sub_monitor
 
-MIN_STAY_PROBABILITY = 0.05  # smallest probability of staying in a state
 MIN_MIXTURE_POSTERIOR = 1e-5
 """Smaller state posteriors are left out of the statistics of mixtures; nearly all posteriors are smaller."""
 Rows = NDArray[np.float32]
@@ -77,14 +76,6 @@ class PreparedUtterances:
 
     items: tuple[PreparedUtterance, ...]
     triphones: tuple[TriphoneState, ...]
-
-
-class StatePosteriors(NamedTuple):
-    """The posteriors of an utterance's states [shape=(T, S)], and expected transitions to themselves [shape=(S,)]."""
-
-    states: NDArray[np.float64]
-    stay: NDArray[np.float64]
-    log_likelihood: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,22 +125,13 @@ def infer_batches(
     """Give utterances with the posteriors of their states; those without a path are left out."""
     if not items:
         return
-    weights, log_move = hmm.config.training, hmm.log_move
-    frames = np.array([item.frames for item in items], np.intp)
-    states = np.array([len(item.monophones) for item in items], np.intp)
-    log_emission = np.zeros((frames.max(), len(items), states.max()))
-    log_keep, log_leave = np.full((2, len(items), states.max()), -1.0)
-    for u, item in enumerate(items):
-        inside = (slice(frames[u]), u, slice(states[u]))
+    weights, log_emissions = hmm.config.training, []
+    for item in items:
         streams = {name: stream for name, stream in item.streams.items() if name in weights.active}
         item_leaves = {name: leaves[name][item.triphones] for name in streams}
-        log_emission[inside] = hmm.log_density(streams, item_leaves, weights)
-        log_keep[inside[1:]], log_leave[inside[1:]] = hmm.log_stay[item.monophones], log_move[item.monophones]
-    posterior, stay, log_likelihood = chain_posteriors(log_emission, log_keep, log_leave, frames, states)
-    for u, item in enumerate(items):
-        if log_likelihood[u] > LOG_ZERO / 2:
-            of_item = posterior[: frames[u], u, : states[u]]
-            yield item, StatePosteriors(of_item, stay[u, : states[u]], float(log_likelihood[u]))
+        log_emissions.append(hmm.log_density(streams, item_leaves, weights))
+    found = infer_chains(log_emissions, [hmm.log_stay[item.monophones] for item in items])
+    yield from (pair for pair in zip(items, found, strict=True) if pair[1].log_likelihood > LOG_ZERO / 2)
 
 
 class _Accounts(NamedTuple):
@@ -229,16 +211,9 @@ def reestimate_hmm(hmm: JointHmm, statistics: StreamStatistics) -> JointHmm:
     }
     measured = statistics.stay / np.maximum(statistics.occupied, 1e-9)
     stay = np.where(statistics.occupied > 1, measured, np.exp(hmm.log_stay))
-    log_stay = np.log(np.clip(stay, MIN_STAY_PROBABILITY, limit_stay(hmm.inventory)))
+    longest = limit_stay((unit for unit, _ in hmm.inventory.monophones), hmm.inventory.free)
+    log_stay = np.log(np.clip(stay, MIN_STAY_PROBABILITY, longest))
     return replace(hmm, models=models, log_stay=log_stay)
-
-
-def limit_stay(inventory: Inventory) -> NDArray[np.float64]:
-    """Return the largest probability of staying allowed for each state without context [shape=(R,)]."""
-    longest = [
-        LONGEST_SILENCE_FRAMES if unit in inventory.free else LONGEST_STATE_FRAMES for unit, _ in inventory.monophones
-    ]
-    return 1 - 1 / np.array(longest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -338,7 +313,7 @@ def _make_equal_models(
         models[name] = StreamModel(scale, forest, tied)
     free, silence = inventory.free, inventory.silence
     sequences = [tuple(silence if unit in free else unit for unit in utterance.units) for utterance in utterances]
-    log_stay = np.log(limit_stay(inventory))
+    log_stay = np.log(limit_stay((unit for unit, _ in inventory.monophones), inventory.free))
     bigram = estimate_bigram(inventory.names, sequences)
     return JointHmm(config, inventory, models, log_stay, spoken, bigram)
 

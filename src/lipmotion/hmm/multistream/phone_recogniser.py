@@ -51,10 +51,10 @@ class OwnPhoneRecogniser:
         if _score_similarity(self.hmm, observations) < self.training_score + SIMILARITY_MARGIN:
             return None
         try:
-            segments = recognise_units(self.hmm, observations)
+            units, bounds = recognise_units(self.hmm, observations)
         except AlignmentError:  # shorter than any phone
             return None
-        return frames_to_units(segments, speech.features.duration_s)
+        return frames_to_units(map(Unit, units), bounds, speech.features.duration_s)
 
 
 def fit_phone_recogniser(

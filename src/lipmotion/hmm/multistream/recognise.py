@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.multistream.densities import ACOUSTIC_STREAMS, MOTION, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.model import JointHmm
-from lipmotion.hmm.multistream.unit_states import RecognisedUnit, TriphoneStates, expand_triphones
+from lipmotion.hmm.multistream.unit_states import TriphoneStates, expand_triphones
 from lipmotion.hmm.network import LogLikelihoods, UnitLoop, build_chain, build_loop, decode_path, score_language
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.stats.curves import with_dynamics
@@ -101,9 +101,10 @@ def build_context_loop(hmm: JointHmm) -> tuple[UnitLoop, dict[str, NDArray[np.in
     return loop, dict(zip(acoustic, distinct.T, strict=True))
 
 
-def recognise_units(hmm: JointHmm, observed: StreamObservations) -> list[RecognisedUnit]:
+def recognise_units(hmm: JointHmm, observed: StreamObservations) -> tuple[tuple[str, ...], NDArray[np.intp]]:
     """Return the likeliest of all sequences of units that occurred in training, in context, with the back-off bigram.
 
+    With it the first frame of each unit, and the frame count at the end.
     The search is exact, whether trees of acoustic streams ask about one neighbour or both. Where units have one state,
     a unit spoken twice in a row is recognised once.
     Raises InputError: no active stream. Raises AlignmentError: too few frames.
@@ -116,8 +117,7 @@ def recognise_units(hmm: JointHmm, observed: StreamObservations) -> list[Recogni
         rows = {name: stream[first:end] for name, stream in streams.items()}
         return hmm.log_density(rows, leaves, weights).astype(np.float32)
 
-    units, starts = decode_path(loop, loop.network.best_path(LogLikelihoods(observed.frames, log_density)))
-    return [RecognisedUnit(unit, int(first)) for unit, first in zip(units, starts[:-1], strict=True)]
+    return decode_path(loop, loop.network.best_path(LogLikelihoods(observed.frames, log_density)))
 
 
 Array = NDArray[np.float64]

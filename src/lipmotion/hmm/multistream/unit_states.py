@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,13 +97,6 @@ def expand_triphones(inventory: Inventory, units: Sequence[str]) -> TriphoneStat
     return TriphoneStates(triphones, np.repeat(np.arange(len(units)), counts), monophones)
 
 
-class RecognisedUnit(NamedTuple):
-    """A recognised unit, and its first frame."""
-
-    unit: str
-    first: int
-
-
 def units_to_frames(
     units: Timeline[Unit], frames: int, silence: str, unit_of: Callable[[Unit], str] = attrgetter("phone")
 ) -> tuple[tuple[str, ...], NDArray[np.intp]]:
@@ -136,10 +128,7 @@ def units_to_frames(
     return tuple(names), np.array([*firsts, frames], np.intp)
 
 
-def frames_to_units(
-    recognised: Sequence[RecognisedUnit], duration_s: float, label_of: Callable[[str], Unit] = Unit
-) -> Timeline[Unit]:
-    """Return recognised units from 0 s to ``duration_s``, labelled by ``label_of``: frame n covers (n ± ½) · 10 ms."""
-    edges = np.clip((np.array([unit.first for unit in recognised]) - 0.5) / FRAME_RATE_HZ, 0, duration_s).tolist()
-    spans = zip(edges, [*edges[1:], duration_s], recognised, strict=True)
-    return Timeline(tuple(Span(start_s, end_s, label_of(unit.unit)) for start_s, end_s, unit in spans))
+def frames_to_units(labels: Iterable[Unit], bounds: NDArray[np.intp], duration_s: float) -> Timeline[Unit]:
+    """Return units with the bounds of ``units_to_frames`` from 0 s to ``duration_s``: frame n is (n ± ½) · 10 ms."""
+    edges = np.clip((bounds[:-1] - 0.5) / FRAME_RATE_HZ, 0, duration_s).tolist()
+    return Timeline(tuple(Span(*each) for each in zip(edges, [*edges[1:], duration_s], labels, strict=True)))

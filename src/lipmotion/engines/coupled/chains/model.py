@@ -68,19 +68,11 @@ class NetworkLattice(Lattice):
                 total += log[first:end].take(tie, axis=1)
             return total
 
-        count = len(self.states)
-        path, score = best_path(
-            log_emission,
-            len(logs[0]),
-            NetworkArrays(
-                np.arange(count),
-                self.network.arc_from,
-                transitions.arc_log[self.transition_index].astype(np.float32),
-                self.network.arc_start,
-                transitions.log_initial[self.states].astype(np.float32),
-                np.zeros(count, np.float32),
-            ),
-        )
+        everywhere, log_final = np.arange(len(self.states)), np.zeros(len(self.states), np.float32)
+        arc_log = transitions.arc_log[self.transition_index].astype(np.float32)
+        log_initial = transitions.log_initial[self.states].astype(np.float32)
+        arcs = self.network.arc_from, arc_log, self.network.arc_start
+        path, score = best_path(log_emission, len(logs[0]), NetworkArrays(everywhere, *arcs, log_initial, log_final))
         return self.states[path], score
 
 
@@ -160,13 +152,9 @@ class Chains:
         Returns log densities [each shape=(T, G')], -inf for units that are not allowed, and the responsibilities of
         mixture components [each shape=(T, M, G')]; None: one component.
         """
-        logs, responsibilities = zip(
-            *(
-                group.log_densities(observations, own)
-                for group, own in zip(self.groups, lattice.densities, strict=True)
-            ),
-            strict=True,
-        )
+        pairs = zip(self.groups, lattice.densities, strict=True)
+        of_groups = (group.log_densities(observations, densities) for group, densities in pairs)
+        logs, responsibilities = zip(*of_groups, strict=True)
         return lattice.masked(logs), responsibilities
 
     def infer(self, observations: AudioVisualObservations, lattice: Lattice) -> Inference:
