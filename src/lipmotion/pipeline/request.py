@@ -131,9 +131,7 @@ class Request(Configuration):
         metavar="NAME",
         help="of labels with several tiers or speakers, the tier or the speaker that is read (default: all speakers)",
     )
-    edits: Path | None = _file(
-        "edits", "FILE", "file of edits from lipmotion edit (docs/edit.md)", replaceable=True
-    )
+    edits: Path | None = _file("edits", "FILE", "file of edits from lipmotion edit (docs/edit.md)", replaceable=True)
     recogniser: str = option(
         "auto",
         metavar="KIND",
