@@ -1,150 +1,34 @@
-"""The characters that are drawn: a man, a cartoon, and a woman, who is the portrait of the first version."""
+"""The characters that are drawn, in ``characters.json``: the woman of the first version, a man, a cartoon."""
 
 from __future__ import annotations
 
+import json
+from importlib import resources
+from typing import Any
+
 from lipmotion_faces.portrait.design import Design, EyeDesign, LipDesign, Lock, Palette, close_curve, mirror_curve
 
-MAN = Design(
-    palette=Palette(
-        wall=(206, 214, 222), wall_light=(236, 239, 240), skin=(214, 160, 122), skin_light=(238, 192, 152),
-        skin_shade=(176, 112, 80), skin_deep=(128, 74, 52), blush=(208, 122, 92), beard=(116, 82, 68),
-        hair=(44, 36, 34), hair_dark=(26, 22, 22), hair_light=(92, 76, 66), lashes=(34, 26, 24), cloth=(66, 76, 104),
-        cloth_light=(96, 108, 138), cloth_dark=(44, 52, 76), iris=(106, 72, 46), iris_light=(168, 118, 70),
-        iris_dark=(52, 34, 24), upper_lip_light=(186, 112, 90), upper_lip_dark=(150, 80, 66),
-        lower_lip_light=(198, 122, 100), lower_lip_dark=(166, 94, 76), gloss=(226, 166, 140), seam=(106, 51, 43),
-        mouth_shadow=(124, 72, 52),
-    ),
-    head="0 -0.93, 0.38 -0.87, 0.66 -0.62, 0.765 -0.2, 0.775 0.2, 0.76 0.6, 0.7 0.94, 0.53 1.23, 0.27 1.4, 0 1.43",
-    neck=close_curve(
-        "-0.45 0.7, -0.45 1.2, -0.47 1.5, -0.74 1.7, -1.1 1.84, -1.1 2.6, 1.1 2.6, 1.1 1.84, 0.74 1.7, 0.47 1.5,"
-        "0.45 1.2, 0.45 0.7"
-    ),
-    shoulders=close_curve(
-        "-0.66 1.66, -1.0 1.72, -1.5 1.84, -1.86 2.1, -1.95 2.6, 1.95 2.6, 1.86 2.1, 1.5 1.84, 1.0 1.72, 0.66 1.66,"
-        "0.42 1.9, 0.18 2.08, 0 2.16, -0.18 2.08, -0.42 1.9"
-    ),
-    collar=(
-        close_curve(
-            "-0.62 1.6, -0.7 1.68, -0.66 1.86, -0.5 2.06, -0.3 2.2, -0.14 2.16, -0.05 2.1, -0.3 1.92, -0.5 1.74"
-        ),
-        close_curve("0.62 1.6, 0.7 1.68, 0.66 1.86, 0.5 2.06, 0.3 2.2, 0.14 2.16, 0.05 2.1, 0.3 1.92, 0.5 1.74"),
-    ),
-    lips=LipDesign(line_y=0.93, half_width=0.315, upper=0.056, lower=0.092, seam=0.006, smile=-0.048),
-    eyes=EyeDesign(
-        upper=((0.18, 0.03), (0.25, -0.045), (0.35, -0.08), (0.45, -0.063), (0.515, -0.004)),
-        lower=((0.18, 0.03), (0.26, 0.056), (0.365, 0.065), (0.46, 0.038), (0.515, -0.004)),
-        iris=0.094,
-        lashes=0.5,
-        brow="0.155 -0.24, 0.28 -0.264, 0.44 -0.274, 0.6 -0.222",
-        brow_widths=(0.02, 0.05, 0.058, 0.046, 0.012),
-    ),
-    ear="0.72 0.0, 0.82 -0.08, 0.91 -0.01, 0.905 0.2, 0.85 0.4, 0.79 0.5, 0.72 0.42",
-    ear_hollow="0.785 0.05, 0.84 0.0, 0.866 0.07, 0.856 0.19, 0.81 0.32, 0.785 0.22",
-    cap=mirror_curve("0 -1.1, 0.5 -1.02, 0.8 -0.7, 0.845 -0.3, 0.825 0.02, 0.76 0.12, 0.4 0.2, 0 0.2"),
-    hair=(
-        Lock(
-            close_curve(
-                "-0.835 0.06, -0.86 -0.3, -0.83 -0.68, -0.62 -1.0, -0.3 -1.16, 0.1 -1.22, 0.5 -1.12, 0.78 -0.84,"
-                "0.86 -0.4, 0.835 0.06, 0.775 0.14, 0.755 -0.14, 0.69 -0.4, 0.58 -0.58, 0.3 -0.66, 0.0 -0.62,"
-                "-0.3 -0.64, -0.56 -0.56, -0.69 -0.38, -0.755 -0.14, -0.775 0.14"
-            ),
-            (-0.3, -0.98, 0.36, 0.1),
-            (
-                "-0.6 -0.6, -0.52 -0.84, -0.2 -1.02, 0.2 -1.08",
-                "-0.3 -0.66, -0.1 -0.86, 0.2 -0.98, 0.5 -0.98",
-                "0.05 -0.64, 0.25 -0.8, 0.5 -0.86, 0.7 -0.78",
-            ),
-        ),
-    ),
-    nose_width=1.14,
-    beard=0.24,
-    blush=0.2,
-)  # fmt: skip
+PARTS = {"palette": Palette, "lips": LipDesign, "eyes": EyeDesign}
 
 
-CARTOON = Design(
-    palette=Palette(
-        wall=(255, 214, 120), wall_light=(255, 224, 150), skin=(255, 205, 160), skin_light=(255, 222, 186),
-        skin_shade=(240, 172, 124), skin_deep=(214, 138, 96), blush=(252, 160, 130), hair=(232, 98, 58),
-        hair_dark=(176, 62, 40), hair_light=(250, 142, 84), lashes=(58, 32, 40), cloth=(60, 132, 196),
-        cloth_light=(90, 160, 220), cloth_dark=(40, 96, 156), eye_white=(255, 255, 255), iris=(70, 120, 90),
-        iris_dark=(58, 32, 40), pupil=(40, 24, 32), upper_lip_light=(240, 160, 122), upper_lip_dark=(240, 160, 122),
-        lower_lip_light=(243, 166, 128), lower_lip_dark=(243, 166, 128), seam=(58, 32, 40), cavity=(98, 24, 40),
-        tooth=(255, 255, 255), lower_tooth=(244, 240, 236), tongue=(240, 108, 112), line=(58, 32, 40),
-    ),
-    head="0 -0.95, 0.42 -0.88, 0.74 -0.58, 0.85 -0.1, 0.85 0.35, 0.83 0.72, 0.7 1.06, 0.42 1.28, 0.18 1.36, 0 1.37",
-    neck=close_curve(
-        "-0.3 0.7, -0.3 1.2, -0.31 1.5, -0.5 1.74, -1.0 1.9, -1.0 2.6, 1.0 2.6, 1.0 1.9, 0.5 1.74, 0.31 1.5,"
-        "0.3 1.2, 0.3 0.7"
-    ),
-    shoulders=close_curve(
-        "-0.46 1.7, -0.8 1.78, -1.15 1.92, -1.4 2.2, -1.5 2.8, 1.5 2.8, 1.4 2.2, 1.15 1.92, 0.8 1.78, 0.46 1.7,"
-        "0.3 1.86, 0.14 1.95, 0 1.98, -0.14 1.95, -0.3 1.86"
-    ),
-    lips=LipDesign(line_y=0.9, half_width=0.3, upper=0.036, lower=0.05, seam=0.012, smile=-0.058, outline=0.024),
-    eyes=EyeDesign(
-        x=0.35,
-        y=0.0,
-        iris=0.12,
-        upper=((0.15, 0.025), (0.22, -0.076), (0.35, -0.114), (0.48, -0.08), (0.555, 0.015)),
-        lower=((0.15, 0.025), (0.23, 0.09), (0.35, 0.11), (0.47, 0.085), (0.555, 0.015)),
-        lashes=1.05,
-        brow="0.165 -0.345, 0.3 -0.376, 0.45 -0.374, 0.585 -0.322",
-        brow_widths=(0.026, 0.05, 0.054, 0.044, 0.022),
-    ),
-    ear="0.8 0.1, 0.9 0.0, 1.0 0.06, 0.99 0.26, 0.92 0.4, 0.82 0.42",
-    ear_hollow="0.88 0.14, 0.93 0.1, 0.95 0.17, 0.93 0.27, 0.88 0.32",
-    hair=(
-        Lock(
-            close_curve(
-                "-0.86 0.02, -0.93 -0.36, -0.86 -0.74, -0.62 -1.04, -0.36 -1.12, -0.2 -1.3, 0.08 -1.36, 0.3 -1.22,"
-                "0.56 -1.14, 0.84 -0.84, 0.93 -0.4, 0.86 0.02, 0.8 -0.24, 0.66 -0.5, 0.5 -0.62, 0.3 -0.54, 0.06 -0.64,"
-                "-0.2 -0.52, -0.44 -0.6, -0.66 -0.48, -0.8 -0.24"
-            ),
-            None,
-            ("-0.3 -0.98, -0.12 -1.12, 0.1 -1.16, 0.26 -1.1", "0.4 -0.98, 0.56 -0.9, 0.68 -0.74, 0.74 -0.56"),
-        ),
-    ),
-    blush=0.55,
-    line=0.026,
-)  # fmt: skip
+def _read_design(drawn: dict[str, Any]) -> Design:
+    """Return the design of a character: its parts, and its outlines, closed or mirrored."""
+    values: dict[str, Any] = dict(drawn)
+    values |= {name: kind(**_as_tuples(drawn[name])) for name, kind in PARTS.items() if name in drawn}
+    values |= {name: close_curve(drawn[name]) for name in ("neck", "shoulders")}
+    values |= {name: mirror_curve(drawn[name]) for name in ("cap", "hair_behind") if name in drawn}
+    values["collar"] = tuple(map(close_curve, drawn.get("collar", ())))
+    values["hair"] = tuple(
+        Lock(**_as_tuples(each) | {"outline": close_curve(each["outline"])}) for each in drawn["hair"]
+    )
+    return Design(**values)
 
 
-WOMAN = Design(
-    palette=Palette(),
-    head="0 -0.93, 0.36 -0.86, 0.63 -0.6, 0.745 -0.2, 0.755 0.2, 0.725 0.55, 0.635 0.9, 0.45 1.19, 0.22 1.35, 0 1.39",
-    neck=close_curve(
-        "-0.35 0.7, -0.35 1.2, -0.37 1.48, -0.6 1.72, -1.1 1.86, -1.1 2.6, 1.1 2.6, 1.1 1.86, 0.6 1.72, 0.37 1.48,"
-        "0.35 1.2, 0.35 0.7"
-    ),
-    shoulders=close_curve(
-        "-0.58 1.66, -0.9 1.74, -1.3 1.86, -1.62 2.1, -1.7 2.6, 1.7 2.6, 1.62 2.1, 1.3 1.86, 0.9 1.74, 0.58 1.66,"
-        "0.42 1.85, 0.2 2, 0 2.04, -0.2 2, -0.42 1.85"
-    ),
-    hair_behind=mirror_curve(
-        "0 -1.06, 0.5 -0.98, 0.83 -0.62, 0.92 -0.1, 0.93 0.4, 0.99 0.9, 1.08 1.35, 1 1.7, 0.7 1.9, 0.3 1.85, 0 1.8"
-    ),
-    hair=(
-        Lock(
-            close_curve(
-                "-0.2 -0.98, -0.34 -1.05, -0.58 -0.97, -0.8 -0.72, -0.875 -0.3, -0.835 0.04, -0.765 0.25, -0.73 0.02,"
-                "-0.68 -0.24, -0.52 -0.48, -0.32 -0.64, -0.22 -0.76"
-            ),
-            (-0.52, -0.76, 0.25, 0.1),
-        ),
-        Lock(
-            close_curve(
-                "-0.24 -0.96, -0.1 -1.06, 0.2 -1.11, 0.58 -1, 0.82 -0.7, 0.885 -0.28, 0.84 0.04, 0.77 0.25, 0.735 0.03,"
-                "0.69 -0.2, 0.54 -0.39, 0.24 -0.5, -0.04 -0.63, -0.2 -0.78"
-            ),
-            (0.3, -0.76, 0.25, 0.1),
-            tuple(
-                f"-0.19 {-0.8 - 0.6 * lift}, 0.12 {-0.7 - lift}, 0.48 {-0.56 - lift}, 0.76 {-0.16 - 1.2 * lift}"
-                for lift in (0.05, 0.15, 0.24)
-            ),
-        ),
-    ),
-    lips=LipDesign(smile=-0.048),
-    earrings=True,
-    collarbones=True,
-)
+def _as_tuples(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _as_tuples(each) for name, each in value.items()}
+    return tuple(map(_as_tuples, value)) if isinstance(value, list) else value
+
+
+_DRAWN = json.loads(resources.files(__package__).joinpath("characters.json").read_text(encoding="ascii"))
+WOMAN, MAN, CARTOON = (_read_design(_DRAWN[name]) for name in ("woman", "man", "cartoon"))
