@@ -39,7 +39,7 @@ class Face(ABC):
     """Draws motion as pictures. A subclass needs no arguments to be made.
 
     An entry point of the group ``lipmotion.faces`` makes it known by a name, for ``lipmotion animate --face NAME``;
-    ``lipmotion.testing.check_face`` tests the contract.
+    ``lipmotion_faces.testing.check_face`` tests the contract.
     """
 
     @abstractmethod

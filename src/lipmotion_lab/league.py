@@ -467,7 +467,7 @@ def run_rivals(  # noqa: PLR0913
 ) -> League:
     """Return how rivals, and our engines, move the lips of the same recordings.
 
-    adapters : the folder ``extras/run_rivals``, with a table of rivals
+    adapters : the folder ``extras/league``, with a table of rivals
     work     : answers are kept there: a run that was stopped goes on
     choosing : another corpus, on whose list ``val`` (without one: on all) settings are chosen. None: the corpus's own
                ``val``, and its ``test`` is reported; without both lists, in folds over its recordings
