@@ -6,12 +6,19 @@ for each class; exit code 2 means a wrong command line, exit code 1 a bug.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 SHOWN_CHARACTERS = 80  # largest number of characters of a text from a user that a message repeats
 
 
 def shorten(text: str) -> str:
     """Return a text, or its first ``SHOWN_CHARACTERS`` characters and ``...``, for a message."""
     return text if len(text) <= SHOWN_CHARACTERS else text[:SHOWN_CHARACTERS] + "..."
+
+
+def shorten_list(names: Sequence[str], count: int = 5) -> str:
+    """Return the first names of a list, each shortened, and ``...`` if there are more, for a message."""
+    return ", ".join(map(shorten, names[:count])) + ", ..." * (len(names) > count)
 
 
 class LipMotionError(Exception):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shorten_list
 from lipmotion.formats.c3d import MILLIMETRES
 from lipmotion.measures import curves
 from lipmotion.measures.closures import find_threshold, measure_closures
@@ -142,10 +142,8 @@ def _match_channels(reference: _Side, other: _Side) -> tuple[list[str], list[str
     units = {channel.name: channel.unit for channel in other.motion.channels}
     same = [each.name for each in reference.motion.channels if units.get(each.name) == each.unit]
     if not same:
-        some = []
-        for side in (other, reference):
-            first = [f"{channel.name} ({channel.unit})" for channel in side.motion.channels[:4]]
-            some.append(", ".join(first) + (", ..." if len(side.motion.channels) > len(first) else ""))
+        named = ([f"{channel.name} ({channel.unit})" for channel in s.motion.channels] for s in (other, reference))
+        some = [shorten_list(names, 4) for names in named]
         raise InputError(
             f"{other.name} has no channel of {reference.name} in the same unit: it has {some[0]}, required one of "
             f"{some[1]}"

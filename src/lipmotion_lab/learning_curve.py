@@ -45,10 +45,9 @@ def run_learning_curve(
     Raises CorpusError: names that are not in the corpus, twice in the list or in the split; no utterances of this
     split; or motion without an opening.
     """
-    listed = tuple(order) if order is not None else runner.shuffle(corpus.required("train"), settings.seed)
     held_out, validation = corpus.required(split), corpus.required("val") if rival else ()
+    listed = runner.choose_training_names(corpus, order, settings.seed, (*held_out, *validation))
     steps = runner.choose_sizes(sizes, len(listed))
-    runner.check_training_names(corpus, listed, (*held_out, *validation))
     channels = runner.check_opening(corpus, held_out)
     key = runner.PartKey(engine_named("trajectory"), (*listed, *held_out, *validation), others=BLSTM * rival)
     checkpoint = runner.open_parts(work, corpus, settings, key)

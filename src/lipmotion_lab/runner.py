@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import os
 import platform
 import shlex
@@ -24,7 +25,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora import SPLITS, Corpus, Selection
 from lipmotion.engines import ENGINES, Engine
-from lipmotion.errors import CorpusError, InputError
+from lipmotion.errors import CorpusError, InputError, shorten_list
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.compiler import list_blas_kernels
 from lipmotion.pipeline.model import GEOMETRY, Model
@@ -48,6 +49,8 @@ from lipmotion_lab.evaluation.held_out import (
 ItemT = TypeVar("ItemT")
 MotionReceiver = Callable[[str, str, HeldOutRecordings, Sequence[ComparedClip]], None]
 """Called with the name of a system, a condition, the recordings, and what the system generates for each of them."""
+LOG = logging.getLogger("lipmotion")
+MAX_MISSING = 0.05  # share of a list that a corpus may lack: recordings without a face, damaged ones
 QUICK_CLIPS = {"train": 20, "val": 4, "test": 6}  # most recordings of each list in a quick run of any experiment
 _CURVES, _ABOUT = ("original", "generated", "time_s"), "about"
 """Fields of ``ComparedClip`` that are curves; the array with the rest of stored clips."""
@@ -318,6 +321,24 @@ def choose_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:
     return steps
 
 
+def choose_training_names(
+    corpus: Corpus, order: Sequence[str] | None, seed: int, held_out: Sequence[str]
+) -> tuple[str, ...]:
+    """Return the names to train on: a list, or the corpus's ``train``, shuffled.
+
+    Names of recordings that could not be prepared are left out with a warning, if they are few.
+    Raises CorpusError: as ``check_training_names``.
+    """
+    listed = tuple(order) if order is not None else shuffle(corpus.required("train"), seed)
+    missing = [name for name in listed if name not in corpus.names()]
+    if 0 < len(missing) <= MAX_MISSING * len(listed):
+        some = f"{len(missing)} of {len(listed)} names to train on ({shorten_list(missing)})"
+        LOG.warning(f"{corpus.path}: {some} are not in the corpus; left out")
+        listed = tuple(name for name in listed if name not in missing)
+    check_training_names(corpus, listed, held_out)
+    return listed
+
+
 def check_training_names(corpus: Corpus, listed: Sequence[str], held_out: Sequence[str]) -> None:
     """Raise CorpusError if names to train on are not in the corpus, twice in the list, or held out."""
     known, excluded = set(corpus.names()), set(held_out)
@@ -328,5 +349,5 @@ def check_training_names(corpus: Corpus, listed: Sequence[str], held_out: Sequen
     }
     for reason, names in wrong.items():
         if names:
-            some = ", ".join(sorted(names)[:5]) + (", ..." if len(names) > 5 else "")
-            raise CorpusError(f"{corpus.path}: {len(names)} of {len(listed)} names to train on ({some}) {reason}")
+            some = f"{len(names)} of {len(listed)} names to train on ({shorten_list(sorted(names))})"
+            raise CorpusError(f"{corpus.path}: {some} {reason}")

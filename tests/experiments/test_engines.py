@@ -22,7 +22,7 @@ from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, FrameRegression
 from lipmotion_lab.engine_comparison import ENGINES_COMPARED, compare_engines
 from lipmotion_lab.learning_curve import run_learning_curve
 from lipmotion_lab.report.sections import build_learning_section
-from lipmotion_lab.runner import ExperimentSettings
+from lipmotion_lab.runner import ExperimentSettings, choose_training_names
 from testing.toy import SMALL
 
 LONG = pytest.mark.long
@@ -212,6 +212,13 @@ def test_recordings_of_the_training_are_not_compared(toy_corpus):
     for split in ("train", None):
         with pytest.raises(CorpusError, match="are in the split that is compared with"):
             compare_engines(toy_corpus, split=split, settings=SETTINGS)
+
+
+def test_a_name_that_could_not_be_prepared_is_left_out(caplog):
+    listed = tuple("qwertyuiopasdfghjklz")
+    corpus: Any = SimpleNamespace(path="corpus", names=lambda: sorted(listed))
+    assert choose_training_names(corpus, [*listed, "smeared"], 1, ()) == listed
+    assert "corpus: 1 of 21 names to train on (smeared) are not in the corpus; left out" in caplog.text
 
 
 def test_what_cannot_be_trained_on(toy_corpus, tmp_path):

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from lipmotion.corpora import UTTERANCES, Corpus, quantise, read_entry, write_utterance
-from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError, shorten_list
 from lipmotion.extensions import find_version
 from lipmotion.pipeline.workers import open_workers, process_count
 from lipmotion.speech.sound.analysed_audio import analysed
@@ -38,7 +38,6 @@ from lipmotion_faces.tracking.trackers import MEDIAPIPE, make_tracker
 LOG = logging.getLogger("lipmotion")
 RECIPE = "5"
 """Version of the preparation, increased when the same video gives other values; older utterances are then replaced."""
-NAMED_UTTERANCES = 5  # utterances that a warning names
 _STAGE = "preparing recordings"
 
 
@@ -220,10 +219,9 @@ def _warn_of_older(corpus: Corpus, collection: str, outcomes: list[_Outcome]) ->
     others = [name for name in corpus.names() if name not in good]
     older = [name for name in others if (_read_source(corpus.folder(name)) or {}).get("collection") == collection]
     if older:
-        shown = ", ".join(older[:NAMED_UTTERANCES]) + (", ..." if len(older) > NAMED_UTTERANCES else "")
         wish = "to do without them, delete their folders and prepare again"
         what = "utterances are from recordings that are no longer there, or cannot be used any longer"
-        LOG.warning("%s: %d %s: %s; %s", corpus.path / UTTERANCES, len(older), what, shown, wish)
+        LOG.warning("%s: %d %s: %s; %s", corpus.path / UTTERANCES, len(older), what, shorten_list(older), wish)
 
 
 def _read_source(folder: Path) -> dict[str, Any] | None:

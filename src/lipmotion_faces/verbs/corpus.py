@@ -7,6 +7,7 @@ import argparse
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output
 from lipmotion.cli.arguments.options import add_machine_readable, add_workers, list_or_all
 from lipmotion.cli.terminal.printing import print_error, print_json, print_line
+from lipmotion.errors import shorten_list
 from lipmotion.pipeline.request import Request
 
 LINES = 12
@@ -149,7 +150,7 @@ def run_prompts(options: argparse.Namespace) -> None:
     print_line(f"{len(selection.chosen)} of {selection.sentences} sentences: {covered}")
     if selection.left_out:
         words = sorted(set(selection.left_out.values()))
-        some = ", ".join(words[:10]) + (", ..." if len(words) > 10 else "")
+        some = shorten_list(words, 10)
         print_error(f"warning: left out {len(selection.left_out)} sentences for their words: {some}")
 
 

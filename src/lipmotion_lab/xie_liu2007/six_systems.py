@@ -171,10 +171,9 @@ def run_xieliu2007(  # noqa: PLR0913
     if not options.voices and (without := [name for name in names if systems.COMPARED_SYSTEMS[name].second_stage]):
         raise InputError(f"{without[0]} needs speech of others; give it by --recordings or --voices")
     check_visual(options.visual)
-    listed = tuple(order) if order is not None else runner.shuffle(corpus.required("train"), seed)
     chosen_on_val = any(systems.COMPARED_SYSTEMS[name].splits for name in names)
     held_out, validation = corpus.required(split), corpus.required("val") if chosen_on_val else ()
-    runner.check_training_names(corpus, listed, (*held_out, *validation))
+    listed = runner.choose_training_names(corpus, order, seed, (*held_out, *validation))
     steps = runner.choose_sizes(sizes if sizes is not None else [len(listed)], len(listed))
     setup = _TrainingSetup(corpus, held_out, validation, options, settings, work)
     if options.visual != EIGENLIPS:
