@@ -116,7 +116,7 @@ def write_gltf_scene(path: Path, scene: Scene) -> None:
     """Write a scene as ``.glb``: its mesh with blendshapes, and their weights over time as its animation.
 
     Every part becomes a primitive with its own vertices; those that no blendshape moves are a mesh of their own.
-    Textures are not written, colours of vertices are. A sound is named as ``extras`` of the scene (``gltf_sound``).
+    Textures are not written, colours of vertices are. A sound is named as ``extras`` of the scene (``describe_sound``).
     Raises ExportError: the file cannot be written.
     """
     buffer, normals = GltfBuffer(), compute_shading_normals(scene.mesh, split=scene.split)
