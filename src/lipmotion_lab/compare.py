@@ -83,6 +83,42 @@ def _read_side(source: Source, number: int) -> _Side:
 
 def _compare_pair(reference: _Side, other: _Side) -> dict[str, Any]:
     """Return the figures of one pair. Raises InputError: as ``compare``."""
+    made, original, notes = _select_common_frames(reference, other)
+    names = made.names
+    axes = {name[2:]: tuple(f"{axis}_{name[2:]}" for axis in "xyz") for name in names if name.startswith("x_")}
+    points = {point: parts for point, parts in axes.items() if set(names).issuperset(parts)}
+    coordinates = {axis for parts in points.values() for axis in parts}
+    channel_figures, still = _measure_channels(made, original, [name for name in names if name not in coordinates])
+    if still:
+        notes.append(f"left out, for they do not move in the reference: {', '.join(still)}")
+    accuracies = [row["acc"] for row in channel_figures.values()]
+    figures = {
+        "name": other.name,
+        "rate_hz": made.rate_hz,
+        "frames": len(made.values),
+        "notes": notes,
+        "channels": channel_figures,
+        "acc": float(np.mean(accuracies)) if accuracies else None,
+    }
+    if OPENING in channel_figures:
+        generated, recorded = ([_select_values(side, [OPENING])[:, 0]] for side in (made, original))
+        threshold = find_threshold(recorded)
+        closures = asdict(measure_closures(generated, recorded, threshold, made.rate_hz))
+        figures["closures"] = closures | {"closed_under": threshold}
+    if points:
+        figures["points"] = _measure_points(made, original, points)
+    if upper := [name for name in UPPER_FACE if name in names]:  # weights, which are 0 at rest
+        generated, recorded = ([_select_values(side, upper)[:, :, None]] for side in (made, original))
+        deviation = curves.measure_upper_face(generated, recorded, rest=np.zeros((len(upper), 1)))
+        figures["upper_face"] = {"curves": len(upper), "deviation": deviation}
+    return figures
+
+
+def _select_common_frames(reference: _Side, other: _Side) -> tuple[Motion, Motion, list[str]]:
+    """Return motion of the other and of the reference, in the channels and frames of both, and notes on the rest.
+
+    Raises InputError: too few of them.
+    """
     names, notes = _match_channels(reference, other)
     rate_hz = min(reference.motion.rate_hz, other.motion.rate_hz, HIGHEST_RATE_HZ)
     for name, side in (("the reference", reference), ("the other", other)):
@@ -108,33 +144,7 @@ def _compare_pair(reference: _Side, other: _Side) -> dict[str, Any]:
         Motion(side.motion.at(time_s)[measured][:, [side.motion.column(name) for name in names]], rate_hz, channels)
         for side in (other, reference)
     )
-    axes = {name[2:]: tuple(f"{axis}_{name[2:]}" for axis in "xyz") for name in names if name.startswith("x_")}
-    points = {point: parts for point, parts in axes.items() if set(names).issuperset(parts)}
-    coordinates = {axis for parts in points.values() for axis in parts}
-    channel_figures, still = _measure_channels(made, original, [name for name in names if name not in coordinates])
-    if still:
-        notes.append(f"left out, for they do not move in the reference: {', '.join(still)}")
-    accuracies = [row["acc"] for row in channel_figures.values()]
-    figures = {
-        "name": other.name,
-        "rate_hz": rate_hz,
-        "frames": count,
-        "notes": notes,
-        "channels": channel_figures,
-        "acc": float(np.mean(accuracies)) if accuracies else None,
-    }
-    if OPENING in channel_figures:
-        generated, recorded = ([_select_values(side, [OPENING])[:, 0]] for side in (made, original))
-        threshold = find_threshold(recorded)
-        closures = asdict(measure_closures(generated, recorded, threshold, rate_hz))
-        figures["closures"] = closures | {"closed_under": threshold}
-    if points:
-        figures["points"] = _measure_points(made, original, points)
-    if upper := [name for name in UPPER_FACE if name in names]:  # weights, which are 0 at rest
-        generated, recorded = ([_select_values(side, upper)[:, :, None]] for side in (made, original))
-        deviation = curves.measure_upper_face(generated, recorded, rest=np.zeros((len(upper), 1)))
-        figures["upper_face"] = {"curves": len(upper), "deviation": deviation}
-    return figures
+    return made, original, notes
 
 
 def _match_channels(reference: _Side, other: _Side) -> tuple[list[str], list[str]]:

@@ -144,7 +144,7 @@ def write_report(
     quick: bool = False,
     settings: ExperimentSettings = DEFAULT_SETTINGS,
 ) -> WrittenReport:
-    """Run experiments on a corpus, and write a page of what they found, with its tables, pictures and videos.
+    """Run experiments on a corpus, and write a page of what they found, with its tables and pictures.
 
     folder   : of the report, made if need be. What is finished in it is not computed again; a call after a stop goes on
     The page is written anew when an experiment is finished; where nothing is left to do, nothing is written. Every
