@@ -52,6 +52,39 @@ def test_nodes_turn_scale_and_shift(tmp_path):
     np.testing.assert_allclose(shaped(mesh, {"jawOpen": 1})[2] - mesh.vertices[2], [-1, 0, 0], atol=1e-6)
 
 
+def test_a_mirrored_node_turns_its_triangles(tmp_path):
+    content, binary = document()
+    content["nodes"][0]["scale"] = [-1, 1, 1]
+    mesh = _read(tmp_path, content, binary)
+    assert mesh.triangles.tolist() == [[2, 1, 0], [3, 2, 0]]
+    np.testing.assert_allclose(mesh.vertices, POSITIONS * (-1, 1, 1), atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("mode", "indices", "triangles"),
+    [(5, [0, 1, 3, 2, 2], [[0, 1, 3], [1, 2, 3]]), (6, [0, 1, 2, 3], [[1, 2, 0], [2, 3, 0]])],
+)
+def test_strips_and_fans_are_triangles(tmp_path, mode, indices, triangles):
+    content, binary = document()
+    binary, number = with_array(content, binary, np.array(indices, "<u2"), "SCALAR")
+    content["meshes"][0]["primitives"][0] |= {"indices": number, "mode": mode}
+    assert _read(tmp_path, content, binary).triangles.tolist() == triangles
+
+
+@pytest.mark.parametrize("holder", ["meshes", "nodes"])
+def test_sliders_of_the_body_stay_and_a_pose_of_the_face_does_not(tmp_path, holder):
+    content, binary = document()
+    content["meshes"][0] |= {"extras": {"targetNames": ["jawOpen", "bodyFat"]}, "weights": [0.0, 0.0]}
+    content[holder][0]["weights"] = [0.7, 0.5]
+    mesh = _read(tmp_path, content, binary)
+    np.testing.assert_allclose(mesh.vertices, POSITIONS + WIDE / 2, atol=1e-7)
+    assert gltf_writer.write_animated_gltf(tmp_path / "a.glb", tmp_path / "head.glb", weights("jawOpen"))
+    written = gltf_document.read_gltf_document(tmp_path / "a.glb")
+    output = written.json["animations"][0]["samplers"][0]["output"]
+    stored = gltf_document.GltfArrays(written).read_floats(output, 1).reshape(9, 2)
+    np.testing.assert_allclose(stored, np.stack([weights("jawOpen")["jawOpen"], np.full(9, 0.5)], 1), atol=1e-6)
+
+
 def test_quantised_positions(tmp_path):
     content, binary = document()
     content["extensionsRequired"] = ["KHR_mesh_quantization"]

@@ -95,9 +95,10 @@ def build_schema(json: Mapping[str, Any]) -> Schema:
         "targets": items(target, most=ALLOWANCE["blendshapes"]),
         "extras": if_fits(members({"targetNames": items(_WORD)})),
     }
-    mesh = {"name": _NAME, "primitives": items(members(primitive, ["attributes"])), "extras": primitive["extras"]}
+    named = {"name": _NAME, "weights": items(_NUMBER)}
+    mesh = {**named, "primitives": items(members(primitive, ["attributes"])), "extras": primitive["extras"]}
     node = {
-        **{"name": _NAME, "mesh": to("meshes"), "skin": to("skins"), "children": items(to("nodes"))},
+        **{**named, "mesh": to("meshes"), "skin": to("skins"), "children": items(to("nodes"))},
         **{"matrix": list_of(16), "translation": list_of(3), "rotation": list_of(4), "scale": list_of(3)},
     }
     place = {"bufferView": to("bufferViews"), "byteOffset": _SIZE}

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.model.mesh import OPAQUE, Blendshape, Bone, Material, Mesh, MeshPart, Texture
+from lipmotion.meshes.model.shape_names import is_known
 from lipmotion_faces.characters.gltf_document import (
     COMPONENTS,
     LARGEST_NUMBER,
@@ -38,7 +39,7 @@ UNKNOWN = (0.8, 0.72, 0.66)
 multiplied by the texture."""
 WHITE = (1.0, 1.0, 1.0)  # the colour of a primitive that has colours of vertices and no material
 MIN_WEIGHT = 1e-6
-TRIANGLES = 4  # the mode of primitives that are lists of triangles; strips, fans, lines and points are not read
+TRIANGLES, STRIP, FAN = 4, 5, 6  # modes of primitives; lines and points are no surface
 MIN_DISPLACEMENT = 1e-9
 """Vertices that a morph target moves by no more than this, in the unit of the file, are not stored."""
 PRESETS = {"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh", "joy": "happy", "sorrow": "sad", "fun": "relaxed"}
@@ -198,9 +199,10 @@ def read_gltf(path: Path) -> Mesh:
 
 @dataclass(frozen=True, eq=False)
 class _SharedVertices:
-    """Vertices that primitives of a node share: the number of the first one, and how they look."""
+    """Vertices that primitives of a node share: the number of the first one, whether mirrored, and how they look."""
 
     first: int
+    mirrored: bool
     vertices: Array
     colours: Array
     tints: Array
@@ -233,7 +235,7 @@ class _SceneSurface:
                 name = clean_name(node.get("name") or mesh.get("name", "")) or f"mesh {node['mesh']}"
                 self._budget.spend("parts", len(mesh["primitives"]))
                 for primitive in mesh["primitives"]:
-                    if primitive.get("mode", TRIANGLES) == TRIANGLES and "POSITION" in primitive["attributes"]:
+                    if primitive.get("mode", TRIANGLES) >= TRIANGLES and "POSITION" in primitive["attributes"]:
                         self._add_primitive(primitive, name, self._share_vertices(number, mesh, primitive))
         if not self._triangles:
             raise InputError("there are no triangles in it; export the surface")
@@ -264,12 +266,16 @@ class _SceneSurface:
     def _add_primitive(self, primitive: dict[str, Any], name: str, block: _SharedVertices) -> None:
         attributes, count = primitive["attributes"], len(block.vertices)
         size = self._arrays.count(primitive["indices"]) if "indices" in primitive else count
-        self._budget.spend("triangles", -(-size // 3))
+        mode = primitive.get("mode", TRIANGLES)
+        self._budget.spend("triangles", -(-size // 3) if mode == TRIANGLES else size)
         corners = self._arrays.read_ints(primitive["indices"], 1)[:, 0] if "indices" in primitive else np.arange(count)
-        if size % 3 or (size and not 0 <= corners.min() <= corners.max() < count):
+        corners = corners if mode == TRIANGLES else _divide_strip(corners, fan=mode == FAN)
+        if corners.size % 3 or (corners.size and not 0 <= corners.min() <= corners.max() < count):
             raise InputError(f"triangles of vertices up to {corners.max(initial=0)} of {count}; export it again")
         if not corners.size:
             return
+        if block.mirrored:
+            corners = corners.reshape(-1, 3)[:, ::-1].reshape(-1)
         material = self._materials.read_material(primitive.get("material"))
         if "COLOR_0" in attributes and "material" not in primitive:
             material = replace(material, colour=WHITE)
@@ -326,9 +332,11 @@ class _SceneSurface:
             linear, shift = placed.matrix[:3, :3], placed.matrix[:3, 3]
             for kind, above in sorted(placed.kinds.items()):
                 self._bones.append(Bone(kind, self._nodes[above].matrix[:3, 3], rows, np.ones(count)))
-        self._add_targets(node["mesh"], mesh, primitive, linear, count)
+        shift = shift + self._add_targets(node, mesh, primitive, linear, count)
         colours = np.tile(self._materials.read_material(primitive.get("material")).colour, (count, 1))
-        block = _SharedVertices(self._count, _map_vectors(linear, vertices) + shift, colours, np.ones((count, 4)))
+        mirrored = bool(count and np.median(np.linalg.det(linear)) < 0)  # faces then look inwards
+        vertices = _map_vectors(linear, vertices) + shift
+        block = _SharedVertices(self._count, mirrored, vertices, colours, np.ones((count, 4)))
         self._blocks[shared] = block
         self._count += count
         return block
@@ -353,14 +361,15 @@ class _SceneSurface:
         return self._skins[number]
 
     def _add_targets(
-        self, number: int, mesh: dict[str, Any], primitive: dict[str, Any], linear: Array, count: int
-    ) -> None:
-        targets = primitive.get("targets", [])
+        self, node: dict[str, Any], mesh: dict[str, Any], primitive: dict[str, Any], linear: Array, count: int
+    ) -> Array:
+        """Keep the morph targets of a primitive; return how far they move its vertices at rest [shape=(N, 3)]."""
+        targets, rest = primitive.get("targets", []), np.zeros((count, 3))
         self._budget.spend("morph targets", len(targets))
-        for column, (name, target) in enumerate(
-            zip(name_targets(self._document, mesh, primitive), targets, strict=True)
-        ):
-            self._targets[(number, column)] = name
+        names = name_targets(self._document, mesh, primitive)
+        weights = list_rest_weights(names, node, mesh)
+        for column, (name, weight, target) in enumerate(zip(names, weights, targets, strict=True)):
+            self._targets[(node["mesh"], column)] = name
             if name not in self._moved:
                 self._budget.spend("blendshapes", 1)
             displacements = self._moved.setdefault(name, [])
@@ -371,9 +380,27 @@ class _SceneSurface:
             if size != count:
                 raise InputError(f"the target {shorten(name)!r} moves {size} of {count} vertices; export it again")
             moved = _map_vectors(linear, self._arrays.read_floats(target["POSITION"], 3))
+            rest += weight * moved
             rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > MIN_DISPLACEMENT)
             self._budget.spend("displacements", len(rows))
             displacements.append((rows + self._count, moved[rows]))
+        return rest
+
+
+def list_rest_weights(names: Sequence[str], node: Mapping[str, Any], mesh: Mapping[str, Any]) -> list[float]:
+    """Return the weights at rest of morph targets: those of the file; 0 for movements of a face, left from a pose."""
+    stored = node.get("weights", mesh.get("weights", []))
+    return [0.0 if is_known(name) or n >= len(stored) else float(stored[n]) for n, name in enumerate(names)]
+
+
+def _divide_strip(corners: Rows, *, fan: bool) -> Rows:
+    """Return the corners of the triangles of a strip or a fan (glTF 2.0, §3.7.2.1), without those that have no area."""
+    first = np.arange(max(len(corners) - 2, 0))
+    odd = first % 2
+    order = [first + 1, first + 2, 0 * first] if fan else [first, first + 1 + odd, first + 2 - odd]
+    triangles = corners[np.stack(order, axis=1)]
+    same = triangles == np.roll(triangles, 1, axis=1)
+    return triangles[~same.any(axis=1)].reshape(-1)
 
 
 def _map_vectors(linear: Array, vectors: Array) -> Array:

@@ -16,7 +16,7 @@ from lipmotion.meshes.model.mesh import Blendshape, MeshPart
 from lipmotion.storage.files import as_text
 from lipmotion.types import Motion
 from lipmotion_faces.characters.gltf_document import read_gltf_document, write_container
-from lipmotion_faces.characters.gltf_scene import name_mesh_targets
+from lipmotion_faces.characters.gltf_scene import list_rest_weights, name_mesh_targets
 from lipmotion_faces.characters.scene import HeadTurn, Scene, ShadingNormals, compute_shading_normals
 from lipmotion_faces.characters.textures import decode_srgb
 
@@ -267,12 +267,14 @@ def write_animated_gltf(
     binary = document.buffers.get(0)
     if binary is None or "uri" in document.get("buffers")[0] or len(document.buffers) > 1 or not len(weights.values):
         return False
-    moved: dict[int, tuple[str, ...]] = {}  # the nodes whose mesh has morph targets that move, with all targets' names
+    moved: dict[int, tuple[tuple[str, float], ...]] = {}
+    """The nodes whose mesh has morph targets that move, with names and weights at rest of all its targets."""
     for number, node in enumerate(document.get("nodes")):
-        names = name_mesh_targets(document, document.get("meshes")[node["mesh"]] if "mesh" in node else {})
+        mesh = document.get("meshes")[node["mesh"]] if "mesh" in node else {}
+        names = name_mesh_targets(document, mesh)
         if set(names) & set(weights.names):
-            moved[number] = names
-    if not set(weights.names) <= {name for names in moved.values() for name in names}:
+            moved[number] = tuple(zip(names, list_rest_weights(names, node, mesh), strict=True))
+    if not set(weights.names) <= {name for targets in moved.values() for name, _ in targets}:
         return False
     json, body = document.json, bytes(binary[: document.get("buffers")[0].get("byteLength", len(binary))])
     buffer = GltfBuffer(json.setdefault("bufferViews", []), json.setdefault("accessors", []))
@@ -281,18 +283,18 @@ def write_animated_gltf(
     chosen = [name in stepped for name in weights.names]
     time_s, rows = place_keys(weights.time_s, weights.values.astype(np.float64), chosen, thinning)
     times = buffer.add(time_s, "SCALAR", limits=True)
-    samplers: dict[tuple[str, ...], dict[str, Any]] = {}
+    samplers: dict[tuple[tuple[str, float], ...], dict[str, Any]] = {}
     channels: list[dict[str, Any]] = []
-    for node_number, names in moved.items():
-        if names not in samplers:
-            document.budget.spend("morph targets", len(names))
-            table = np.zeros((len(rows), len(names)))
-            for column, name in enumerate(names):
+    for node_number, targets in moved.items():
+        if targets not in samplers:
+            document.budget.spend("morph targets", len(targets))
+            table = np.tile([rest for _, rest in targets], (len(rows), 1))
+            for column, (name, _) in enumerate(targets):
                 if name in weights.names:
-                    table[:, column] = rows[:, weights.column(name)]
+                    table[:, column] += rows[:, weights.column(name)]
             output = buffer.add(table.reshape(-1), "SCALAR")
-            samplers[names] = {"input": times, "output": output, "interpolation": "LINEAR"}
-        channels.append({"sampler": list(samplers).index(names), "target": {"node": node_number, "path": "weights"}})
+            samplers[targets] = {"input": times, "output": output, "interpolation": "LINEAR"}
+        channels.append({"sampler": list(samplers).index(targets), "target": {"node": node_number, "path": "weights"}})
     animation = {"name": "speech", "channels": channels, "samplers": [*samplers.values()]}
     json.setdefault("animations", []).insert(0, animation)
     json["buffers"][0]["byteLength"] = buffer.size
