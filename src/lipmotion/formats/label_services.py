@@ -40,6 +40,7 @@ from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import values
 from lipmotion.types.values import parse_clock, parse_number, require
 from lipmotion.units import SILENCE
+from lipmotion.units.spelling import parse_table
 from lipmotion.units.spoken_text import check_word_count, extract_spoken_text
 from lipmotion.units.text_normalisation import find_words
 
@@ -107,14 +108,8 @@ KOKORO_LETTERS = {"A": "eɪ", "I": "aɪ", "W": "aʊ", "Y": "ɔɪ", "O": "oʊ", "
 KOKORO_FRAMES_PER_S = 40  # durations are in frames of 600 samples at 24 kHz
 POLLY_KINDS = ("sentence", "word", "viseme", "ssml")
 MARK = re.compile(r"[^\W\d_]+(?:['’-][^\W\d_]+)*[.,;:!?]?")  # a name of one of Google's marks that is the word after it
-COLUMNS = (
-    "characters characters=text characterstarttimesseconds=startsec characterendtimesseconds=endsec",  # ElevenLabs
-    "characters chars=text charstarttimesms=sentencestartms chardurationsms=sentencedurationms",  # its web socket
-    "characters chars=text charstarttimesms=sentencestartms charsdurationsms=sentencedurationms",
-    "characters tokens=text timestamps=start",  # sherpa-onnx, pieces of words that last to the next one
-    "words words=word wordstarttimeseconds=sentencestart wordendtimeseconds=sentenceend",  # Inworld
-    "words words=word start=start end=end",  # Cartesia, word_timestamps
-    "phonemes phonemes=symbol start=start end=end",  # Cartesia, phoneme_timestamps
+PARALLEL_LISTS = tuple(
+    (row["items"], parse_table(row["members"])) for row in read_shipped_table("lipmotion.formats", "label_lists.csv")
 )
 """Parallel lists: the list of items that they become, and the member that each is of them."""
 SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
@@ -330,10 +325,8 @@ def _collect_rows(
 
 
 def _list_items(item: dict[str, Any], where: str) -> dict[str, Any]:
-    """Return an object with lists of items for parallel lists (``COLUMNS``), and for the phones of Piper and Kokoro."""
-    for column in COLUMNS:
-        name, *pairs = column.split()
-        members = dict(pair.split("=") for pair in pairs)
+    """Return an object with lists of items for ``PARALLEL_LISTS``, and for the phones of Piper and Kokoro."""
+    for name, members in PARALLEL_LISTS:
         lists: list[Any] = [item.get(member) for member in members]
         if not all(isinstance(each, list) for each in lists) or any(isinstance(each, dict) for each in lists[0]):
             continue

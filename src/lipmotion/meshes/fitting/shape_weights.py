@@ -94,14 +94,9 @@ Limits = tuple[Array | float, Array | float]
 LARGEST_EIGENVALUE = 16.0  # the largest eigenvalue of the squared second difference
 MAX_STEPS, TOLERANCE = 2000, 1e-5
 """Iteration stops after so many steps, or when no weight changes by more than the second number in one."""
-SIDED_SHAPES = {
-    "mouthSmile": ("smile", 0.75), "mouthFrown": ("frown", 0.9), "mouthStretch": ("stretched", 0.7),
-    "mouthUpperUp": ("upper_raise", 0.6), "mouthPress": ("tight", 0.5),
-}  # fmt: skip
-"""By blendshapes of both sides: the curve of the spoken mouth that they show, and their weight where it is 1."""
-MIDDLE_SHAPES = {"mouthShrugLower": ("chin_raise", 0.5), "mouthRollUpper": ("tight", 0.15)}
-"""The same of blendshapes that have no sides."""
-MOOD_SHAPES = {f"{name}{side}": row for name, row in SIDED_SHAPES.items() for side in SIDES} | MIDDLE_SHAPES
+_MOODS = read_shipped_table("lipmotion.meshes.fitting", "mood_shapes.csv")
+MOOD_SHAPES = {row["shape"]: (row["curve"], float(row["weight"])) for row in _MOODS}
+"""By blendshapes: the curve of the spoken mouth that they show, and their weight where it is 1."""
 EXPRESSIONS: Mapping[str, tuple[tuple[str, float], ...]] = {
     "happy": (("happy", 1.0),), "sad": (("sad", 1.0),), "angry": (("angry", 1.0),), "surprised": (("surprised", 1.0),),
     "afraid": (("surprised", 0.5), ("sad", 0.5)), "disgusted": (("angry", 0.6), ("sad", 0.3)),
