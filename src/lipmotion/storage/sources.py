@@ -264,19 +264,6 @@ LARGEST_BLOCK_BYTES = 1 << 28
 MAX_PIXELS = 4096 * 2304  # most pixels of a picture: slightly more than 4K. A decoder may keep sixteen pictures.
 
 
-@cache
-def read_x264() -> str:
-    """Return the parameter of x264 that limits its instructions, after a colon; empty on processors without AVX-512.
-
-    With AVX-512 it writes other bytes now and then for pictures under 100 px (3 videos of 100), with AVX2 it does not,
-    at the same speed, and for larger pictures in the same bytes.
-    """
-    import numpy as np
-
-    features = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
-    return ":asm=avx2" if any(name.startswith(("AVX512", "X86_V4")) for name in features) else ""
-
-
 def open_media(path: Path, *, content: Any = None) -> Any:
     """Return an open PyAV container, which the caller closes.
 
