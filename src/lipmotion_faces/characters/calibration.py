@@ -15,9 +15,10 @@ from lipmotion.meshes.fitting.shape_weights import solve_shape_weights
 from lipmotion.meshes.model.rig_tables import RigRow, suggest_names
 from lipmotion.pipeline.outputs.curve_sets import make_rig_sources
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+from lipmotion_faces.characters.binding import PosedCharacter
 
 
-def describe_character(character: DrivenCharacter) -> Iterator[str]:
+def describe_character(character: PosedCharacter) -> Iterator[str]:
     """Yield what was found in a character's files, line by line."""
     mesh, placement = character.mesh, character.placement
     parts = ", ".join(part.name or "(no name)" for part in mesh.parts)

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.face_shapes import FaceShapes, LipPlacement, group_by_name, measure_lip_parting
 from lipmotion.meshes.model.mesh import JAW, MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart, Texture
 from lipmotion.meshes.model.rig_tables import RigRow, find_table, read_rig_table, suggest_names
@@ -31,6 +30,7 @@ from lipmotion.meshes.model.shape_names import (
 from lipmotion.storage.sources import check_kind, is_file
 from lipmotion_faces.characters.binding import (
     BINDING_SUFFIX,
+    PosedCharacter,
     bind,
     load_binding,
     paint_weights,
@@ -380,7 +380,7 @@ def with_sources(mesh: Mesh, table: Mapping[str, RigRow]) -> Mesh:
 
 def load_character(
     path: str | Path, *, points: Path | None = None, binding: Path | None = None, by_points: bool = False
-) -> DrivenCharacter:
+) -> PosedCharacter:
     """Return a character from its files, ready to be moved; with the table beside it, if there is one.
 
     path      : ``.glb``, ``.gltf``, ``.vrm``, ``.obj``, or a folder of OBJ files
@@ -396,7 +396,7 @@ def load_character(
     try:
         if binding is not None and binding.suffix.lower() == BINDING_SUFFIX:
             stored = load_binding(binding, mesh)
-            return DrivenCharacter(mesh, stored.placement, None, stored, path, table)
+            return PosedCharacter(mesh, stored.placement, None, path, table, stored)
         if points is not None:
             named = read_points(points)
             surface = separate_named_lips(mesh, named)
@@ -405,11 +405,11 @@ def load_character(
             surface = build_surface(mesh)
             placement = place_lips_by_shape(mesh, surface)
         if mesh.shapes and not by_points and binding is None:
-            return DrivenCharacter(mesh, placement, find_face_shapes(mesh, placement), None, path, table)
+            return PosedCharacter(mesh, placement, find_face_shapes(mesh, placement), path, table)
         bound = bind(mesh, surface, placement)
         if binding is not None:
             bound = paint_weights(bound, mesh, read_weights(binding))
-        return DrivenCharacter(mesh, placement, None, bound, path, table)
+        return PosedCharacter(mesh, placement, None, path, table, bound)
     except InputError as error:
         text = str(error)
         raise InputError(text if str(path) in text else f"{path}: {text}") from error

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output, pick_part
 from lipmotion.cli.terminal.printing import print_line, print_lines
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from lipmotion.meshes.fitting.driven import DrivenCharacter
     from lipmotion.meshes.model.rig_tables import RigRow
+    from lipmotion_faces.characters.binding import PosedCharacter
 
 CALIBRATION = {
     "open": "values at which the mouth is as wide open as speech opens it: A=0.8",
@@ -68,7 +69,7 @@ def run(options: argparse.Namespace) -> None:
         return
     by_points = bool(options.control_points or options.write_weights or options.write_binding)
     try:
-        character = open_character(pick_part(options, Outputs(), control_points=by_points))
+        character = cast("PosedCharacter", open_character(pick_part(options, Outputs(), control_points=by_points)))
     except InputError:
         table = find_table(path)
         if options.write_table and not is_file(table):  # the mouth was not found: the table is to be filled in
