@@ -248,14 +248,8 @@ def is_text(path: Path) -> bool:
     return False
 
 
-MEDIA_FORMATS = (
-    # sound
-    "aac ac3 aiff amr amrnb amrwb ape au caf dsf dts dtshd eac3 flac g722 gsm ircam loas mlp mp3 mpc mpc8 nistsphere "
-    "ogg oma pvf qcp qoa rso sds sln sox spdif tak truehd tta voc w64 wav wavarc wv xwma "
-    # video, most of them with sound
-    "apng asf asf_o avi dv dvd flv gif gxf h264 hevc ivf live_flv m4v matroska mjpeg mov mpeg mpegts mpegvideo mxf "
-    "nut obu rm smjpeg wtv yuv4mpegpipe"
-).split()
+_MEDIA = read_shipped_table("lipmotion.storage", "media_formats.csv")
+MEDIA_FORMATS = [name for row in _MEDIA for name in row["formats"].split()]
 """FFmpeg's names of the container formats whose content is in the file itself. All others are refused before they
 open anything: playlists (hls, concat, dash, imf), indexes (vobsub), numbered pictures (image2), addresses (sdp, rtsp),
 devices."""

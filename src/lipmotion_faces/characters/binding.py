@@ -24,6 +24,7 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter, make_plain_row
 from lipmotion.meshes.fitting.shape_weights import weigh_expressions
 from lipmotion.meshes.model.face_shapes import LipPlacement
 from lipmotion.meshes.model.mesh import Mesh
+from lipmotion.meshes.model.rig_tables import find_table
 from lipmotion.meshes.model.shape_names import VRM_EMOTIONS
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_header_of, write_archive
 from lipmotion.storage.files import atomic_file
@@ -317,10 +318,19 @@ class DrivenPose(NamedTuple):
 class PosedCharacter(DrivenCharacter):
     """A character whose vertices move, by its own blendshapes or else by control points.
 
+    file    : where it was read from; None: from no file
     binding : weights of control points; None: blendshapes move it
     """
 
+    file: Path | None = None
     binding: ControlBinding | None = None
+
+    @property
+    def table_file(self) -> Path:
+        """Where the table of the character is. Raises InputError: it is from no file."""
+        if self.file is None:
+            raise InputError("the character was read from no file, so no table is beside it; read it from one")
+        return find_table(self.file)
 
     def poses(
         self, motion: Motion, units: Timeline[Unit], time_s: Array, others: Mapping[str, Array] | None = None

@@ -396,7 +396,7 @@ def load_character(
     try:
         if binding is not None and binding.suffix.lower() == BINDING_SUFFIX:
             stored = load_binding(binding, mesh)
-            return PosedCharacter(mesh, stored.placement, None, path, table, stored)
+            return PosedCharacter(mesh, stored.placement, None, table, path, stored)
         if points is not None:
             named = read_points(points)
             surface = separate_named_lips(mesh, named)
@@ -405,11 +405,11 @@ def load_character(
             surface = build_surface(mesh)
             placement = place_lips_by_shape(mesh, surface)
         if mesh.shapes and not by_points and binding is None:
-            return PosedCharacter(mesh, placement, find_face_shapes(mesh, placement), path, table)
+            return PosedCharacter(mesh, placement, find_face_shapes(mesh, placement), table, path)
         bound = bind(mesh, surface, placement)
         if binding is not None:
             bound = paint_weights(bound, mesh, read_weights(binding))
-        return PosedCharacter(mesh, placement, None, path, table, bound)
+        return PosedCharacter(mesh, placement, None, table, path, bound)
     except InputError as error:
         text = str(error)
         raise InputError(text if str(path) in text else f"{path}: {text}") from error

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.shape_weights import solve_shape_weights, with_gap
 from lipmotion.meshes.model.face_shapes import FaceShapes, LipPlacement, group_by_name, measure_lip_parting
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
-from lipmotion.meshes.model.rig_tables import RigRow, apply_rig, find_table
+from lipmotion.meshes.model.rig_tables import RigRow, apply_rig
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, VRM_EMOTIONS, find_spoken_name, to_arkit
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 
@@ -25,11 +24,7 @@ Array = NDArray[np.float64]
 def _solve_with_table(
     motion: Motion, units: Timeline[Unit], shapes: FaceShapes, rows: Sequence[RigRow], parted: Array
 ) -> Motion:
-    """Return the weights of all blendshapes of a mouth, ``offset + gain · solved``, within their limits.
-
-    Rows are those of ``mouth_rows``. Where the lips touch in solved weights they touch with these gains, too.
-    Offsets act in every frame. If the motion already has weights by the mesh's names, they stay.
-    """
+    """Return a mouth's weights, ``offset + gain · solved``; lips that touch in solved weights touch in these, too."""
     parting = np.zeros(len(shapes.names))
     for row, parts in zip(rows, parted.tolist(), strict=True):
         parting[shapes.names.index(row.source)] += row.gain * parts
@@ -84,14 +79,12 @@ class DrivenCharacter:
     """A mesh, where its lip points are, and the blendshapes that move it.
 
     shapes : the blendshapes of its mouth; None: it has none, and no weights
-    file   : where it was read from; None: from no file
     table  : rows of the table beside its file, by blendshapes
     """
 
     mesh: Mesh
     placement: LipPlacement
     shapes: FaceShapes | None
-    file: Path | None = None
     table: Mapping[str, RigRow] = field(default_factory=dict)
 
     def weights(self, motion: Motion, units: Timeline[Unit]) -> Motion:
@@ -109,13 +102,6 @@ class DrivenCharacter:
         others = {name: called for name, called in known.items() if called in VRM_EMOTIONS}
         others |= {row.control: row.source for row in self.other_rows}
         return tuple(self.table.get(row.control, row) for row in list_rows(self.mesh, self.shapes, others))
-
-    @property
-    def table_file(self) -> Path:
-        """Where the table of the character is. Raises InputError: it is from no file."""
-        if self.file is None:
-            raise InputError("the character was read from no file, so no table is beside it; read it from one")
-        return find_table(self.file)
 
     @cached_property
     def mouth_rows(self) -> tuple[tuple[RigRow, ...], Array]:
