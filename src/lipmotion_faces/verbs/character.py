@@ -53,11 +53,11 @@ def run(options: argparse.Namespace) -> None:
     """Print what was found; write what was asked for."""
     from lipmotion.extensions import load_provided
     from lipmotion.meshes.fitting.driven import list_rows
-    from lipmotion.meshes.model.rig_tables import find_table, read_rig_table, write_rig_table
+    from lipmotion.meshes.model.rig_tables import find_table, read_rig_table
     from lipmotion.pipeline.job import open_character
     from lipmotion.storage.sources import is_file
     from lipmotion_faces.characters.binding import save_binding, write_points, write_weights
-    from lipmotion_faces.characters.calibration import describe_character
+    from lipmotion_faces.characters.calibration import describe_character, write_rig_table
     from lipmotion_faces.characters.character_files import read_character
 
     stated, path = _read_values(options), options.character
@@ -96,8 +96,7 @@ def _write_table(
     path: Path, rows: Sequence[RigRow], curves: DrivenCharacter | Path, stated: dict[str, dict[str, float]]
 ) -> None:
     """Write a table with the gains and offsets by which its controls have the stated values; print those."""
-    from lipmotion.meshes.model.rig_tables import write_rig_table
-    from lipmotion_faces.characters.calibration import calibrate_rows, list_pose_sources
+    from lipmotion_faces.characters.calibration import calibrate_rows, list_pose_sources, write_rig_table
 
     changed = calibrate_rows(rows, list_pose_sources(curves, rows), stated) if stated else rows
     for row in changed:

@@ -5,7 +5,6 @@ The table beside a character is the same: its controls are the blendshapes, one 
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -15,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.storage.files import atomic_file
-from lipmotion.storage.text_table import as_field, from_field, read_whole_table
+from lipmotion.storage.text_table import from_field, read_whole_table
 from lipmotion.types import Channel, Motion
 from lipmotion.types.values import parse_number
 
@@ -65,17 +63,6 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
     if not rows or len(rows) > MAX_CONTROLS:
         raise InputError(f"{path}: {len(rows)} rows, required 1 to {MAX_CONTROLS}")
     return tuple(rows)
-
-
-def write_rig_table(path: Path, rows: Iterable[RigRow]) -> None:
-    """Write a table, which ``read_rig_table`` reads. Raises ExportError: it cannot be written."""
-    with atomic_file(path) as unfinished, unfinished.open("w", encoding="utf-8-sig", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(COLUMNS)
-        for row in rows:
-            limits = [f"{limit:g}" if np.isfinite(limit) else "" for limit in (row.low, row.high)]
-            names = (as_field(row.control), as_field(row.source))
-            table.writerow([*names, f"{row.gain:.4g}", f"{row.offset:.4g}", *limits])
 
 
 def suggest_names(name: str, names: Iterable[str]) -> str:
