@@ -141,3 +141,12 @@ def find_opacity_range(
             rows = np.flatnonzero(inside)[all_of_it]
             result[rows] = level / 255
     return low_opacity, high_opacity
+
+
+def find_pixels(texture: Texture, uv: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the nearest pixels at places, v down, repeated beyond 0 to 1, as 0 to 1 [shapes=(N, 4), (N, 2)]."""
+    height, width = texture.pixels.shape[:2]
+    at = uv % 1.0 * (width, height)
+    column = np.minimum(at[:, 0].astype(int), width - 1)
+    row = np.minimum(at[:, 1].astype(int), height - 1)
+    return np.asarray(texture.pixels[row, column] / 255.0)

@@ -67,14 +67,6 @@ class Texture:
         if self.pixels.dtype != np.uint8 or len(shape) != 3 or shape[2] != 4 or not self.pixels.size:
             raise InputError(f"a texture has shape {shape} of {self.pixels.dtype}, required (H, W, 4) of uint8")
 
-    def at(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the nearest pixels at places, v down, repeated beyond 0 to 1, as 0 to 1 [shapes=(N, 4), (N, 2)]."""
-        height, width = self.pixels.shape[:2]
-        at = uv % 1.0 * (width, height)
-        column = np.minimum(at[:, 0].astype(int), width - 1)
-        row = np.minimum(at[:, 1].astype(int), height - 1)
-        return np.asarray(self.pixels[row, column] / 255.0)
-
 
 @dataclass(frozen=True)
 class Material:
