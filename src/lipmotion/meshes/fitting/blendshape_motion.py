@@ -61,11 +61,8 @@ def arkit_mouth() -> FaceShapes:
 def vowel_mouth() -> FaceShapes:
     """Return the vowels of VRM, made of ARKit's blendshapes (``VOWELS``), as displacements of points."""
     mouth = arkit_mouth()
-    gains = np.zeros((len(VRM_VOWELS), len(mouth.known)))
-    for known, sources in VOWELS.items():
-        for vowel, gain in sources:
-            if vowel in VRM_VOWELS:
-                gains[VRM_VOWELS.index(vowel), mouth.known.index(known)] = gain
+    sources = [dict(VOWELS.get(known, ())) for known in mouth.known]
+    gains = np.array([[each.get(vowel, 0.0) for each in sources] for vowel in VRM_VOWELS])
     moved = np.einsum("vs,spd->vpd", gains, mouth.moved)
     return FaceShapes(VRM_VOWELS, tuple(f"vowel_{name}" for name in VRM_VOWELS), moved, gains @ mouth.gap, "visemes")
 
