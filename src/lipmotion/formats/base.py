@@ -190,12 +190,11 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     """
     path = Path(path)
     check_kind(path, "motion file")
-    named = _name_by_content(path)
-    other = find_suffix(named, [f".{name}" for name in MOTION_READERS.names])
-    added = MOTION_READERS.load(other.removeprefix(".")) if other and not find_suffix(named) else None
-    read, max_bytes = added, LARGEST_MOTION_BYTES
+    named, read, max_bytes = _name_by_content(path), None, LARGEST_MOTION_BYTES
     if find_suffix(named):
         read, max_bytes = _format_of(named).read, _format_of(named).max_bytes
+    elif other := find_suffix(named, [f".{name}" for name in MOTION_READERS.names]):
+        read = MOTION_READERS.load(other.removeprefix("."))
     if read is None:
         known = ", ".join(list_read_suffixes())
         raise InputError(f"{path}: cannot read motion from {_suffix(path)}; use one of {known}")

@@ -207,8 +207,7 @@ _NO_MISTAKE = {
 
 @cache
 def _read_kinds() -> list[tuple[str, str, str, int, bytes]]:
-    """Return each kind of file: its group, its name, what to do with one that is given in the place of another, its
-    mark, and at which byte that is; -1: anywhere in the tail, -2: in the head."""
+    """Return group, name, next step, place (-1: anywhere in the tail, -2: in the head) and mark of kinds of files."""
     steps = {row["group"]: row["next"] for row in read_shipped_table("lipmotion.storage", "next_steps.csv")}
     rows = read_shipped_table("lipmotion.storage", "file_kinds.csv")
     marks = (row["mark"].encode().decode("unicode_escape").encode("latin-1") for row in rows)

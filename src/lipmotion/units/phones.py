@@ -66,9 +66,8 @@ in no dictionary. Its word, where it is given, is that of the whole span."""
 _CLOSED = parse_table("pcl=p bcl=b tcl=t_ch_dx dcl=d_jh_dx kcl=k gcl=g")
 CLOSURES = {closure: tuple(phones.split()) for closure, phones in _CLOSED.items()}
 """Closures of TIMIT to the phones that they open to; alone, a closure is the first of these."""
-OTHER_NAMES = {closure: phones[0] for closure, phones in CLOSURES.items()} | dict(
-    zip("dx nx eng ux hv ax-h axh tq epi pau h#".split(), "d n ng uw hh ax ax t sil sil sil".split(), strict=True)
-)
+OTHER_NAMES = {closure: phones[0] for closure, phones in CLOSURES.items()}
+OTHER_NAMES |= parse_table("dx=d nx=n eng=ng ux=uw hv=hh ax-h=ax axh=ax tq=t epi=sil pau=sil h#=sil")
 """Phones that TIMIT and Buckeye name otherwise: the tap of *city* is a d, of *winner* an n.
 Source: TIMIT, phoncode.doc; the Buckeye corpus manual."""
 
