@@ -88,34 +88,29 @@ class Registry(Generic[ExtensionT]):
 
         Raises InputError: none has this name, the package that adds it cannot be imported, or it is of another kind.
         """
-        loaded = self._import(name)
+        if name in self.built_in:
+            module, _, attribute = self.built_in[name].partition(":")
+            loaded: ExtensionT = getattr(import_module(module), attribute)
+        elif name in self._own:
+            loaded = self._own[name].load()
+        elif name not in self._installed:
+            raise InputError(f"no {self.kind} {name!r}; there are: {', '.join(self.names)}")
+        else:
+            entry = self._installed[name]
+            try:
+                with redirect_stdout(sys.stderr):
+                    loaded = entry.load()
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:  # also sys.exit(), which would end the program without a word
+                what = f"the {self.kind} {name!r} cannot be imported from the {_locate(entry)}: {_describe(error)};"
+                raise InputError(f"{what} install a version that works with this lipmotion, or remove it") from error
         if self.base is not None:
             fits = isinstance(loaded, type) and issubclass(loaded, self.base)
             if not fits or (self.named and getattr(loaded, "name", "") != name):
                 required = f"a class of {self.base.__name__}{' of this name' * self.named}"
                 raise InputError(f"the {self.kind} {name!r} of an installed package is {loaded!r}, required {required}")
         return loaded
-
-    def _import(self, name: str) -> ExtensionT:
-        if name in self.built_in:
-            module, _, attribute = self.built_in[name].partition(":")
-            return getattr(import_module(module), attribute)
-        if name in self._own:
-            return self._own[name].load()
-        if name not in self._installed:
-            raise InputError(f"no {self.kind} {name!r}; there are: {', '.join(self.names)}")
-        entry = self._installed[name]
-        try:
-            with redirect_stdout(sys.stderr):
-                added: ExtensionT = entry.load()
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:  # also sys.exit(), which would end the program without a word
-            raise InputError(
-                f"the {self.kind} {name!r} cannot be imported from the {_locate(entry)}: {_describe(error)}; install a "
-                "version of the package that works with this lipmotion, or remove it"
-            ) from error
-        return added
 
     @cached_property
     def _own(self) -> Mapping[str, metadata.EntryPoint]:

@@ -18,8 +18,7 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def is_line(text: str) -> bool:
-    """Return whether text files of any format can hold a text in one line; marks of direction and joiners may be in
-    it."""
+    """Return whether text files of any format can hold a text in one line, perhaps with marks of direction."""
     return not _NOT_IN_LINES.search(text)
 
 

@@ -15,12 +15,12 @@ from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER
 from lipmotion.articulation.mouth import frame_times
 from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
-from lipmotion.meshes.fitting.driven import DrivenCharacter, DrivenPose
 from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
 from lipmotion.meshes.model.mesh import HEAD, LEFT_EYE, NECK, RIGHT_EYE
 from lipmotion.storage.files import atomic_file
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces import base
+from lipmotion_faces.characters.binding import DrivenPose, PosedCharacter
 from lipmotion_faces.characters.surface import build_surface, compute_normals, drop_back_sides
 from lipmotion_faces.rendering.drawn_surface import Camera, TexturedCanvas, fill, prepare_surface
 
@@ -46,7 +46,7 @@ FRAMES_AHEAD = 2
 
 
 class MeshPose(NamedTuple):
-    """A character in one frame: of ``DrivenCharacter.poses``, angles of the head, and of the eyes, in radians."""
+    """A character in one frame: of ``PosedCharacter.poses``, angles of the head, and of the eyes, in radians."""
 
     row: DrivenPose
     turn: Turn
@@ -64,7 +64,7 @@ class MeshFace(base.Face):
 
     def __init__(
         self,
-        character: DrivenCharacter,
+        character: PosedCharacter,
         width: int = WIDTH,
         height: int = HEIGHT,
         staging: base.Staging | None = None,
@@ -100,7 +100,7 @@ class MeshFace(base.Face):
         return lambda pose: draw(self.character.place_vertices(pose.row), pose.turn, pose.look)
 
 
-def write_picture(path: Path, character: DrivenCharacter) -> None:
+def write_picture(path: Path, character: PosedCharacter) -> None:
     """Write a picture of a character at rest as PNG. Raises ExportError: it cannot be written."""
     from PIL import Image
 
@@ -113,7 +113,7 @@ class MeshStage:
     """A mesh before the camera, in light, for several threads; colour: of the background (None: a gradient)."""
 
     def __init__(
-        self, character: DrivenCharacter, width: int, height: int, colour: tuple[int, int, int] | None = None
+        self, character: PosedCharacter, width: int, height: int, colour: tuple[int, int, int] | None = None
     ) -> None:
         mesh, placement = drop_back_sides(character.mesh), character.placement
         surface = build_surface(mesh)
@@ -199,7 +199,7 @@ class MeshStage:
         light[changed], shine[changed] = self._light_vertices(places, normals, changed)
         return places[self._drawn.rows], light, shine, moved
 
-    def _weigh_head(self, character: DrivenCharacter, face: NDArray[np.bool_]) -> tuple[Array, Array]:
+    def _weigh_head(self, character: PosedCharacter, face: NDArray[np.bool_]) -> tuple[Array, Array]:
         """Return how far each vertex follows the head, 0 to 1 [shape=(V,)], and where the head turns [shape=(3,)]."""
         bones = {bone.kind: bone for bone in character.mesh.bones}
         lips = character.placement.vertices

@@ -24,7 +24,7 @@ from lipmotion.storage.json_text import as_json
 from lipmotion.storage.locks import open_temporary
 from lipmotion.types import Motion, values
 from lipmotion.types.configuration import kind_of
-from lipmotion.types.values import Schema, items, number_or_text, parse_number, parse_whole, require
+from lipmotion.types.values import Schema, items, parse_number, parse_whole, require
 from lipmotion.units import PHONES, split_words
 from lipmotion_faces.outputs.shown_faces import ShownPerson
 from lipmotion_studio.folder import RevisionError
@@ -62,17 +62,22 @@ def take(content: Mapping[str, Any], name: str, default: Any, schema: Schema) ->
     return require(schema, content.get(name, default), name)
 
 
+def _number_or_text(read: Callable[[str], Any], schema: Schema) -> Schema:
+    """Return the schema of a number that may also be a text, as in addresses, which ``read`` turns into the number."""
+    return lambda value: schema(read(value) if isinstance(value, str) else value)
+
+
 def take_int(
     content: Mapping[str, Any], name: str, default: int | None = None, *, low: int = 0, high: int = 1 << 31
 ) -> int:
     """Return a whole number of a request, also from its text in an address. Raises as ``take``."""
-    schema = number_or_text(partial(parse_whole, what=f"{name} is"), values.whole(low, high))
+    schema = _number_or_text(partial(parse_whole, what=f"{name} is"), values.whole(low, high))
     return int(take(content, name, default, schema))
 
 
 def take_time(content: Mapping[str, Any], name: str, default: float | None = None) -> float:
     """Return a time of a request in seconds, also from its text in an address. Raises as ``take``."""
-    schema = number_or_text(partial(parse_number, what=f"{name} is"), values.number(0, LATEST_S))
+    schema = _number_or_text(partial(parse_number, what=f"{name} is"), values.number(0, LATEST_S))
     return float(take(content, name, default, schema))
 
 

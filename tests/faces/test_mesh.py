@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from lipmotion import Staging
-from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.mesh import Material, Mesh, MeshPart
+from lipmotion_faces.characters.binding import PosedCharacter
 from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.mesh import MeshFace, MeshStage
 from lipmotion_faces.testing import check_face
@@ -14,7 +14,7 @@ STILL = Staging(blinks=False, gaze=False, brows=False, head=False)
 
 
 @pytest.fixture(scope="module")
-def character(tmp_path_factory) -> DrivenCharacter:
+def character(tmp_path_factory) -> PosedCharacter:
     path = tmp_path_factory.mktemp("character") / "head.glb"
     mesh = head()
     red = Material("lips", (0.8, 0.2, 0.2))

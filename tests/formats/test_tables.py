@@ -9,10 +9,11 @@ import pytest
 from formats.examples import of_motion, written
 from lipmotion import read_motion
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.tables import CURVES, SPEECH_CURVES, is_live_link_file, read_speech_curves, timecode
+from lipmotion.formats.tables import CURVES, is_live_link_file, timecode
 from lipmotion.meshes.fitting.blendshape_motion import arkit_weights, with_mouth
 from lipmotion.meshes.model.shape_names import ARKIT_52, ARKIT_MOUTH, ARKIT_OTHERS
 from lipmotion.types import WEIGHT, Channel, Generation, Motion
+from lipmotion_faces.corpus.supplied import SPEECH_CURVES, read_speech_curves
 from meshes.live_link_app import COLUMNS, HEAD, write_take
 
 

@@ -20,7 +20,7 @@ from lipmotion.types.delivery import parse_moods
 from lipmotion.types.motion import RADIAN
 from lipmotion.units import PHONES
 from lipmotion_faces.base import stage_liveliness
-from lipmotion_faces.characters import binding, character_files, gltf_scene
+from lipmotion_faces.characters import binding, calibration, character_files, gltf_scene
 from lipmotion_faces.characters.character_files import JAW_OPEN, load_character, with_jaw
 from lipmotion_faces.characters.gltf_document import find_bone_kind
 from lipmotion_faces.characters.gltf_scene import merge_bones
@@ -157,7 +157,7 @@ def test_any_names_are_understood_by_their_rows(file):
 
 def test_the_table_of_what_was_found_changes_nothing_and_weights_that_are_given_back_stay(file):
     before = load_character(file)
-    rig_tables.write_rig_table(before.table_file, before.table_rows())
+    calibration.write_rig_table(before.table_file, before.table_rows())
     after = load_character(file)
     assert after.table_rows() == before.table_rows()
     np.testing.assert_array_equal(after.weights(motion(), units()).values, before.weights(motion(), units()).values)

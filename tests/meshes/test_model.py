@@ -3,12 +3,12 @@ import pytest
 
 from lipmotion import errors, types
 from lipmotion.errors import InputError
-from lipmotion.formats.base import EVERY_KEY, Thinning, place_keys
+from lipmotion.formats.base import Thinning
 from lipmotion.meshes.model import shape_names
 from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
 from lipmotion.meshes.model.rig_tables import apply_rig, read_rig_table
 from lipmotion_faces.characters import surface
-from lipmotion_faces.characters.scene import HeadTurn, Scene, compute_shading_normals
+from lipmotion_faces.characters.scene import EVERY_KEY, HeadTurn, Scene, compute_shading_normals, place_keys
 from meshes.heads import head, shaped
 
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])

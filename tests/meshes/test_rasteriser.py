@@ -208,9 +208,9 @@ def test_opacity_in_a_box_is_never_less_or_more_than_said():
     texture = Texture(np.dstack([np.zeros((32, 48, 3)), alpha]).astype(np.uint8))
     low = draw.uniform(-1, 1, (200, 2))
     high = low + draw.uniform(0.01, 0.2, (200, 2))
-    least, most = texture.range_of_opacity(low, high, np.ones(200, np.int64))
+    least, most = textures.find_opacity_range(texture, low, high, np.ones(200, np.int64))
     inside = draw.uniform(0, 1, (50, 1, 2)) * (high - low) + low
-    seen = np.stack([texture.at(each)[:, 3] for each in inside])
+    seen = np.stack([textures.find_pixels(texture, each)[:, 3] for each in inside])
     assert (seen.min(axis=0) >= least).all()
     assert (seen.max(axis=0) <= most).all()
     assert 0.05 < (least > 0.9).mean() < 0.95

@@ -9,7 +9,7 @@ import json
 import logging
 import re
 from array import array
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import pairwise
@@ -190,12 +190,11 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     """
     path = Path(path)
     check_kind(path, "motion file")
-    named = _name_by_content(path)
-    other = find_suffix(named, [f".{name}" for name in MOTION_READERS.names])
-    added = MOTION_READERS.load(other.removeprefix(".")) if other and not find_suffix(named) else None
-    read, max_bytes = added, LARGEST_MOTION_BYTES
+    named, read, max_bytes = _name_by_content(path), None, LARGEST_MOTION_BYTES
     if find_suffix(named):
         read, max_bytes = _format_of(named).read, _format_of(named).max_bytes
+    elif other := find_suffix(named, [f".{name}" for name in MOTION_READERS.names]):
+        read = MOTION_READERS.load(other.removeprefix("."))
     if read is None:
         known = ", ".join(list_read_suffixes())
         raise InputError(f"{path}: cannot read motion from {_suffix(path)}; use one of {known}")
@@ -421,9 +420,6 @@ def _pass(text: str, at: int, character: str) -> int:
     return at + 1
 
 
-JUMP_S = 1e-3  # how long a change at once may last, in seconds
-
-
 @dataclass(frozen=True)
 class Thinning:
     """Which keys may be left out.
@@ -463,30 +459,3 @@ class Thinning:
                 is_kept[middle] = True
                 open_ends += [(first, middle), (middle, last)]
         return np.flatnonzero(is_kept)
-
-
-EVERY_KEY = Thinning()
-
-
-def with_jumps(time_s: Array, rows: Array, stepped: Sequence[bool]) -> tuple[Array, Array]:
-    """Return evenly spaced keys with those added that let some curves change at once between straight lines.
-
-    time_s  : seconds [shape=(T,)]; rows : of curves [shape=(T, N)]; stepped : which curves change at once [N values]
-    An added key is ``JUMP_S`` before a change, or a tenth of the time between two keys, whichever is shorter.
-    """
-    chosen = np.array(stepped, bool)
-    changed = np.flatnonzero(np.diff(rows[:, chosen], axis=0).any(axis=1)) + 1
-    if not len(changed):
-        return time_s, rows
-    step_s = float(time_s[1] - time_s[0])
-    early_s = min(JUMP_S, step_s / 10)
-    before = rows[changed] - early_s / step_s * (rows[changed] - rows[changed - 1])
-    before[:, chosen] = rows[changed - 1][:, chosen]
-    return np.insert(time_s, changed, time_s[changed] - early_s), np.insert(rows, changed, before, axis=0)
-
-
-def place_keys(time_s: Array, rows: Array, stepped: Sequence[bool], thinning: Thinning) -> tuple[Array, Array]:
-    """Return times and values of keys, with straight lines between, of even rows; arguments as of ``with_jumps``."""
-    all_s, all_rows = with_jumps(time_s, rows, stepped)
-    chosen = thinning.choose(all_s, all_rows)
-    return all_s[chosen], all_rows[chosen]

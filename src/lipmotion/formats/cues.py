@@ -44,6 +44,7 @@ from lipmotion.articulation.cue_sheets import (
 from lipmotion.articulation.lip_points import build_mouth
 from lipmotion.articulation.phone_targets import crossfade_phones
 from lipmotion.errors import ExportError, InputError, shorten
+from lipmotion.motion.frame_labels import find_runs
 from lipmotion.printable import is_line, printable
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json
@@ -176,10 +177,8 @@ def format_project(sheet: CueSheet, sound_file: str) -> str:
     # Papagayo knows whole rates alone: 29.97 becomes 30 at the same times, so that frames do not drift from the sound
     sheet = replace(sheet, fps=float(math.ceil(sheet.fps - WHOLE_RATE_TOLERANCE)))
     names = list_frame_shapes(sheet)
-    moving = [False, *(shape != REST for shape in names), False]
-    starts = [frame for frame in range(len(names)) if moving[frame + 1] and not moving[frame]]
-    ends = [frame for frame in range(len(names)) if moving[frame + 1] and not moving[frame + 2]]
-    phrases = [find_words_of_run(sheet, first, last) for first, last in zip(starts, ends, strict=True)]
+    runs = find_runs(np.array([shape != REST for shape in names], bool)).tolist()
+    phrases = [_list_words(sheet, first, stop - 1) for first, stop in runs]
     texts = [" ".join(word for *_, word in phrase) for phrase in phrases]
     lines = [MARK, _one_line(" ".join(sound_file.split())) or "sound.wav", f"{sheet.fps:.0f}", f"{len(names)}"]
     lines += ["1", "\tVoice 1", f"\t{'|'.join(texts)}", f"\t{len(phrases)}"]
@@ -192,7 +191,7 @@ def format_project(sheet: CueSheet, sound_file: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def find_words_of_run(sheet: CueSheet, first: int, last: int) -> list[Part]:
+def _list_words(sheet: CueSheet, first: int, last: int) -> list[Part]:
     """Return the words from one frame to another without gaps; what is said within a frame joins the one before."""
     parts: list[Part] = []
     spans = sheet.words.spans

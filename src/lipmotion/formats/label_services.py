@@ -40,6 +40,7 @@ from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import values
 from lipmotion.types.values import parse_clock, parse_number, require
 from lipmotion.units import SILENCE
+from lipmotion.units.spelling import parse_table
 from lipmotion.units.spoken_text import check_word_count, extract_spoken_text
 from lipmotion.units.text_normalisation import find_words
 
@@ -107,14 +108,8 @@ KOKORO_LETTERS = {"A": "eɪ", "I": "aɪ", "W": "aʊ", "Y": "ɔɪ", "O": "oʊ", "
 KOKORO_FRAMES_PER_S = 40  # durations are in frames of 600 samples at 24 kHz
 POLLY_KINDS = ("sentence", "word", "viseme", "ssml")
 MARK = re.compile(r"[^\W\d_]+(?:['’-][^\W\d_]+)*[.,;:!?]?")  # a name of one of Google's marks that is the word after it
-COLUMNS = (
-    "characters characters=text characterstarttimesseconds=startsec characterendtimesseconds=endsec",  # ElevenLabs
-    "characters chars=text charstarttimesms=sentencestartms chardurationsms=sentencedurationms",  # its web socket
-    "characters chars=text charstarttimesms=sentencestartms charsdurationsms=sentencedurationms",
-    "characters tokens=text timestamps=start",  # sherpa-onnx, pieces of words that last to the next one
-    "words words=word wordstarttimeseconds=sentencestart wordendtimeseconds=sentenceend",  # Inworld
-    "words words=word start=start end=end",  # Cartesia, word_timestamps
-    "phonemes phonemes=symbol start=start end=end",  # Cartesia, phoneme_timestamps
+PARALLEL_LISTS = tuple(
+    (row["items"], parse_table(row["members"])) for row in read_shipped_table("lipmotion.formats", "label_lists.csv")
 )
 """Parallel lists: the list of items that they become, and the member that each is of them."""
 SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
@@ -163,7 +158,7 @@ def parse_service_tiers(text: str, where: str) -> list[LabelTier] | None:
     """Return the tiers of the JSON of a service; None: it has none. Raises InputError: it is damaged, with its line."""
     numbered = [(f"line {line}", value) for line, value in _decode_documents(text, where)]
     if len(numbered) == 1 and isinstance(numbered[0][1], list):
-        if numbered[0][1] and all(map(_name_stamp, numbered[0][1])):
+        if numbered[0][1] and all(map(_read_stamp, numbered[0][1])):
             numbered = [("", [{"segments": numbered[0][1]}])]
         numbered = [(f"item {number}", value) for number, value in enumerate(numbered[0][1], 1)]
     objects = [(place, item) for place, item in numbered if isinstance(item, dict)]
@@ -304,7 +299,7 @@ def _collect_rows(
     name = path[-1]
     if isinstance(value, list):
         for number, each in enumerate(value[:1] if name in ALTERNATIVES else value, 1):
-            item = dict(zip(_name_stamp(each), each, strict=True)) if _name_stamp(each) else each
+            item = _read_stamp(each) or each
             if isinstance(item, dict):
                 at = f"{place}, {name or 'item'} {number}".strip(", ")
                 _collect_rows(item, found, where, at, path, owner, who)
@@ -330,10 +325,8 @@ def _collect_rows(
 
 
 def _list_items(item: dict[str, Any], where: str) -> dict[str, Any]:
-    """Return an object with lists of items for parallel lists (``COLUMNS``), and for the phones of Piper and Kokoro."""
-    for column in COLUMNS:
-        name, *pairs = column.split()
-        members = dict(pair.split("=") for pair in pairs)
+    """Return an object with lists of items for ``PARALLEL_LISTS``, and for the phones of Piper and Kokoro."""
+    for name, members in PARALLEL_LISTS:
         lists: list[Any] = [item.get(member) for member in members]
         if not all(isinstance(each, list) for each in lists) or any(isinstance(each, dict) for each in lists[0]):
             continue
@@ -417,21 +410,22 @@ def _choose_rows(found: Found, *, phones: bool) -> list[Row]:
     return [*(replace(line, parts=tuple(parts[id(line)])) for line in lines), *parts[id(None)]]
 
 
-def _name_stamp(item: Any) -> tuple[str, ...]:
-    """Return what the members of a list are that is a word with its times (IBM's, Qwen's); none: it is no such list."""
+def _read_stamp(item: Any) -> dict[str, Any]:
+    """Return a list that is a word with its times (IBM's, Qwen's) as an object; empty: it is no such list."""
     if not isinstance(item, list) or len(item) != 3 or not (isinstance(item[0], str) or isinstance(item[2], str)):
-        return ()
-    return ("text", "start", "end") if isinstance(item[0], str) else ("start", "end", "text")
+        return {}
+    text, start, end = item if isinstance(item[0], str) else (item[2], *item[:2])
+    return {"text": text, "start": start, "end": end}
 
 
 def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
-    """Return lists of items in time: phones, and a tier of each speaker, of words if nearly all are, else of lines."""
+    """Return lists of items in time: the phones, and what each speaker says; None: there are none."""
     found: Found = defaultdict(list)
     for place, item in objects:
         _collect_rows(item, found, where, place if len(objects) > 1 else "")
-    rows = (row for rows in found.values() for row in rows if row.times.kind == "sentence" and len(objects) > 1)
-    if len(sentences := {row.place.partition(",")[0] for row in rows}) > 1:
-        what = f"{len(sentences)} pieces whose times each begin at 0; save the sound of each apart"
+    begun = {row.place.partition(",")[0] for rows in found.values() for row in rows if row.times.kind == "sentence"}
+    if len(objects) > 1 < len(begun):
+        what = f"{len(begun)} pieces whose times each begin at 0; save the sound of each apart"
         raise InputError(f"{where}: holds {what}, and give those of one")
     words = [word for _, item in objects if isinstance(item.get("words"), list) for word in item["words"]]
     missed = sum(isinstance(word, dict) and word.get("case") == MISSED for word in words)
@@ -444,27 +438,34 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
             return [] if lists and not any(lists) else None
         spoken = next(filter(None, found.values()))
     phones = _extend_to_next(phones, [])
-    silences = [row.start for row in phones if row.text == SILENCE]
-    spoken = _extend_to_next(spoken, silences)
+    spoken = _extend_to_next(spoken, [row.start for row in phones if row.text == SILENCE])
+    if not phones:
+        return _build_spoken_tiers(spoken, where, may_be_phones=True)
+    labels = _scale_rows(phones, PHONE_LABELS, where)
+    labels = split_ipa(labels, where) if any(row.is_symbol for row in phones) else labels
+    tier = LabelTier(PHONE_LABELS, tuple(labels), PHONE_LABELS)
+    return [tier, *_build_spoken_tiers(spoken, where, may_be_phones=False)]
+
+
+def _build_spoken_tiers(spoken: list[Row], where: str, *, may_be_phones: bool) -> list[LabelTier]:
+    """Return a tier of each speaker: of words if nearly all rows are, else of lines, or of what may be phones."""
     half = len(spoken) // 2  # Google's last result repeats the first half, with speakers
     first, again = ([(row.text, row.start) for row in part] for part in (spoken[:half], spoken[half:]))
     if half and first == again and spoken[0].speaker != spoken[-1].speaker:
         spoken = spoken[half:]
     if any(len({part.speaker for part in row.parts}) > 1 for row in spoken):
         spoken = [part for row in spoken for part in row.parts or (row,)]
-    labels = _scale_rows(phones, PHONE_LABELS, where)
-    labels = split_ipa(labels, where) if any(row.is_symbol for row in phones) else labels
-    tiers = [LabelTier(PHONE_LABELS, tuple(labels), PHONE_LABELS)] if phones else []
     counts = [len(find_words(extract_spoken_text(each.text[:LONGEST_JUDGED]))) for each in spoken]
     check_word_count(sum(counts) + sum(len(each.parts) for each in spoken), where)
     single = sum(each.role == WORDS or count < 2 for each, count in zip(spoken, counts, strict=True))
-    role = WORDS if single >= SINGLE_SHARE * len(spoken) and not any(each.parts for each in spoken) else LINES
+    has_parts = any(each.parts for each in spoken)
+    role = WORDS if single >= SINGLE_SHARE * len(spoken) and not has_parts else LINES
     by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
     for each, label in zip(spoken, _scale_rows(spoken, role, where), strict=True):
         by_speaker[each.speaker or (each.parts[0].speaker if each.parts else "")].append(label)
-    if not phones and all(each.role != WORDS and not each.parts for each in spoken):
+    if may_be_phones and not has_parts and not any(each.role == WORDS for each in spoken):
         role = PHONE_LABELS if all(holds_phones(LabelTier("", tuple(each))) for each in by_speaker.values()) else role
-    return tiers + [LabelTier(who or role, tuple(labels), role, who) for who, labels in by_speaker.items()]
+    return [LabelTier(who or role, tuple(labels), role, who) for who, labels in by_speaker.items()]
 
 
 def _extend_to_next(rows: list[Row], silences: Iterable[float]) -> list[Row]:

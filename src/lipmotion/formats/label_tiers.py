@@ -333,14 +333,11 @@ def _join_states(labels: Sequence[TimedLabel]) -> list[TimedLabel]:
 
 def _reduce_vowels(labels: Sequence[TimedLabel], phones: Sequence[str], words: Sequence[TimedLabel]) -> list[str]:
     """Return the phones with the unstressed vowels of every word reduced by the lexicon's rule."""
-    result = list(phones)
+    result, end = list(phones), 0
     middles_s = [(label.start_s + label.end_s) / 2 for label in labels]
-    in_time = sorted(range(len(labels)), key=middles_s.__getitem__)
-    sorted_s = [middles_s[i] for i in in_time]
-    end = 0
     for word in words:
-        start, end = max(end, bisect_left(sorted_s, word.start_s)), max(end, bisect_left(sorted_s, word.end_s))
-        inside = [i for i in sorted(in_time[start:end]) if not is_silent(phones[i])]
+        start, end = max(end, bisect_left(middles_s, word.start_s)), max(end, bisect_left(middles_s, word.end_s))
+        inside = [i for i in range(start, end) if not is_silent(phones[i])]
         reduced = reduce_vowels(word.text.lower(), tuple(phones[i] for i in inside))
         for i, phone in zip(inside, reduced, strict=True):
             result[i] = phone

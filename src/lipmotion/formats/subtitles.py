@@ -75,9 +75,9 @@ def parse_subtitles(text: str, where: str) -> LabelTier:
     of an unknown rate.
     """
     text = _convert_counts(text, where) if COUNTED.match(text) else text
-    read = _read_lyrics if LYRICS.search(text) else _read_cues
-    cues = list((_read_dialogue if read is _read_cues and SUBSTATION.search(text) else read)(text, where))
-    labels = (replace(cue, parts=_split_words(cue)) for cue in _drop_repetitions(cues))
+    is_dialogue = SUBSTATION.search(text) is not None
+    read = _read_lyrics if LYRICS.search(text) else _read_dialogue if is_dialogue else _read_cues
+    labels = (replace(cue, parts=_split_words(cue)) for cue in _drop_repetitions(list(read(text, where))))
     return LabelTier("subtitles", tuple(labels), LINES)
 
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats import steady_rate
 from lipmotion.formats.base import MotionFormat, format_rows
-from lipmotion.meshes.model.shape_names import ARKIT_52, ARKIT_MOUTH, is_known, to_arkit
+from lipmotion.meshes.model.shape_names import ARKIT_52, is_known, to_arkit
 from lipmotion.storage.text_table import LONGEST_LINE, open_table, parse_numbers
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, Timeline, Unit
 
@@ -43,10 +43,6 @@ TAKE_DECIMALS = 6
 BEFORE_CURVES = ("Timecode", "BlendshapeCount")
 FIRST, COUNT = (name.lower() for name in BEFORE_CURVES)
 """Names of the first two columns of the app; capitals do not matter, for versions of the app differ."""
-SPEECH_CURVES = frozenset(
-    (*ARKIT_MOUTH, "cheekPuff", "cheekSquintLeft", "cheekSquintRight", "noseSneerLeft", "noseSneerRight")
-)
-"""The curves that speech moves: those of mouth, jaw, tongue, cheeks and nose."""
 NO_CURVES = re.compile(r"(?:|unnamed:?0|(?:frame|face)?(?:index|idx|id|number|no|num)?s?|blendshapecount|neutral)")
 """The same of columns that are no curves: numbers of frames and faces, and what MediaPipe calls neutral."""
 SCORES = ("score", "value", "weight", "coefficient")
@@ -136,14 +132,6 @@ def is_live_link_file(path: Path) -> bool:
         return False
     lower = [name.lower() for name in names[:2]]
     return lower[:1] == [FIRST] and (lower[1:] in ([], [COUNT]) or (is_known(names[1]) and "." not in names[1]))
-
-
-def read_speech_curves(motion: Motion) -> Motion:
-    """Return the curves that speech moves, without those of eyes, brows and head. Raises InputError: there are none."""
-    names = [name for name in motion.names if name in SPEECH_CURVES]
-    if not names:
-        raise InputError("none of its curves is one of mouth or jaw, required jawOpen, mouthClose, ...")
-    return motion.selected(names)
 
 
 def read_curve_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:

@@ -25,6 +25,7 @@ from lipmotion.formats.label_tiers import (
     require_time,
     to_phone,
 )
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.units.spoken_text import SpokenAs, classify_label
 
 SHORTEST_TICKS = 10_000  # whole numbers below a millisecond are no ticks at sight: "20 30 people" is a sentence
@@ -50,14 +51,7 @@ RTTM = re.compile(r"(?:SPEAKER|SPKR-INFO)\s+\S+\s+\S+\s")
 COMMENT = (";;", "#")
 LRS_TEXT = re.compile(r"\s*Text:[ \t]+(\S.*)")  # the first line of a text of LRS: what is said
 LRS_WORDS = re.compile(r"^WORD[ \t]+START[ \t]+END\b.*$", re.MULTILINE)
-COLUMNS = {
-    "start": {"begin", "begintime", "start", "starttime", "starts", "tmin", "onset", "startframe", "framestart"},
-    "end": {"end", "endtime", "ends", "stop", "tmax", "offset", "endframe", "frameend"},
-    "duration": {"duration", "dur"},
-    "text": {"label", "text", "word", "phone", "transcript", "transcription", "utterance", "annotation"},
-    "kind": {"type", "tier", "tiername"},
-    "speaker": {"speaker", "speakerid", "participant"},
-}
+COLUMNS = {row["column"]: {*row["names"].split()} for row in read_shipped_table(__package__, "label_columns.csv")}
 """Names of columns of tables: of the Montreal Forced Aligner, of Praat, of people."""
 UNIT_END = re.compile(
     r"(?:[\s_]+(?:-\s)?|[\s_]*[(\[])(?:hh:mm:ss(?:[:.]\w+)?|(?:ss\.)?m?s(?:ecs?)?|(?:milli)?seconds?)[)\]]?$"

@@ -117,9 +117,7 @@ def open_temporary() -> Iterator[Path]:
     for left in place.glob(f"{FOLDER_PREFIX}*/{LOCK}"):
         with suppress(ExportError, OSError), files.confine(place):  # it is in use, or another user's
             with lock_folder(left.parent):
-                for path in left.parent.iterdir():
-                    if path != left:
-                        files.remove(path)
+                remove_unfinished(left.parent, "*")
             left.parent.rmdir()
     with ExitStack() as stack:
         for is_last in (False, False, True):
@@ -155,9 +153,7 @@ def keep_unfinished(target: Path) -> Iterator[Path]:
                 yield folder
             except ExportError as error:
                 raise ExportError(f"{error}; what is finished is kept in {folder}") from error
-            for path in folder.iterdir():
-                if path.name != LOCK:
-                    files.remove(path)
+            remove_unfinished(folder, "*")
     finally:
         with suppress(OSError):  # it contains finished parts
             folder.rmdir()
@@ -169,8 +165,8 @@ def name_work_folder(target: Path) -> Path:
     return target.with_name(target.name + UNFINISHED)
 
 
-def remove_unfinished(folder: Path) -> None:
-    """Delete the unfinished files that a killed run left in ``folder``."""
-    for path in folder.glob(f"{files.TEMPORARY}*"):
+def remove_unfinished(folder: Path, names: str = f"{files.TEMPORARY}*") -> None:
+    """Delete the unfinished files that a killed run left in ``folder``, or those of other names, but for its lock."""
+    for path in folder.glob(names):
         if path.name != LOCK:
             files.remove(path)

@@ -207,8 +207,7 @@ _NO_MISTAKE = {
 
 @cache
 def _read_kinds() -> list[tuple[str, str, str, int, bytes]]:
-    """Return each kind of file: its group, its name, what to do with one that is given in the place of another, its
-    mark, and at which byte that is; -1: anywhere in the tail, -2: in the head."""
+    """Return group, name, next step, place (-1: anywhere in the tail, -2: in the head) and mark of kinds of files."""
     steps = {row["group"]: row["next"] for row in read_shipped_table("lipmotion.storage", "next_steps.csv")}
     rows = read_shipped_table("lipmotion.storage", "file_kinds.csv")
     marks = (row["mark"].encode().decode("unicode_escape").encode("latin-1") for row in rows)
@@ -248,33 +247,14 @@ def is_text(path: Path) -> bool:
     return False
 
 
-MEDIA_FORMATS = (
-    # sound
-    "aac ac3 aiff amr amrnb amrwb ape au caf dsf dts dtshd eac3 flac g722 gsm ircam loas mlp mp3 mpc mpc8 nistsphere "
-    "ogg oma pvf qcp qoa rso sds sln sox spdif tak truehd tta voc w64 wav wavarc wv xwma "
-    # video, most of them with sound
-    "apng asf asf_o avi dv dvd flv gif gxf h264 hevc ivf live_flv m4v matroska mjpeg mov mpeg mpegts mpegvideo mxf "
-    "nut obu rm smjpeg wtv yuv4mpegpipe"
-).split()
+_MEDIA = read_shipped_table("lipmotion.storage", "media_formats.csv")
+MEDIA_FORMATS = [name for row in _MEDIA for name in row["formats"].split()]
 """FFmpeg's names of the container formats whose content is in the file itself. All others are refused before they
 open anything: playlists (hls, concat, dash, imf), indexes (vobsub), numbered pictures (image2), addresses (sdp, rtsp),
 devices."""
 LARGEST_BLOCK_BYTES = 1 << 28
 """Most bytes that FFmpeg may allocate at a time: three pictures of ``MAX_PIXELS`` with four channels of 16 bits."""
 MAX_PIXELS = 4096 * 2304  # most pixels of a picture: slightly more than 4K. A decoder may keep sixteen pictures.
-
-
-@cache
-def read_x264() -> str:
-    """Return the parameter of x264 that limits its instructions, after a colon; empty on processors without AVX-512.
-
-    With AVX-512 it writes other bytes now and then for pictures under 100 px (3 videos of 100), with AVX2 it does not,
-    at the same speed, and for larger pictures in the same bytes.
-    """
-    import numpy as np
-
-    features = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
-    return ":asm=avx2" if any(name.startswith(("AVX512", "X86_V4")) for name in features) else ""
 
 
 def open_media(path: Path, *, content: Any = None) -> Any:

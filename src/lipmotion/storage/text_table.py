@@ -10,7 +10,7 @@ import csv
 import io
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
@@ -98,10 +98,8 @@ def parse_numbers(fields: Sequence[str], line: int) -> list[float]:
     written = "".join(fields)
     if "_" in written or not written.isascii():  # as 1_0, or digits of other scripts, which Python reads
         raise ValueError(f"line {line}: required numbers in the digits 0 to 9")
-    try:
+    with suppress(ValueError):
         return list(map(float, fields))
-    except ValueError:
-        pass
     try:
         return [float("nan") if f.strip().lower() in MISSING else float(f.replace(",", ".")) for f in fields]
     except ValueError as error:

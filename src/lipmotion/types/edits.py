@@ -75,9 +75,7 @@ class Gain:
         if not 0 <= self.factor <= LARGEST_GAIN:
             raise InputError(f"the gain is {self.factor:g}, required 0 to {LARGEST_GAIN:g}")
         if not self.start_s <= self.end_s:
-            raise InputError(
-                f"the gain lasts from {self.start_s:g} to {self.end_s:g} s, an end after the start is required"
-            )
+            raise InputError(f"the gain lasts from {self.start_s:g} to {self.end_s:g} s, required a later end")
 
 
 @dataclass(frozen=True)

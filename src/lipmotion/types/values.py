@@ -178,11 +178,6 @@ def value_of(kind: Callable[..., Any], table: Mapping[str, Schema], needed: Coll
     return lambda value: kind(**schema(value))
 
 
-def number_or_text(read: Callable[[str], Any], schema: Schema) -> Schema:
-    """Return the schema of a number that may also be a text, which ``read`` turns into the number."""
-    return lambda value: schema(read(value) if isinstance(value, str) else value)
-
-
 def as_tuple(schema: Schema) -> Schema:
     """Return the schema of a list that becomes a tuple."""
     return lambda value: tuple(schema(value))

@@ -10,27 +10,12 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from lipmotion.errors import shorten
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import Timeline, Unit
 from lipmotion.units.spelling import parse_table, read_table
 
-VISEMES: dict[str, tuple[str, ...]] = {
-    "sip": ("sil", "sp"),  # silence (the print's /sip/ is /sil/; sp joins it)
-    "lr1": ("ao", "aa", "ah", "er", "oy", "aw", "hh"),  # vowels by lip rounding, 1 to 4
-    "lr2": ("uw", "uh", "ow", "em"),
-    "lr3": ("ae", "eh", "ey", "ay"),
-    "lr4": ("ih", "iy", "ax", "axr", "ix"),
-    "as": ("l", "el", "r", "y"),  # alveolar semi-vowels
-    "af": ("s", "z"),  # alveolar fricatives
-    "al": ("t", "d", "n", "en"),  # alveolar
-    "pa": ("sh", "zh", "ch", "jh"),  # palato-alveolar
-    "bi": ("p", "b", "m"),  # bilabial: the mouth closes
-    "de": ("th", "dh"),  # dental
-    "ld": ("f", "v"),  # labio-dental
-    "ve": ("ng", "k", "g", "w"),  # velar
-}
-
-VISEME_OF: dict[str, str] = {phone: viseme for viseme, phones in VISEMES.items() for phone in phones}
-
+VISEMES = {viseme: tuple(phones.split()) for viseme, phones in read_table("visemes").items()}
+VISEME_OF = {phone: viseme for viseme, phones in VISEMES.items() for phone in phones}
 VOWELS = frozenset(phone for viseme in ("lr1", "lr2", "lr3", "lr4") for phone in VISEMES[viseme]) - {"hh", "em"}
 """The vowels among the phones of the vowel visemes."""
 
@@ -53,16 +38,9 @@ class MouthShape:
     fallback: str = ""
 
 
-SHAPES: dict[str, MouthShape] = {
-    "A": MouthShape("closed, lips pressed: p b m", 0.0, 0.0, "MBP"),
-    "B": MouthShape("slightly open, teeth together: most consonants, ee", 0.35, 0.4, "etc"),
-    "C": MouthShape("open: e as in men, a as in bat", 0.6, 0.2, "E"),
-    "D": MouthShape("wide open: a as in father", 0.85, 0.0, "AI"),
-    "E": MouthShape("slightly rounded: o as in off, ir as in bird", 0.5, -0.5, "O"),
-    "F": MouthShape("puckered: oo as in you, w", 0.2, -1.0, "U"),
-    "G": MouthShape("upper teeth on the lower lip: f v", 0.15, 0.0, "FV", fallback="A"),
-    "H": MouthShape("open, tongue raised behind the upper teeth: l", 0.6, 0.0, "L", fallback="C"),
-    "X": MouthShape("at rest, lips closed and relaxed: silence", 0.0, 0.0, "rest", fallback="A"),
+SHAPES = {
+    row["shape"]: MouthShape(row["meaning"], float(row["opening"]), float(row["spread"]), row["blair"], row["fallback"])
+    for row in read_shipped_table("lipmotion.units", "tables/mouth_shapes.csv")
 }
 OPTIONAL = "".join(name for name, shape in SHAPES.items() if shape.fallback)
 REST = "X"
@@ -88,9 +66,8 @@ in no dictionary. Its word, where it is given, is that of the whole span."""
 _CLOSED = parse_table("pcl=p bcl=b tcl=t_ch_dx dcl=d_jh_dx kcl=k gcl=g")
 CLOSURES = {closure: tuple(phones.split()) for closure, phones in _CLOSED.items()}
 """Closures of TIMIT to the phones that they open to; alone, a closure is the first of these."""
-OTHER_NAMES = {closure: phones[0] for closure, phones in CLOSURES.items()} | dict(
-    zip("dx nx eng ux hv ax-h axh tq epi pau h#".split(), "d n ng uw hh ax ax t sil sil sil".split(), strict=True)
-)
+OTHER_NAMES = {closure: phones[0] for closure, phones in CLOSURES.items()}
+OTHER_NAMES |= parse_table("dx=d nx=n eng=ng ux=uw hv=hh ax-h=ax axh=ax tq=t epi=sil pau=sil h#=sil")
 """Phones that TIMIT and Buckeye name otherwise: the tap of *city* is a d, of *winner* an n.
 Source: TIMIT, phoncode.doc; the Buckeye corpus manual."""
 

@@ -8,6 +8,7 @@ from itertools import pairwise
 from lipmotion.types import Timeline, Unit
 from lipmotion.units.lexicon import WEAK_WORDS, Lexicon
 from lipmotion.units.phones import FULL_FORMS, is_silent, list_phone_classes
+from lipmotion.units.spelling import read_table
 
 REDUCED = frozenset(FULL_FORMS)
 """Vowels, and consonants in the place of a vowel, that are not stressed in a word with a full vowel."""
@@ -17,22 +18,9 @@ UNSTRESSED_WORDS = WEAK_WORDS | frozenset(
     "them they to us we will with would you".split()
 )
 """Words of one syllable that are unstressed in running speech."""
-PATTERNS: dict[str, int] = {
-    "Fx": 0, "FF": 0, "xF": 1, "Fxx": 0, "FxF": 0, "FFx": 1, "FFF": 1, "xFx": 1, "xFF": 1, "xxF": 2, "FxFx": 2,
-    "FxFF": 2, "FFxF": 1, "FFFx": 2, "FFFF": 2, "FFxx": 1, "Fxxx": 0, "FxxF": 0, "xFxx": 1, "xxFx": 2, "xFxF": 1,
-    "FxxFx": 3, "FxxxF": 2, "FxFxx": 2,
-}  # fmt: skip
+PATTERNS = {pattern: int(place) for pattern, place in read_table("stress_patterns").items()}
 """The full (F) and reduced (x) vowels of a word, and the number of its stressed one."""
-ENDINGS: dict[str, int] = {
-    ending: place
-    for place, endings in {
-        -1: "ese ore ette elle oy ect",
-        -2: "ion ions ic ics ish io",
-        -3: "ity ia ian ians ious ium ical ier",
-        -4: "ated ary ator ately izing izes usly ating",
-    }.items()
-    for ending in endings.split()
-}
+ENDINGS = {ending: int(place) for place, endings in read_table("stress_endings").items() for ending in endings.split()}
 """Spellings at the end of a word, and its stressed vowel, counted from the end."""
 UNSTRESSED_PREFIXES = ("be", "de", "dis")
 """Beginnings of words of two syllables that leave the stress to the second one, with one of ``PREFIX_VOWELS``."""

@@ -29,8 +29,6 @@ CURRENCIES = {sign: tuple(names.split()) for sign, names in read_table("currenci
 MAGNITUDES = {"h": "hundred", "k": "thousand", "m": "million", "b": "billion", "t": "trillion"}
 """By the first letter, which the whole names begin with, too: ``mn``, ``bn``, ``million``."""
 UNITS, ABBREVIATIONS, SIGNS = map(read_table, ("measures", "abbreviations", "signs"))
-PARTS = "War|Part|Chapter|Act|Scene|Volume|Book|Episode|Section|Phase|Type|Level|Class|Round|Title|Bowl|Rocky|Stage"
-"""What is counted by cardinals: ``Chapter IV``, but ``Henry VIII``."""
 
 
 def spell_number(digits: str) -> list[str]:
@@ -203,6 +201,11 @@ def _stutter(text: str) -> Iterator[str]:
         yield word if vowel is None else " ".join((*(bit + vowel for bit in bits), word))
 
 
+def _abbreviation(text: str) -> Iterator[str]:
+    name = text[:-1]
+    yield from ABBREVIATIONS[name if name in ABBREVIATIONS else name.lower()].split("|")
+
+
 SAID: dict[str, Callable[[str], str]] = {
     **{"": _usual, "w": str.lower, "c": _plain, "o": _ordinal, "p": _pair, "n": _minutes, "t": _hour},
     "i": lambda amount: _cardinal(amount) if re.fullmatch(NUMBER, amount) else _usual(amount),
@@ -225,131 +228,39 @@ SAID: dict[str, Callable[[str], str]] = {
     "R": lambda numeral: _ordinal(_roman(numeral)),
     "a": lambda name: {"fig": "figure", "vol": "volume", "p": "page", "pp": "pages"}[name.lower()],
     "d": lambda digits: re.sub("ys$", "ies", f"{_usual(digits)}s"),
+    "z": lambda letters: " ".join(letters.replace(".", "")).lower().replace("&", "and"),
     "g": lambda scale: "celsius" if scale in "cC" else "fahrenheit",
 }
 """What the ways of templates make of a part."""
-NUMBER = r"(?:\d{1,3}(?:,\d{3})+(?!\d)|\d+)"
-A = rf"(?:{NUMBER}(?:\.\d+)?|\.\d+)"
-R = rf"({A}(?:\s?[-–]\s?{A})?)"  # an amount, and one or a range of them
-WORD = r"[^\W\d_]+(?:'[^\W\d_]+)*"
 _NAME = "|".join(f"{name[:3].title()}(?:{name[3:]})?" for name in MONTHS).replace("Sep", "Sep(?:t(?!e))?")
-MONTH, MM, DD = rf"(?-i:({_NAME})\.?)", "(0?[1-9]|1[0-2])", r"(0?[1-9]|[12]\d|3[01])"
-UNIT = "|".join(sorted((re.escape(unit) for unit in UNITS if len(unit) > 1 and unit != "in"), key=len, reverse=True))
-S, OVER, PM = "([$£€¥₹₩])", "[/⁄]", r"\s?([ap])\.?m(?:\.|\b)"
-DOMAIN = "(?:com|org|net|edu|gov|io|uk|de|ai|tv)"
-PARTED = "([3-9]|12|16|20|32|64)"
-NUMERAL = "((?:XL|L?X{0,3})(?:IX|IV|V?I{0,3}))"
-TITLE = "|".join(name for name in ABBREVIATIONS if name[0].isupper())
+_MEASURES = sorted((re.escape(unit) for unit in UNITS if len(unit) > 1 and unit != "in"), key=len, reverse=True)
+PIECES = read_table("form_pieces") | {
+    "MONTH": rf"(?-i:({_NAME})\.?)",
+    "UNIT": "|".join(_MEASURES),
+    "TITLE": "|".join(name for name in ABBREVIATIONS if name[0].isupper()),
+    "SHORT": "|".join(re.escape(name) for name in ABBREVIATIONS if name.islower()),
+}
+"""Regular expressions of which those of forms are made."""
 _NAMES = {each.split()[0] for each in UNITS.values()} | set().union(*CURRENCIES.values())
 _COUNTED: re.Pattern[str] = re.compile(rf"((?:^|\band )one )({'|'.join(sorted(_NAMES))})\b")
-NUMERIC: Forms = (
-    (r"(?:\+\d{1,3}[ .-]?|1[-.])?(?:\(\d{3}\)[ -]?|\d{3}[-.])?\d{3}-\d{4}|\d{3}\.\d{3}\.\d{4}|\+\d{7,14}", _telephone),
-    (r"0\d{2,4}(?: \d{3,4}){2}", _telephone),
-    (rf"(\d{{4}})[-/]{MM}[-/]{DD}", "{2:m} {3:o} {1}|the {3:o} of {2:m} {1}|{2:m} {3:c} {1}|{2:m} {3:o} {1:*}"),
-    (r"\+\d{1,3}(?:[ .-]\(?\d{1,4}\)?){2,5}|\d+(?:-\d+){2,5}", _telephone),
-    (
-        rf"{MM}[/.]{MM}[/.](\d{{4}}|\d\d)",
-        "{1:m} {2:o} {3:y}|the {2:o} of {1:m} {3:y}|{2:m} {1:o} {3:y}|the {1:o} of {2:m} {3:y}|{1:c} {2:c} {3:y}",
-    ),
-    (rf"{MM}[/.]{DD}[/.](\d{{4}}|\d\d)", "{1:m} {2:o} {3:y}|the {2:o} of {1:m} {3:y}|{1:c} {2:c} {3:y}"),
-    (rf"{DD}[/.]{MM}[/.](\d{{4}}|\d\d)", "the {1:o} of {2:m} {3:y}|{2:m} {1:o} {3:y}|{1:c} {2:c} {3:y}"),
-    (rf"{DD}(?:st|nd|rd|th)?\s{MONTH}", "the {1:o} of {2:m}|{1:o} of {2:m}|{2:m} {1:o}|{1:c} {2:m}|the {1:o} {2:m}"),
-    (rf"(\d\d?):00{PM}", "{1:c} {2:w} m|{1:c} o'clock {2:w} m|{1:c} o'clock|{1:c}"),
-    (rf"(\d\d?:\d\d){PM}", "{1:*} {2:w} m|{1}"),
-    (rf"(1[0-2]|[1-9]){PM}", "{1} {2:w} m"),
-    (r"([01]?\d|2[0-4]):([0-5]\d):([0-5]\d)", "{1:c} {2:p} {3:p}|{1:c} hours {2:c} minutes {3:c} seconds"),
-    (r"12:00", "twelve o'clock|twelve|noon|midnight|twelve hundred"),
-    (r"([1-9]|1[01]):00", "{1} o'clock|{1}|{1} hundred|{1} hundred hours"),
-    (r"(0\d|1\d|2[0-4]):00", "{1} hundred|{1} hundred hours|{1:t} o'clock|{1:t} p m|{1:t}|midnight"),
-    (
-        r"([01]?\d|2[0-4]):(0\d|1\d|2\d|30)",
-        "{1:c} {2:p}|{2:n} past {1:t}|{2:N} past {1:t}|{1:t} {2:p}|{2:n} after {1:t}|{1:c} {2:c}",
-    ),
-    (r"([01]?\d|2[0-4]):([345]\d)", "{1:c} {2:p}|{2:l} to {1:f}|{2:L} to {1:f}|{1:t} {2:p}"),
-    (r"(\d+):(\d+)", "{1} to {2}|{1} {2}"),
-    (rf"{S}\s?({A})\s?(?:k|thousand)", "{2} thousand {1:s}|{2} k|{2:k} {1:s}|{2:e} {1:s}|{2:*} thousand {1:s}"),
-    (
-        rf"{S}\s?{R}(\s?(?:hundred|million|billion|trillion|mn|mil|bn)\b|mm?|bn?|tn?)",
-        "{2:*} {3:x} {1:s}|{2} {3:x}|{2} {3:x} {1:b}",
-    ),
-    (rf"{S}\s?0?\.(?!00)(\d\d)", "{2:c} {1:S}"),
-    (rf"{S}\s?({NUMBER})\.00", "{2} {1:s}|{2} {1:s} even"),
-    (rf"{S}\s?({NUMBER})\.(\d\d)", "{2:i} {1:s} and {3:c} {1:S}|{2:i} {1:s} {3:c} {1:S}|{2:i} {3:p}|{2:i} {1:s} {3:p}"),
-    (rf"{S}\s?{R}(?:\s?[-–]\s?{S})?", "{2:i} {1:s}|{2:i} {1:b}|{2:*} {1:s}"),
-    (rf"{R}\s?([$£€¥₹₩¢])", "{1:i} {2:s}|{1:i} {2:b}|{1:*} {2:s}"),
-    (r"'(0[1-9])", "{1:p}|{1}"),
-    (
-        r"(\d+)\s?h(?:\s?(\d\d?)\s?m(?:ins?)?|(\d\d))",
-        "{1} hours {2:c}{3:c} minutes|{1} hours and {2:c}{3:c} minutes|{1} hours {2}{3}",
-    ),
-    (r"(\d+)\s?m(?:ins?)?\s?(\d\d?)\s?s(?:ecs?)?", "{1} minutes {2:c} seconds|{1} minutes and {2:c} seconds"),
-    (r"'?(\d0)'?s", "{1:d}|{1} seconds"),
-    (r"'?(\d\d\d0)'?s", "{1:d}"),
-    (rf"{R}\s?°\s?([cf])", "{1} degrees {2:g}|{1} degrees|{1} {2:w}|{1} {2:g}|{1} degrees centigrade"),
-    (rf"{R}((?-i:[CF]))", "{1} degrees {2:g}|{1} {2:w}|{1} degrees|{1} {2:g}"),
-    (rf"{R}\s?mph", "{1} miles per hour|{1} m p h|{1} miles an hour|{1:*} miles per hour"),
-    (rf"{R}\s?gb(?!/)", "{1} gigabytes|{1} gigs|{1} g b|{1:*} gigabytes"),
-    (rf"{R}((?-i:[M]))", "{1} million|{1:i} meters"),
-    (rf"{R}((?-i:[GLHS]))", "{1} {2:w}|{1:i} {2:u}"),
-    (rf"{R}(\s?(?-i:[gl])|[hs])", "{1:i} {2:u}|{1} {2:w}"),
-    (rf"{R}\s?m", "{1:i} meters|{1} million|{1} m"),
-    (rf"{R}(\s?(?:{UNIT}|[%°])|in|[wv])", "{1:i} {2:u}|{1:*} {2:u}"),
-    (rf"({A})-({UNIT})", "{1} {2:v}"),
-    (r"(\d)'\s?(1[01]|\d)(?:\"|'')?", "{1} {2}|{1} foot {2}|{1} feet {2}"),
-    (r"(\d+)\.(\d+)\.(\d+)\.(\d+)", "{1} dot {2} dot {3} dot {4}|{1} point {2} point {3} point {4}"),
-    (r"(\d+)\.(\d+)\.(\d+)", "{1} point {2} point {3}|{1} dot {2} dot {3}|{1} {2} {3}"),
-    (rf"({NUMBER})(?:st|nd|rd|th)", "{1:o}"),
-    (rf"(\d+)[ -]1{OVER}2", "{1} and a half|{1} and one half"),
-    (rf"(\d+)[ -]1{OVER}(\d+)", "{1} and a {2:q}|{1} and one {2:q}"),
-    (rf"(\d+)[ -](\d+){OVER}(\d+)", "{1} and {2} {3:q}s"),
-    (rf"1{OVER}2", "one half|a half|half|one over two|one out of two|one two|january second"),
-    (rf"1{OVER}{PARTED}", "one {1:q}|a {1:q}|one {1:o}|one over {1}|one out of {1}|one {1}"),
-    (rf"([2-9]){OVER}{PARTED}", "{1} {2:q}s|{1} {2:o}s|{1} out of {2}|{1} {2}|{1} over {2}|{1} slash {2}"),
-    (rf"(\d+){OVER}(10|100)", "{1} out of {2}|{1} {2}|{1} {2:o}s|{1} over {2}|{1} slash {2}"),
-    (rf"{MM}{OVER}{DD}", "{1:c} {2:c}|{1:m} {2:o}|the {2:o} of {1:m}|{1:c} out of {2:c}|{1:c} over {2:c}"),
-    (rf"(\d+){OVER}(\d+)", "{1} {2}|{1} out of {2}|{1} over {2}|{1} slash {2}"),
-    (r"(20(?=[-–]20)|50(?=[-–]50))[-–][25]0", "{1} {1}|{1} to {1}"),
-    (r"(\d+)[-–]0", "{1} to zero|{1} nil|{1} zero|{1} nothing|{1} oh"),
-    (rf"({A})\s?[-–]\s?({A})", "{1} to {2}|{1} {2}|{1:*} to {2}|{1} to {2:*}|{1} through {2}|{1} minus {2}"),
-    (rf"({A})k", "{1} k|{1} thousand|{1:k}"),
-    (rf"({A})(b|bn)", "{1} billion|{1} b"),
-    (rf"({A})\s?[x×]\s?({A})(?!\^)", "{1} by {2}|{1} times {2}|{1} x {2}"),
-    (rf"({A})x", "{1} times|{1} x"),
-    (r"#(\d+)", "number {1}|hashtag {1}"),
-    (rf"({NUMBER})\^2", "{1} squared|{1} to the second"),
-    (rf"({NUMBER})\^(\d+)", "{1} to the {2:o}"),
-    (rf"{NUMBER}?\.\d+", _decimal),
-    (NUMBER, _number),
-)
-FORMS: Forms = (
-    *NUMERIC,
-    (r"[\w.+-]{1,64}@[\w-]{1,63}(?:\.[\w-]{1,63}){1,4}|(?:https?://|www\.)[^\s<>()]{0,200}[\w/]", _address),
-    (rf"[a-z][\w-]{{0,63}}(?:\.[\w-]{{1,63}}){{0,4}}\.{DOMAIN}\b(?:/[\w/.-]{{0,200}}\w)?", _address),
-    (rf"{MONTH}\s{DD}(?:st|nd|rd|th)?(?!\s?[-–:.]?\d)", "{1:m} {2:o}|{1:m} {2:c}|{1:m} the {2:o}|the {2:o} of {1:m}"),
-    (r"no\.\s?(\d+)", "number {1}|no {1}"),
-    (r"(fig|vol|pp?)\.\s?(\d+(?:[-–]\d+)?)", "{1:a} {2}"),
-    (r"(?-i:CO)2", "c o two"),
-    (r"(?-i:St\. ([A-Z][a-z]+))", "saint {1:w}|street {1:w}"),
-    (rf"(?-i:(?:{TITLE})\.)(?=\s+(?-i:[A-Z])|\Z)", lambda text: iter(ABBREVIATIONS[text[:-1]].split("|"))),
-    (
-        "(?:" + "|".join(re.escape(name) for name in ABBREVIATIONS if name.islower()) + r")\.",
-        lambda text: iter(ABBREVIATIONS[text[:-1].lower()].split("|")),
-    ),
-    (rf"(?-i:({PARTS}) (?=[IVXL]){NUMERAL})", "{1:w} {2:r}|{1:w} the {2:R}|{1:w} {2:w}"),
-    (r"(?-i:([A-Z][a-z]+) ([VX]))", "{1:w} {2:w}|{1:w} the {2:R}|{1:w} {2:r}"),
-    (rf"(?-i:([A-Z][a-z]+) (?=[IVX]{{2}}){NUMERAL})", "{1:w} the {2:R}|{1:w} {2:r}"),
-    (r"(?:[a-z]\.){2,}[a-z]?", lambda text: iter([text.lower().replace(".", " ")])),
-    (r"(?-i:([A-Z])\+\+)", "{1:w} plus plus"),
-    (r"(?-i:([A-Z])#)", "{1:w} sharp"),
-    (r"(?-i:[A-Z]{1,3}&[A-Z]{1,3})", lambda text: iter([" ".join(text).lower().replace("&", "and")])),
-    (rf"(?!d-day)(?P<bit>[b-df-hj-np-tv-z]{{1,3}})-(?:(?P=bit)-)*(?=(?P=bit)){WORD}", _stutter),
-    (r"(?-i:[A-Z]{2,5}s?)", lambda text: iter([" ".join(text).lower(), text.lower()])),
-)  # fmt: skip
-"""Patterns of forms, without regard of case, and how they are read: the first that matches counts.
-Those that begin with a letter come last.
+_READERS = {"!telephone": _telephone, "!decimal": _decimal, "!number": _number}
+_READERS |= {"!address": _address, "!abbreviation": _abbreviation, "!stutter": _stutter}
 
-Readings are divided by ``|``; ``{1}`` is the usual one of the first group, ``{1:*}`` each of them; or as of ``SAID``.
-"""
+
+def _expand(pattern: str) -> str:
+    return re.sub("<([A-Z]+)>", lambda piece: _expand(PIECES[piece[1]]), pattern)
+
+
+def _read_forms(table: str) -> Forms:
+    return tuple((_expand(form), _READERS.get(text, text)) for form, text in read_table(table).items())
+
+
+NUMBER: str = _expand("<NUMBER>")
+WORD = _expand("<WORD>")
+NUMERIC = _read_forms("numeric_forms")
+FORMS = NUMERIC + _read_forms("worded_forms")
+"""Patterns of forms, without regard of case, and how they are read: the first that matches counts. Those that begin
+with a letter come last."""
 
 
 def _singular(match: re.Match[str]) -> str:

@@ -1,29 +1,97 @@
-"""Binding a character to control points by distance along its surface; bindings, and painted weights, in files."""
+"""Binding a character to control points by distance along its surface; bindings, and painted weights, in files.
+
+Below: the vertices of a character in motion, moved by a binding or by its own blendshapes.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.lip_points import build_mouth
+from lipmotion.articulation.contact import MIN_GAP, sample_pictures
+from lipmotion.articulation.expression import read_moods
+from lipmotion.articulation.lip_points import LOWER_MIDDLE, UPPER_MIDDLE, build_mouth
+from lipmotion.articulation.mouth import SpokenMouth
 from lipmotion.errors import InputError, ModelFormatError, shorten
-from lipmotion.meshes.fitting.driven import ControlBinding
+from lipmotion.meshes.fitting.blendshape_motion import move_points
+from lipmotion.meshes.fitting.driven import DrivenCharacter, make_plain_row
+from lipmotion.meshes.fitting.shape_weights import weigh_expressions
 from lipmotion.meshes.model.face_shapes import LipPlacement
 from lipmotion.meshes.model.mesh import Mesh
+from lipmotion.meshes.model.rig_tables import find_table
+from lipmotion.meshes.model.shape_names import VRM_EMOTIONS
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_header_of, write_archive
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.schema import ArraySpec, check_arrays, format_errors
 from lipmotion.storage.sources import check_source
 from lipmotion.storage.text_table import read_whole_table
+from lipmotion.types import Motion, Timeline, Unit
 from lipmotion.types.values import parse_whole
 from lipmotion_faces.characters.file_limits import MAX_VERTICES
 from lipmotion_faces.characters.surface import MeshSurface
 
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class ControlBinding:
+    """Weights of control points on the vertices of a mesh.
+
+    placement : the control points: lip and jaw points of motion, each at a vertex
+    rows      : the vertices that follow any of them, ascending [shape=(N,)]
+    controls  : which control points a vertex follows, as rows of the placement; unused ones have weight 0
+                [shape=(N, K)]
+    weights   : how much, 0 to 1; what they leave of 1 is fixed to the head [shape=(N, K)]
+    """
+
+    placement: LipPlacement
+    rows: Rows
+    controls: Rows
+    weights: Array
+
+    @cached_property
+    def matrix(self) -> csr_array:
+        """The weights as sparse rows [shape=(N, C)]."""
+        from scipy.sparse import csr_array
+
+        starts = np.arange(0, self.controls.size + 1, self.controls.shape[1])
+        shape = (len(self.rows), len(self.placement.points))
+        return csr_array((self.weights.reshape(-1), self.controls.reshape(-1), starts), shape=shape)
+
+    def moved(self, mesh: Mesh, displacements: Array) -> Array:
+        """Return the vertices [shape=(V, 3)] under displacements of control points, eye distances [shape=(C, 3)]."""
+        matrices = np.tile(np.eye(3, 4), (len(displacements), 1, 1))
+        matrices[:, :, 3] = self.placement.to_mesh(displacements)
+        return self.transformed(mesh, matrices)
+
+    def transformed(self, mesh: Mesh, matrices: Array) -> Array:
+        """Return the vertices [shape=(V, 3)] under transformations of the control points [shape=(C, 3, 4)].
+
+        v′ = Σ wᵢ Mᵢ v + (1 − Σ wᵢ) v: the matrices are blended, then applied, which is the same and costs less.
+        Source: Hofer 2008, Eq. 12.  Deviation: a fixed control point has what the weights leave of 1, so that the face
+        beyond the mouth stands still.
+        Cost: O(12 · (number of weights) + 12 N).
+        """
+        vertices, at_rest = mesh.vertices.copy(), mesh.vertices[self.rows]
+        blended = (self.matrix @ (matrices - np.eye(3, 4)).reshape(len(matrices), 12)).reshape(-1, 3, 4)
+        moved: Array = blended[:, :, 0] * at_rest[:, :1]
+        moved += blended[:, :, 1] * at_rest[:, 1:2]
+        moved += blended[:, :, 2] * at_rest[:, 2:]
+        moved += blended[:, :, 3]
+        vertices[self.rows] = moved + at_rest
+        return vertices
+
+
 BINDING_FORMAT, BINDING_VERSION = "lipmotion.binding", 1
 BINDING_SUFFIX = ".binding"
 WEIGHT_COLUMNS = ("vertex", "point", "weight")
@@ -237,3 +305,131 @@ def _read_rows(path: Path, columns: tuple[str, ...], kind: str) -> Iterator[tupl
             if len(row) != len(columns):
                 raise InputError(f"{path}: line {line}: {len(row)} columns, required {','.join(columns)}")
             yield line, row
+
+
+class DrivenPose(NamedTuple):
+    """What moves a character in one frame: weights of its mouth's shapes, or places' shifts [shape=(52, 3)]; others."""
+
+    mouth: Array
+    others: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PosedCharacter(DrivenCharacter):
+    """A character whose vertices move, by its own blendshapes or else by control points.
+
+    file    : where it was read from; None: from no file
+    binding : weights of control points; None: blendshapes move it
+    """
+
+    file: Path | None = None
+    binding: ControlBinding | None = None
+
+    @property
+    def table_file(self) -> Path:
+        """Where the table of the character is. Raises InputError: it is from no file."""
+        if self.file is None:
+            raise InputError("the character was read from no file, so no table is beside it; read it from one")
+        return find_table(self.file)
+
+    def poses(
+        self, motion: Motion, units: Timeline[Unit], time_s: Array, others: Mapping[str, Array] | None = None
+    ) -> list[DrivenPose]:
+        """Return the pose at some times in seconds, evenly spaced, for ``place_vertices``.
+
+        others : weights of ARKit's blendshapes of eyes and brows, 0 to 1 [each shape=(T,)]; those that the mesh does
+                 not have are left out; None: they stay at rest
+        A closure between two times is shown at the nearer one (``articulation.contact.show_contact``).
+        Raises InputError: as ``move_points``.
+        """
+        points = move_points(motion, units)
+        other_rows = np.zeros((len(time_s), len(self._other_names)))
+        for column, curve in enumerate(self.weigh_others(others or {}, len(time_s)).values()):
+            other_rows[:, column] = curve
+        moved, contact = points.expressed, points.mouth.contact
+        if self.shapes is not None:
+            moved = self.weights(motion, units).values.astype(np.float64)
+        rows = sample_pictures(moved, contact, motion.rate_hz, time_s)
+        moods = self.expressions(motion, points.mouth)
+        if moods:
+            table = np.stack([moods.get(name, np.zeros(len(contact))) for name in self._expressions.values()], axis=1)
+            other_rows[:, len(self.other_rows) :] = sample_pictures(table, contact, motion.rate_hz, time_s)
+        return list(map(DrivenPose, rows, other_rows))
+
+    def expressions(self, motion: Motion, mouth: SpokenMouth) -> dict[str, Array]:
+        """Return weights of VRM's expressions for moods, by the mesh's names [each shape=(T,)]; none parts p b m."""
+        moods = weigh_expressions(read_moods(motion)) if self._expressions else {}
+        upper, lower = (self.placement.vertices[self.placement.row(point)] for point in (UPPER_MIDDLE, LOWER_MIDDLE))
+        curves = {}
+        for name, shape in self._expressions.items():
+            if name in moods:
+                curve = self.table.get(shape, make_plain_row(shape, name)).alone(moods[name])
+                shifts = self.placement.to_motion(self.mesh.displacements(np.array([upper, lower]), (shape,)))[0]
+                curves[shape] = curve * mouth.free if shifts[0, 1] - shifts[1, 1] > MIN_GAP / 2 else curve
+        return curves
+
+    @cached_property
+    def _expressions(self) -> dict[str, str]:
+        """The mesh's names of VRM's expressions, by VRM's; none where it has ARKit's blendshapes of brows."""
+        if {"browDownLeft", "browInnerUp", "browDownRight"} & {row.source for row in self.other_rows}:
+            return {}
+        by_name = {shape.called.lower(): shape.name for shape in self.mesh.shapes if len(shape.rows)}
+        return {name: by_name[name] for name in VRM_EMOTIONS if name in by_name}
+
+    def vertices(
+        self, motion: Motion, units: Timeline[Unit], time_s: Array, others: Mapping[str, Array] | None = None
+    ) -> Iterator[Array]:
+        """Yield the vertices at some times [each shape=(V, 3)], as of ``poses``."""
+        return map(self.place_vertices, self.poses(motion, units, time_s, others))
+
+    def place_vertices(self, pose: DrivenPose) -> Array:
+        """Return the vertices in a pose [shape=(V, 3)]. Raises InputError: no blendshapes of the mouth, no binding."""
+        of_mouth, of_others = self._displacements
+        if self.shapes is not None:
+            vertices = self.mesh.vertices.copy()
+            vertices[self.moving] += (pose.mouth @ of_mouth).reshape(-1, 3)
+        elif self.binding is None:
+            raise InputError("the character has neither blendshapes of the mouth nor a binding; give it a binding")
+        else:
+            vertices = self.binding.moved(self.mesh, pose.mouth)
+        if pose.others.any():
+            vertices[self.moving] += (pose.others @ of_others).reshape(-1, 3)
+        return vertices
+
+    @cached_property
+    def moving(self) -> NDArray[np.int64]:
+        """Numbers of the vertices that ever move, other than with the head, ascending [shape=(N,)]."""
+        names = {*self._mouth_names, *self._other_names}
+        rows = [shape.rows for shape in self.mesh.shapes if shape.name in names]
+        if self.binding is not None:
+            rows.append(self.binding.rows)
+        return np.unique(np.concatenate(rows)) if rows else np.zeros(0, np.int64)
+
+    def has_shape(self, known: str) -> bool:
+        """Return whether the mesh has a blendshape of this ARKit name that moves something."""
+        others = (row.source for row in self.other_rows)
+        return known in others or (self.shapes is not None and known in self.shapes.known)
+
+    def weigh_others(self, others: Mapping[str, Array], count: int) -> dict[str, Array]:
+        """Return weights of eyes' and brows' blendshapes over ``count`` frames, by the mesh's names; missing: 0."""
+        nothing = np.zeros(count)
+        return {row.control: row.alone(others.get(row.source, nothing)) for row in self.other_rows}
+
+    @cached_property
+    def _mouth_names(self) -> tuple[str, ...]:
+        if self.shapes is None:
+            return ()
+        return tuple(dict.fromkeys(row.control for row in self.mouth_rows[0])) if self.table else self.shapes.names
+
+    @cached_property
+    def _other_names(self) -> tuple[str, ...]:
+        return (*(row.control for row in self.other_rows), *self._expressions.values())
+
+    @cached_property
+    def _displacements(self) -> tuple[Array, Array]:
+        """What blendshapes of the mouth, and all others, do to the moving vertices [shape=(S, N · 3), both]."""
+        mouth, others = (
+            self.mesh.displacements(self.moving, names).reshape(len(names), 3 * len(self.moving))
+            for names in (self._mouth_names, self._other_names)
+        )
+        return mouth, others

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import csv
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,12 +13,15 @@ from lipmotion.articulation.lip_points import build_mouth
 from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.shape_weights import solve_shape_weights
-from lipmotion.meshes.model.rig_tables import RigRow, suggest_names
+from lipmotion.meshes.model.rig_tables import COLUMNS, RigRow, suggest_names
 from lipmotion.pipeline.outputs.curve_sets import make_rig_sources
+from lipmotion.storage.files import atomic_file
+from lipmotion.storage.text_table import as_field
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+from lipmotion_faces.characters.binding import PosedCharacter
 
 
-def describe_character(character: DrivenCharacter) -> Iterator[str]:
+def describe_character(character: PosedCharacter) -> Iterator[str]:
     """Yield what was found in a character's files, line by line."""
     mesh, placement = character.mesh, character.placement
     parts = ", ".join(part.name or "(no name)" for part in mesh.parts)
@@ -90,6 +94,17 @@ def calibrate_rows(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str
             seen.add(row.control)
         calibrated.append(row)
     return calibrated
+
+
+def write_rig_table(path: Path, rows: Iterable[RigRow]) -> None:
+    """Write a table, which ``read_rig_table`` reads. Raises ExportError: it cannot be written."""
+    with atomic_file(path) as unfinished, unfinished.open("w", encoding="utf-8-sig", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(COLUMNS)
+        for row in rows:
+            limits = [f"{limit:g}" if np.isfinite(limit) else "" for limit in (row.low, row.high)]
+            names = (as_field(row.control), as_field(row.source))
+            table.writerow([*names, f"{row.gain:.4g}", f"{row.offset:.4g}", *limits])
 
 
 def list_pose_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sources:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from array import array
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -13,14 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.face_shapes import FaceShapes, LipPlacement, group_by_name, measure_lip_parting
 from lipmotion.meshes.model.mesh import JAW, MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart, Texture
-from lipmotion.meshes.model.rig_tables import read_character_table, with_sources
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, find_spoken_name, is_known, to_arkit
+from lipmotion.meshes.model.rig_tables import RigRow, find_table, read_rig_table, suggest_names
+from lipmotion.meshes.model.shape_names import (
+    ARKIT_52,
+    ARKIT_MOUTH,
+    CLOSED,
+    VISEMES_15,
+    VRM_EMOTIONS,
+    VRM_VOWELS,
+    find_spoken_name,
+    is_known,
+    to_arkit,
+)
 from lipmotion.storage.sources import check_kind, is_file
 from lipmotion_faces.characters.binding import (
     BINDING_SUFFIX,
+    PosedCharacter,
     bind,
     load_binding,
     paint_weights,
@@ -38,6 +48,9 @@ from lipmotion_faces.characters.lip_placement import (
 from lipmotion_faces.characters.surface import build_surface
 from lipmotion_faces.characters.textures import read_texture
 
+SOURCES = (*ARKIT_52, *(f"viseme_{name}" for name in VISEMES_15), *VRM_VOWELS, CLOSED, *VRM_EMOTIONS)
+"""The curves that blendshapes of a character may follow; besides, each what its own shape fits best: its own name."""
+CLOSED_VISEME = "viseme_PP"
 NEUTRAL = "neutral"
 """The file of a folder with this word in its name, in any case, is the mesh; the others are its blendshapes."""
 MIN_SHARE = 1e-5
@@ -338,9 +351,36 @@ def with_jaw(mesh: Mesh) -> Mesh:
     return mesh
 
 
+def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
+    """Return the rows of the table beside a character, by blendshape; none without it. Raises InputError: damaged."""
+    path = find_table(character)
+    if not is_file(path):
+        return {}
+    table: dict[str, RigRow] = {}
+    for row in read_rig_table(path):
+        control, source = shorten(row.control), shorten(row.source)
+        if row.control not in mesh.shape_names:
+            near = suggest_names(row.control, mesh.shape_names)
+            raise InputError(f"{path}: there is no blendshape {control!r}; {near}")
+        if row.source not in {"", row.control, *SOURCES}:
+            near = suggest_names(row.source, SOURCES)
+            raise InputError(f"{path}: {control!r} follows {source!r}, which is no curve; {near}")
+        if row.control in table:
+            raise InputError(f"{path}: the blendshape {control!r} occurs twice; leave one row")
+        table[row.control] = replace(row, low=max(row.low, 0.0), high=min(row.high, 1.0))
+    return table
+
+
+def with_sources(mesh: Mesh, table: Mapping[str, RigRow]) -> Mesh:
+    """Return a mesh whose blendshapes follow the curves of a table; those without a row, what their names say."""
+    sources = {name: CLOSED_VISEME if row.source == CLOSED else row.source for name, row in table.items()}
+    shapes = (replace(each, source=sources[each.name]) if each.name in sources else each for each in mesh.shapes)
+    return replace(mesh, shapes=tuple(shapes))
+
+
 def load_character(
     path: str | Path, *, points: Path | None = None, binding: Path | None = None, by_points: bool = False
-) -> DrivenCharacter:
+) -> PosedCharacter:
     """Return a character from its files, ready to be moved; with the table beside it, if there is one.
 
     path      : ``.glb``, ``.gltf``, ``.vrm``, ``.obj``, or a folder of OBJ files
@@ -356,7 +396,7 @@ def load_character(
     try:
         if binding is not None and binding.suffix.lower() == BINDING_SUFFIX:
             stored = load_binding(binding, mesh)
-            return DrivenCharacter(mesh, stored.placement, None, stored, path, table)
+            return PosedCharacter(mesh, stored.placement, None, table, path, stored)
         if points is not None:
             named = read_points(points)
             surface = separate_named_lips(mesh, named)
@@ -365,11 +405,11 @@ def load_character(
             surface = build_surface(mesh)
             placement = place_lips_by_shape(mesh, surface)
         if mesh.shapes and not by_points and binding is None:
-            return DrivenCharacter(mesh, placement, find_face_shapes(mesh, placement), None, path, table)
+            return PosedCharacter(mesh, placement, find_face_shapes(mesh, placement), table, path)
         bound = bind(mesh, surface, placement)
         if binding is not None:
             bound = paint_weights(bound, mesh, read_weights(binding))
-        return DrivenCharacter(mesh, placement, None, bound, path, table)
+        return PosedCharacter(mesh, placement, None, table, path, bound)
     except InputError as error:
         text = str(error)
         raise InputError(text if str(path) in text else f"{path}: {text}") from error

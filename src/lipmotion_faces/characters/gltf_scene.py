@@ -29,7 +29,7 @@ from lipmotion_faces.characters.gltf_document import (
     place_nodes,
     read_gltf_document,
 )
-from lipmotion_faces.characters.textures import decode_srgb, encode_srgb, read_texture
+from lipmotion_faces.characters.textures import decode_srgb, encode_srgb, find_pixels, read_texture
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -289,7 +289,7 @@ class _SceneSurface:
             mapped = (uv * (1.0, -1.0) + (0.0, 1.0))[corners].reshape(-1, 3, 2)
             self._mapped = True
             if material.texture is not None:
-                colours = material.texture.at(uv[used])[:, :3] * material.colour
+                colours = find_pixels(material.texture, uv[used])[:, :3] * material.colour
         if "COLOR_0" in attributes:
             tints = _read_tints(self._document, self._arrays, attributes["COLOR_0"], count)[used]
             if material.alpha == OPAQUE:

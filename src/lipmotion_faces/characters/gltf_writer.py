@@ -11,13 +11,20 @@ from urllib.parse import quote, unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.formats.base import EVERY_KEY, Thinning, place_keys
+from lipmotion.formats.base import Thinning
 from lipmotion.meshes.model.mesh import Blendshape, MeshPart
 from lipmotion.storage.files import as_text
 from lipmotion.types import Motion
 from lipmotion_faces.characters.gltf_document import read_gltf_document, write_container
 from lipmotion_faces.characters.gltf_scene import list_rest_weights, name_mesh_targets
-from lipmotion_faces.characters.scene import HeadTurn, Scene, ShadingNormals, compute_shading_normals
+from lipmotion_faces.characters.scene import (
+    EVERY_KEY,
+    HeadTurn,
+    Scene,
+    ShadingNormals,
+    compute_shading_normals,
+    place_keys,
+)
 from lipmotion_faces.characters.textures import decode_srgb
 
 AUDIO = "audio"

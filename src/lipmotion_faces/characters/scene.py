@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,13 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.base import EVERY_KEY, Thinning, place_keys
+from lipmotion.formats.base import Thinning
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.types import Motion
 from lipmotion_faces.characters.surface import build_surface, compute_normals, drop_back_sides
 
 Array = NDArray[np.float64]
 
+EVERY_KEY = Thinning()
+JUMP_S = 1e-3  # how long a change at once may last, in seconds
 MIN_TURN = 1e-3  # normals that a blendshape turns by less than this are left out of it
 
 
@@ -87,6 +90,30 @@ class Scene:
         time_s = self.weights.time_s if self.weights else np.zeros(0)
         stepped = [name in self.stepped for name in self.mesh.shape_names]
         return place_keys(time_s, self.tabulate(), stepped, self.thinning)
+
+
+def with_jumps(time_s: Array, rows: Array, stepped: Sequence[bool]) -> tuple[Array, Array]:
+    """Return evenly spaced keys with those added that let some curves change at once between straight lines.
+
+    time_s  : seconds [shape=(T,)]; rows : of curves [shape=(T, N)]; stepped : which curves change at once [N values]
+    An added key is ``JUMP_S`` before a change, or a tenth of the time between two keys, whichever is shorter.
+    """
+    chosen = np.array(stepped, bool)
+    changed = np.flatnonzero(np.diff(rows[:, chosen], axis=0).any(axis=1)) + 1
+    if not len(changed):
+        return time_s, rows
+    step_s = float(time_s[1] - time_s[0])
+    early_s = min(JUMP_S, step_s / 10)
+    before = rows[changed] - early_s / step_s * (rows[changed] - rows[changed - 1])
+    before[:, chosen] = rows[changed - 1][:, chosen]
+    return np.insert(time_s, changed, time_s[changed] - early_s), np.insert(rows, changed, before, axis=0)
+
+
+def place_keys(time_s: Array, rows: Array, stepped: Sequence[bool], thinning: Thinning) -> tuple[Array, Array]:
+    """Return times and values of keys, with straight lines between, of even rows; arguments as of ``with_jumps``."""
+    all_s, all_rows = with_jumps(time_s, rows, stepped)
+    chosen = thinning.choose(all_s, all_rows)
+    return all_s[chosen], all_rows[chosen]
 
 
 @dataclass(frozen=True, eq=False)

@@ -119,3 +119,34 @@ def decode_srgb(colour: Sequence[float] | NDArray[np.float64]) -> NDArray[np.flo
 def encode_srgb(light: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return diffuse reflection as sRGB colours, 0 to 1; the shape stays."""
     return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+def find_opacity_range(
+    texture: Texture, low: NDArray[np.float64], high: NDArray[np.float64], reach: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return least and largest opacity in boxes, v down [shape=(N, 2)], 0 to 1; those over an edge get 0 and 1."""
+    size = np.array(texture.pixels.shape[1::-1])
+    shift = np.floor(low)
+    first = np.floor((low - shift) * size).astype(np.int64) - reach[:, None]
+    last = np.ceil((high - shift) * size).astype(np.int64) + reach[:, None]
+    inside = (first >= 0).all(axis=1) & (last <= size).all(axis=1)
+    low_opacity, high_opacity = np.zeros(len(low)), np.ones(len(low))
+    (x0, y0), (x1, y1) = first[inside].T, last[inside].T
+    count = (x1 - x0) * (y1 - y0)
+    for levels, result, solid in (((250, 242, 128), low_opacity, True), ((2, 13, 128), high_opacity, False)):
+        for level in levels[::-1]:  # the strictest one last
+            marked = texture.pixels[..., 3] >= level if solid else texture.pixels[..., 3] < level
+            table = np.pad(np.cumsum(np.cumsum(marked, axis=0, dtype=np.int64), axis=1), ((1, 0), (1, 0)))
+            all_of_it = table[y1, x1] - table[y0, x1] - table[y1, x0] + table[y0, x0] == count
+            rows = np.flatnonzero(inside)[all_of_it]
+            result[rows] = level / 255
+    return low_opacity, high_opacity
+
+
+def find_pixels(texture: Texture, uv: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the nearest pixels at places, v down, repeated beyond 0 to 1, as 0 to 1 [shapes=(N, 4), (N, 2)]."""
+    height, width = texture.pixels.shape[:2]
+    at = uv % 1.0 * (width, height)
+    column = np.minimum(at[:, 0].astype(int), width - 1)
+    row = np.minimum(at[:, 1].astype(int), height - 1)
+    return np.asarray(texture.pixels[row, column] / 255.0)

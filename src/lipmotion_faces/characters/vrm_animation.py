@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.formats.base import MotionFormat, with_jumps
+from lipmotion.formats.base import MotionFormat
 from lipmotion.meshes.model.mesh import ANGLES, turn_head
 from lipmotion.meshes.model.shape_names import VRM_EMOTIONS, VRM_VOWELS
 from lipmotion.types import Generation
 from lipmotion_faces.characters.gltf_document import write_container
 from lipmotion_faces.characters.gltf_weights import read_gltf_motion
 from lipmotion_faces.characters.gltf_writer import GltfBuffer, describe_sound
+from lipmotion_faces.characters.scene import with_jumps
 
 Array = NDArray[np.float64]
 EXTENSION = "VRMC_vrm_animation"

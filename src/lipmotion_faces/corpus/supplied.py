@@ -11,12 +11,13 @@ import numpy as np
 
 from lipmotion.errors import InputError
 from lipmotion.formats.base import read_motion
-from lipmotion.formats.tables import is_live_link_file, read_curve_table, read_speech_curves
+from lipmotion.formats.tables import is_live_link_file, read_curve_table
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
 from lipmotion.pipeline.outputs.motion_files import correct_rate
 from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.sources import hash_file
-from lipmotion.types import Audio, Span, Timeline, Track, Unit
+from lipmotion.types import Audio, Motion, Span, Timeline, Track, Unit
 from lipmotion.units import PAUSE, SILENCE, check_phones, is_silent
 from lipmotion.units.phones import SHORT_PAUSE_S
 from lipmotion_faces.corpus.captured_faces import MESH, list_mesh_files, read_bare_motion, read_mesh_motion
@@ -29,6 +30,10 @@ CURVES_MARGIN_S, CURVES_MARGIN_SHARE = 0.5, 0.02
 """Largest difference of duration between curves and sound: seconds, or share of the sound. It is larger where the frame
 rate of the curves is wrong."""
 PHONES_MARGIN_S = 0.1  # seconds by which labels may end after the sound; labelling programs round times
+SPEECH_CURVES = frozenset(
+    (*ARKIT_MOUTH, "cheekPuff", "cheekSquintLeft", "cheekSquintRight", "noseSneerLeft", "noseSneerRight")
+)
+"""The curves that speech moves: those of mouth, jaw, tongue, cheeks and nose."""
 
 
 def digest_sources(recording: SourceRecording) -> dict[str, str]:
@@ -49,6 +54,14 @@ def digest_sources(recording: SourceRecording) -> dict[str, str]:
         text = "\n".join(f"{span.start_s!r} {span.end_s!r} {span.label.phone}" for span in recording.phones)
         digests["phones_sha256"] = hashlib.sha256(text.encode()).hexdigest()
     return digests
+
+
+def read_speech_curves(motion: Motion) -> Motion:
+    """Return the curves that speech moves, without those of eyes, brows and head. Raises InputError: there are none."""
+    names = [name for name in motion.names if name in SPEECH_CURVES]
+    if not names:
+        raise InputError("none of its curves is one of mouth or jaw, required jawOpen, mouthClose, ...")
+    return motion.selected(names)
 
 
 def read_supplied_track(curves: MotionFile, duration_s: float | None) -> Track:

@@ -18,7 +18,6 @@ from lipmotion.articulation.mouth import find_mouth, frame_times
 from lipmotion.articulation.rest import add_rest
 from lipmotion.formats.base import Thinning
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
-from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves, eye_and_brow_weights
 from lipmotion.meshes.model.mesh import Blendshape, turn_head
 from lipmotion.pipeline.outputs.curve_sets import apply_weight_edits
@@ -28,6 +27,7 @@ from lipmotion.storage.files import sound_reference
 from lipmotion.types import Channel, Generation, Motion, Prosody, StateTrace
 from lipmotion.types.motion import WEIGHT
 from lipmotion_faces.base import Staging, stage_liveliness
+from lipmotion_faces.characters.binding import PosedCharacter
 from lipmotion_faces.characters.fbx import convert_to_fbx, find_blender
 from lipmotion_faces.characters.gltf_writer import write_animated_gltf, write_gltf_scene
 from lipmotion_faces.characters.scene import HeadTurn, Scene
@@ -167,7 +167,7 @@ def _select_around(frames: slice | None, margin: int) -> tuple[slice, slice]:
 
 def build_character_scene(
     generation: Generation,
-    character: DrivenCharacter,
+    character: PosedCharacter,
     rate_hz: float | None = None,
     *,
     staging: Staging | None = None,

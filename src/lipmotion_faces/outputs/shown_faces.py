@@ -22,6 +22,7 @@ from lipmotion.types.delivery import MOODS
 from lipmotion.types.progress import REPORT_INTERVAL, with_progress
 from lipmotion.units.phones import OPTIONAL
 from lipmotion_faces.base import SMALLEST_PX, Face, Staging
+from lipmotion_faces.characters.binding import PosedCharacter
 from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.cut_out import CutOut, read_cut_out
 from lipmotion_faces.film import filmed_video
@@ -33,7 +34,7 @@ from lipmotion_faces.portrait import DrawnFace
 from lipmotion_faces.registry import FACES, is_drawings, make_face, stage_face
 
 LOG = logging.getLogger("lipmotion")
-AnyFace = str | Path | Face | FilmedFace | CutOut | DrivenCharacter
+AnyFace = str | Path | Face | FilmedFace | CutOut | PosedCharacter
 
 
 class _WithHead(ShownFace):
@@ -88,7 +89,7 @@ class ShownCharacter(ShownDrawing):
 
     def __init__(self, face: MeshFace) -> None:
         super().__init__(face)
-        self.character: DrivenCharacter = face.character
+        self.character: PosedCharacter = face.character
 
     def build_scene(  # noqa: D102
         self, generation: Generation, settings: OutputSettings, prosody: Prosody | None, frames: slice | None = None
@@ -188,7 +189,7 @@ def shown_face(face: AnyFace | ShownFace) -> ShownFace:
     """Return a face as outputs show it, by name, path or value. Raises InputError, ModelFormatError: no such face."""
     if isinstance(face, ShownFace):
         return face
-    if isinstance(face, DrivenCharacter):
+    if isinstance(face, PosedCharacter):
         return ShownCharacter(MeshFace(face))
     opened: Face | FilmedFace | CutOut
     if isinstance(face, Face | FilmedFace | CutOut):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.mesh import BLEND, MASK, Mesh, Texture
-from lipmotion_faces.characters.textures import TextureTable, decode_srgb, reduce_textures
+from lipmotion_faces.characters.textures import TextureTable, decode_srgb, find_opacity_range, reduce_textures
 from lipmotion_faces.kernels.raster import draw
 from lipmotion_faces.kernels.textured import (
     CLEAR,
@@ -285,7 +285,7 @@ def _texture(
             if kind != SOLID:
                 halvings = looks[mine, 0] - table.first[textures[material.texture]]
                 ends_uv, texels = downwards[mine], 2 * 2 ** halvings.astype(np.int64)
-                lowest, highest = material.texture.range_of_opacity(ends_uv.min(axis=1), ends_uv.max(axis=1), texels)
+                lowest, highest = find_opacity_range(material.texture, ends_uv.min(axis=1), ends_uv.max(axis=1), texels)
                 lowest, highest = lowest * material.opacity, highest * material.opacity
                 hides, seen = (material.cutoff, material.cutoff) if kind == CUT else (HIDING_OPACITY, SEEN_OPACITY)
                 looks[mine, 1] = np.where(lowest >= hides, SOLID, np.where(highest < seen, EMPTY, kind))

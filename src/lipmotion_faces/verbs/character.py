@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output, pick_part
 from lipmotion.cli.terminal.printing import print_line, print_lines
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from lipmotion.meshes.fitting.driven import DrivenCharacter
     from lipmotion.meshes.model.rig_tables import RigRow
+    from lipmotion_faces.characters.binding import PosedCharacter
 
 CALIBRATION = {
     "open": "values at which the mouth is as wide open as speech opens it: A=0.8",
@@ -52,11 +53,11 @@ def run(options: argparse.Namespace) -> None:
     """Print what was found; write what was asked for."""
     from lipmotion.extensions import load_provided
     from lipmotion.meshes.fitting.driven import list_rows
-    from lipmotion.meshes.model.rig_tables import find_table, read_rig_table, write_rig_table
+    from lipmotion.meshes.model.rig_tables import find_table, read_rig_table
     from lipmotion.pipeline.job import open_character
     from lipmotion.storage.sources import is_file
     from lipmotion_faces.characters.binding import save_binding, write_points, write_weights
-    from lipmotion_faces.characters.calibration import describe_character
+    from lipmotion_faces.characters.calibration import describe_character, write_rig_table
     from lipmotion_faces.characters.character_files import read_character
 
     stated, path = _read_values(options), options.character
@@ -68,7 +69,7 @@ def run(options: argparse.Namespace) -> None:
         return
     by_points = bool(options.control_points or options.write_weights or options.write_binding)
     try:
-        character = open_character(pick_part(options, Outputs(), control_points=by_points))
+        character = cast("PosedCharacter", open_character(pick_part(options, Outputs(), control_points=by_points)))
     except InputError:
         table = find_table(path)
         if options.write_table and not is_file(table):  # the mouth was not found: the table is to be filled in
@@ -95,8 +96,7 @@ def _write_table(
     path: Path, rows: Sequence[RigRow], curves: DrivenCharacter | Path, stated: dict[str, dict[str, float]]
 ) -> None:
     """Write a table with the gains and offsets by which its controls have the stated values; print those."""
-    from lipmotion.meshes.model.rig_tables import write_rig_table
-    from lipmotion_faces.characters.calibration import calibrate_rows, list_pose_sources
+    from lipmotion_faces.characters.calibration import calibrate_rows, list_pose_sources, write_rig_table
 
     changed = calibrate_rows(rows, list_pose_sources(curves, rows), stated) if stated else rows
     for row in changed:

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
 from lipmotion.storage.files import as_text, atomic_file
-from lipmotion.storage.sources import read_x264
 from lipmotion.types import Audio
+from lipmotion_faces.coded_video import read_x264
 
 XMP_UUID = bytes.fromhex("be7acfcb97a942e89c71999491e3afac")
 """What says that a box of type ``uuid`` holds XMP (Adobe, XMP Specification Part 3)."""

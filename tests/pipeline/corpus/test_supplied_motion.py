@@ -10,7 +10,6 @@ from formats.examples import of_motion, written
 from lipmotion import Corpus, prepare
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.formats.c3d import C3dFile, write_c3d
-from lipmotion.formats.tables import SPEECH_CURVES
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit
 from lipmotion.units import is_silent
 from lipmotion_faces.corpus import supplied
@@ -154,7 +153,7 @@ def test_a_take_of_the_app_and_markers_become_a_corpus(tmp_path):
     assert prepare(takes, tmp_path / "corpus", workers=1).prepared == ("a", "b")
     corpus = Corpus.open(tmp_path / "corpus")
     taken, marked = (corpus.utterance(name).track.motion for name in "ab")
-    assert set(taken.names) == SPEECH_CURVES
+    assert set(taken.names) == supplied.SPEECH_CURVES
     np.testing.assert_allclose(taken["jawOpen"], values[:, 0], atol=1e-6)
     assert marked.rate_hz == 120.0
     expected = np.linalg.norm(places[:, 2] - places[:, 3], axis=1) / 88

@@ -8,6 +8,7 @@ mouth give them the distances and points that faces draw.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -31,6 +32,7 @@ from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.face_shapes import FaceShapes
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, OPENS, VOWELS, VRM_VOWELS, convert_to_arkit, to_arkit
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
@@ -39,13 +41,9 @@ HINGE = (-0.45, -0.75)  # the axis of the jaw: height and depth behind the eyes,
 JAW_ANGLE_RAD = 0.44  # how far ``jawOpen`` turns the jaw: the lower lip goes down by about half an eye distance
 UPPER_PART = 0.08  # the share of the gap that the upper lip closes in ``mouthClose``; the lower lip closes the rest
 MIN_OPENING = 0.05  # a blendshape that parts the lips by more, in eye distances, opens the mouth
-ARTICULATORY = {
-    "tongue": {"tongueOut": 3.0},
-    "lip_tuck": {"mouthRollLower": 1.8},
-    "protrusion": {"mouthPucker": 1.2, "mouthFunnel": 0.9},
-    "spread": dict.fromkeys(("mouthSmileLeft", "mouthSmileRight", "mouthStretchLeft", "mouthStretchRight"), 0.7),
-    "lip_press": {"mouthPressLeft": 2.0, "mouthPressRight": 2.0},
-}
+ARTICULATORY: dict[str, dict[str, float]] = defaultdict(dict)
+for _row in read_shipped_table("lipmotion.meshes.fitting", "articulatory.csv"):
+    ARTICULATORY[_row["channel"]][_row["blendshape"]] = float(_row["gain"])
 """What blendshapes say of the articulatory channels (docs/articulation.md): their weights, times these, added up."""
 
 
@@ -63,11 +61,8 @@ def arkit_mouth() -> FaceShapes:
 def vowel_mouth() -> FaceShapes:
     """Return the vowels of VRM, made of ARKit's blendshapes (``VOWELS``), as displacements of points."""
     mouth = arkit_mouth()
-    gains = np.zeros((len(VRM_VOWELS), len(mouth.known)))
-    for known, sources in VOWELS.items():
-        for vowel, gain in sources:
-            if vowel in VRM_VOWELS:
-                gains[VRM_VOWELS.index(vowel), mouth.known.index(known)] = gain
+    sources = [dict(VOWELS.get(known, ())) for known in mouth.known]
+    gains = np.array([[each.get(vowel, 0.0) for each in sources] for vowel in VRM_VOWELS])
     moved = np.einsum("vs,spd->vpd", gains, mouth.moved)
     return FaceShapes(VRM_VOWELS, tuple(f"vowel_{name}" for name in VRM_VOWELS), moved, gains @ mouth.gap, "visemes")
 

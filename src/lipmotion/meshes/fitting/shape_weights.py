@@ -94,14 +94,9 @@ Limits = tuple[Array | float, Array | float]
 LARGEST_EIGENVALUE = 16.0  # the largest eigenvalue of the squared second difference
 MAX_STEPS, TOLERANCE = 2000, 1e-5
 """Iteration stops after so many steps, or when no weight changes by more than the second number in one."""
-SIDED_SHAPES = {
-    "mouthSmile": ("smile", 0.75), "mouthFrown": ("frown", 0.9), "mouthStretch": ("stretched", 0.7),
-    "mouthUpperUp": ("upper_raise", 0.6), "mouthPress": ("tight", 0.5),
-}  # fmt: skip
-"""By blendshapes of both sides: the curve of the spoken mouth that they show, and their weight where it is 1."""
-MIDDLE_SHAPES = {"mouthShrugLower": ("chin_raise", 0.5), "mouthRollUpper": ("tight", 0.15)}
-"""The same of blendshapes that have no sides."""
-MOOD_SHAPES = {f"{name}{side}": row for name, row in SIDED_SHAPES.items() for side in SIDES} | MIDDLE_SHAPES
+_MOODS = read_shipped_table("lipmotion.meshes.fitting", "mood_shapes.csv")
+MOOD_SHAPES = {row["shape"]: (row["curve"], float(row["weight"])) for row in _MOODS}
+"""By blendshapes: the curve of the spoken mouth that they show, and their weight where it is 1."""
 EXPRESSIONS: Mapping[str, tuple[tuple[str, float], ...]] = {
     "happy": (("happy", 1.0),), "sad": (("sad", 1.0),), "angry": (("angry", 1.0),), "surprised": (("surprised", 1.0),),
     "afraid": (("surprised", 0.5), ("sad", 0.5)), "disgusted": (("angry", 0.6), ("sad", 0.3)),
@@ -147,9 +142,7 @@ class CurveCosts:
 USUAL_COSTS = CurveCosts()
 
 
-def solve_shape_weights(
-    motion: Motion, units: Timeline[Unit], shapes: FaceShapes, costs: CurveCosts = USUAL_COSTS
-) -> Motion:
+def solve_shape_weights(motion: Motion, units: Timeline[Unit], shapes: FaceShapes) -> Motion:
     """Return the weights of blendshapes over time: one channel a blendshape, by the mesh's names, 0 to 1.
 
     motion : of lip and jaw points, or of ``opening`` and ``width``, whose rest pose is the mesh as it is; or of
@@ -176,12 +169,12 @@ def solve_shape_weights(
                 spoken[:, row] += curve
         targets = np.concatenate([_weigh_rows(points.displacements, mouth.gap), VISEME_WEIGHT * spoken], axis=1)
         matrix = np.concatenate([matrix, VISEME_WEIGHT * np.eye(len(shapes.names))], axis=1)
-        weights = fit_bounded_curves(matrix, targets, costs)
+        weights = fit_bounded_curves(matrix, targets)
     else:
         displacements = points.displacements.copy()
         if mood is not None:  # what the shapes of a mood do to the width of the mouth is theirs
             displacements[..., 0] -= mood @ shapes.moved[..., 0]
-        weights = _solve_free_weights(_weigh_rows(displacements, mouth.gap), matrix, mouth, shapes, costs)
+        weights = _solve_free_weights(_weigh_rows(displacements, mouth.gap), matrix, mouth, shapes)
         weights = _add_mood(weights, mood)
     weights = with_gap(weights, shapes, mouth.gap - PRESS_DEPTH * mouth.closing)
     return Motion(weights, motion.rate_hz, channels)
@@ -266,9 +259,7 @@ def _weigh_rows(displacements: Array, gap: Array) -> Array:
     return np.concatenate([(displacements * weights).reshape(len(gap), -1), GAP_WEIGHT * gap[:, None]], axis=1)
 
 
-def _solve_free_weights(
-    targets: Array, matrix: Array, mouth: SpokenMouth, shapes: FaceShapes, costs: CurveCosts
-) -> Array:
+def _solve_free_weights(targets: Array, matrix: Array, mouth: SpokenMouth, shapes: FaceShapes) -> Array:
     """Return the weights of ARKit's or a mesh's own shapes [shape=(T, S)]; some follow the phones, not the points."""
     fixed = np.zeros((len(mouth.gap), len(shapes.names)))
     for name, curve in {
@@ -284,9 +275,9 @@ def _solve_free_weights(
     if jaw is not None and close is not None:
         matrix[close] += matrix[jaw]  # as one: the jaw opens behind closed lips
     ties, weights = PAIR_WEIGHT * shapes.pairs(), fixed.copy()
-    weights[:, free] += fit_bounded_curves(matrix[free], targets - fixed @ matrix, costs, ties[:, free])
+    weights[:, free] += fit_bounded_curves(matrix[free], targets - fixed @ matrix, USUAL_COSTS, ties[:, free])
     weights = round_lips(np.clip(weights, 0.0, 1.0), shapes, mouth.protrusion)
-    weights = separate_opposed(weights, matrix, shapes.known, costs, (fixed, np.where(free, 1.0, fixed)), ties)
+    weights = separate_opposed(weights, matrix, shapes.known, USUAL_COSTS, (fixed, np.where(free, 1.0, fixed)), ties)
     if jaw is not None and close is not None:
         weights[:, jaw] += weights[:, close]
     return np.clip(weights, 0.0, 1.0)

@@ -5,9 +5,8 @@ The table beside a character is the same: its controls are the blendshapes, one 
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -15,11 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.meshes.model.shape_names import ARKIT_52, CLOSED, VISEMES_15, VRM_EMOTIONS, VRM_VOWELS
-from lipmotion.storage.files import atomic_file
-from lipmotion.storage.sources import is_file
-from lipmotion.storage.text_table import as_field, from_field, read_whole_table
+from lipmotion.storage.text_table import from_field, read_whole_table
 from lipmotion.types import Channel, Motion
 from lipmotion.types.values import parse_number
 
@@ -27,9 +22,6 @@ COLUMNS = ("control", "source", "gain", "offset", "low", "high")
 CONTROL = "control"  # the unit of controls of a user's rig
 LARGEST_TABLE_BYTES, MAX_CONTROLS = 1 << 20, 2000
 LARGEST_NUMBER = 1e6
-SOURCES = (*ARKIT_52, *(f"viseme_{name}" for name in VISEMES_15), *VRM_VOWELS, CLOSED, *VRM_EMOTIONS)
-"""The curves that blendshapes of a character may follow; besides, each what its own shape fits best: its own name."""
-CLOSED_VISEME = "viseme_PP"
 
 
 @dataclass(frozen=True)
@@ -73,17 +65,6 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
     return tuple(rows)
 
 
-def write_rig_table(path: Path, rows: Iterable[RigRow]) -> None:
-    """Write a table, which ``read_rig_table`` reads. Raises ExportError: it cannot be written."""
-    with atomic_file(path) as unfinished, unfinished.open("w", encoding="utf-8-sig", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(COLUMNS)
-        for row in rows:
-            limits = [f"{limit:g}" if np.isfinite(limit) else "" for limit in (row.low, row.high)]
-            names = (as_field(row.control), as_field(row.source))
-            table.writerow([*names, f"{row.gain:.4g}", f"{row.offset:.4g}", *limits])
-
-
 def suggest_names(name: str, names: Iterable[str]) -> str:
     """Return what a message says where there is no such name: the nearest ones, or else the first ones."""
     known = list(dict.fromkeys(names))
@@ -118,30 +99,3 @@ def find_table(character: Path) -> Path:
     """Return where the table of a character is: ``head.glb`` has ``head.glb.character.csv`` in the same folder."""
     named = character.resolve() if character.name in {"", ".."} else character
     return named.parent / f"{named.name}.character.csv"
-
-
-def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
-    """Return the rows of the table beside a character, by blendshape; none without it. Raises InputError: damaged."""
-    path = find_table(character)
-    if not is_file(path):
-        return {}
-    table: dict[str, RigRow] = {}
-    for row in read_rig_table(path):
-        control, source = shorten(row.control), shorten(row.source)
-        if row.control not in mesh.shape_names:
-            near = suggest_names(row.control, mesh.shape_names)
-            raise InputError(f"{path}: there is no blendshape {control!r}; {near}")
-        if row.source not in {"", row.control, *SOURCES}:
-            near = suggest_names(row.source, SOURCES)
-            raise InputError(f"{path}: {control!r} follows {source!r}, which is no curve; {near}")
-        if row.control in table:
-            raise InputError(f"{path}: the blendshape {control!r} occurs twice; leave one row")
-        table[row.control] = replace(row, low=max(row.low, 0.0), high=min(row.high, 1.0))
-    return table
-
-
-def with_sources(mesh: Mesh, table: Mapping[str, RigRow]) -> Mesh:
-    """Return a mesh whose blendshapes follow the curves of a table; those without a row, what their names say."""
-    sources = {name: CLOSED_VISEME if row.source == CLOSED else row.source for name, row in table.items()}
-    shapes = (replace(each, source=sources[each.name]) if each.name in sources else each for each in mesh.shapes)
-    return replace(mesh, shapes=tuple(shapes))
