@@ -111,10 +111,8 @@ class Registry(Generic[ExtensionT]):
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # also sys.exit(), which would end the program without a word
-            raise InputError(
-                f"the {self.kind} {name!r} cannot be imported from the {_locate(entry)}: {_describe(error)}; install a "
-                "version of the package that works with this lipmotion, or remove it"
-            ) from error
+            what = f"the {self.kind} {name!r} cannot be imported from the {_locate(entry)}: {_describe(error)}"
+            raise InputError(f"{what}; install a version that works with this lipmotion, or remove it") from error
         return added
 
     @cached_property
@@ -172,10 +170,8 @@ def _entries(group: str) -> Iterator[metadata.EntryPoint]:
             try:
                 list(distribution.entry_points)
             except Exception as reason:
-                raise InputError(
-                    f"entry_points.txt of the package {distribution.metadata['Name']!r} cannot be read: "
-                    f"{_describe(reason)}; install the package again, or remove it"
-                ) from error
+                what = f"entry_points.txt of the package {distribution.metadata['Name']!r} cannot be read"
+                raise InputError(f"{what}: {_describe(reason)}; install it again, or remove it") from error
         raise
 
 

@@ -91,15 +91,12 @@ def mono_samples(samples: Any) -> NDArray[np.float32]:
         or 0 in values.shape[1:]
         or not (values.dtype.kind == "f" or (values.dtype.kind == "i" and values.itemsize == 2))
     ):
-        raise InputError(
-            f"samples of shape {values.shape} and type {values.dtype}, required (N,) or (N, C), floats or int16"
-        )
+        found = f"samples of shape {values.shape} and type {values.dtype}"
+        raise InputError(f"{found}, required (N,) or (N, C), floats or int16")
     with np.errstate(over="ignore"):
         floats = values.astype(np.float32) / np.float32(32768 if values.dtype.kind == "i" else 1)
     if not (np.abs(floats) <= LARGEST_SAMPLE).all():
-        raise InputError(
-            f"samples that are not finite, or beyond {LARGEST_SAMPLE:g}, required full scale 1; put 0 there"
-        )
+        raise InputError(f"samples not finite, or beyond {LARGEST_SAMPLE:g}, required full scale 1; put 0 there")
     return floats.mean(axis=1, dtype=np.float32) if floats.ndim == 2 else floats
 
 

@@ -87,9 +87,8 @@ class Stream:
         seed: int | None = 0,
     ) -> None:
         if not LOWEST_RATE_HZ <= sample_rate <= HIGHEST_RATE_HZ or sample_rate != int(sample_rate):
-            raise InputError(
-                f"a stream of {sample_rate} Hz, required a whole number from {LOWEST_RATE_HZ} to {HIGHEST_RATE_HZ}"
-            )
+            allowed = f"a whole number from {LOWEST_RATE_HZ} to {HIGHEST_RATE_HZ}"
+            raise InputError(f"a stream of {sample_rate} Hz, required {allowed}")
         if look_ahead_ms is not None and not 0 <= look_ahead_ms <= LONGEST_LOOK_AHEAD_MS:
             raise InputError(f"a look-ahead of {look_ahead_ms} ms, required 0 to {LONGEST_LOOK_AHEAD_MS:g}, or None")
         if pauses not in get_args(Pauses):

@@ -108,15 +108,9 @@ def find_speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | Non
     if not speaker:
         return None
     if maps is None:
-        raise InputError(
-            f"the model tells no speakers apart, so that there is no {speaker!r}; leave the speaker out, or train on "
-            "several people"
-        )
+        raise InputError(f"the model tells no speakers apart: there is no {speaker!r}; leave the speaker out")
     if speaker not in maps:
-        raise InputError(
-            f"the model knows no speaker {speaker!r}, only: {', '.join(maps)}; give one of these, or none for the "
-            "mean person"
-        )
+        raise InputError(f"the model knows no speaker {speaker!r}, required one of: {', '.join(maps)}, or none")
     return maps[speaker]
 
 
@@ -128,10 +122,8 @@ def find_person(model: Model, request: Request) -> SpeakerMap | None:
     person = find_speaker_map(model.speakers, request.speaker)
     if request.onto is None:
         if request.onto_speaker:
-            raise InputError(
-                f"onto the speaker {request.onto_speaker!r}, but of what? give a corpus or a model (--onto), or leave "
-                "the name out"
-            )
+            name = request.onto_speaker
+            raise InputError(f"onto the speaker {name!r}, but of what? give a corpus or a model (--onto), or no name")
         return person
     from lipmotion.motion.speaker_maps import compose_maps
 

@@ -222,10 +222,8 @@ class Session:
         self.speaker  # noqa: B018 # what is refused is refused before the long work
         request = self.request
         if self._lasts_s is not None and abs(self._audio.duration_s - self._lasts_s) > LATE_S:
-            raise InputError(
-                f"the recording lasts {self._audio.duration_s:.2f} s, the edited one {self._lasts_s:.2f} s: the "
-                "edits are of another recording; make some of this one: lipmotion edit FILE --of RECORDING"
-            )
+            lasts = f"the recording lasts {self._audio.duration_s:.2f} s, the edited one {self._lasts_s:.2f} s"
+            raise InputError(f"{lasts}: the edits are of another one; begin anew: lipmotion edit FILE --of RECORDING")
         if self._lasts_s is not None or self._known_audio is not None:
             request = replace(request, recording=self._audio)
         return analyse_speech(self.model, request, self._work, self._monitor)
@@ -282,9 +280,8 @@ class Session:
         try:
             spans = self._cache.cached("aligned", (text, tuple(pronunciations.items()), start_s, end_s), align)
         except AlignmentError as error:
-            raise InputError(
-                f"{str(step)!r}: does not fit into {where} ({error}); make room with 'phone N ends TIME' first"
-            ) from error
+            room = "make room with 'phone N ends TIME' first"
+            raise InputError(f"{str(step)!r}: does not fit into {where} ({error}); {room}") from error
         return with_span(units, spans)
 
     def _edited_speech(self, steps: tuple[Step, ...]) -> SpeechAnalysis:

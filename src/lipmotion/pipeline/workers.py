@@ -302,9 +302,8 @@ def cluster_pool(address: str, out: str | Path = ".") -> Iterator[Pool]:
     try:
         from distributed import Client, KilledWorker, as_completed
     except ImportError as error:
-        raise MissingDependencyError(
-            f"a cluster needs the package distributed: {install_command('cluster')}, here and on all workers"
-        ) from error
+        advice = f"{install_command('cluster')}, here and on all workers"
+        raise MissingDependencyError(f"a cluster needs the package distributed: {advice}") from error
     with ExitStack() as stack:
         try:
             client = stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
@@ -338,9 +337,7 @@ def cluster_pool(address: str, out: str | Path = ".") -> Iterator[Pool]:
 def _check_worker(worker: str, answer: Any, out: str | Path) -> None:
     """Raise InputError where a worker cannot do the work; warn where its processor is another kind."""
     if isinstance(answer, BaseException):
-        raise InputError(
-            f"{worker}: this worker cannot run lipmotion ({answer}); install the same version there"
-        ) from answer
+        raise InputError(f"{worker}: cannot run lipmotion ({answer}); install the same version there") from answer
     version, sees_folder, processor = answer
     if version != find_version():
         raise InputError(f"{worker}: has lipmotion {version}, required {find_version()}; install it there")

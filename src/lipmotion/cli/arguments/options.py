@@ -152,7 +152,4 @@ def _check_named(recordings: Sequence[Path]) -> None:
     """Raise InputError where a recording has no name for a file in a folder."""
     for recording in recordings:
         if is_pipe(recording):
-            raise InputError(
-                f"{recording}: what comes through a pipe has no name for a file in a folder; give it alone, with "
-                "the name of a file: -o FILE.json"
-            )
+            raise InputError(f"{recording}: what comes through a pipe has no name; give it alone: -o FILE.json")

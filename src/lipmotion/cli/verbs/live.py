@@ -108,10 +108,8 @@ def _listen(device: str, rate_hz: int) -> Iterator[Any]:
     try:
         import sounddevice
     except (ImportError, OSError) as error:
-        raise MissingDependencyError(
-            f"{device + ' is no file, and ' if device else ''}a microphone needs sounddevice, and PortAudio ({error}); "
-            "pip install sounddevice, or give a FILE or -"
-        ) from error
+        why = f"{device + ' is no file, and ' if device else ''}a microphone needs sounddevice, and PortAudio ({error})"
+        raise MissingDependencyError(f"{why}; pip install sounddevice, or give a FILE or -") from error
     chosen: str | int | None = int(device) if device.isdecimal() else device or None
     opened = False
     while True:

@@ -112,11 +112,8 @@ def warn_of_another_language(recognition: Recognition) -> None:
     """Log a warning where English words were recognised in what is hardly English."""
     confidence = weigh_words(recognition)
     if recognition.word_s >= MIN_TOLD_S and confidence < MIN_CONFIDENCE:
-        LOG.warning(
-            "the words are hardly understood (confidence %.2f, required %.1f): the speech may not be English, then "
-            "give its language (--language es, fr, de, ...); or it is noisy, then give its words (--transcript)",
-            *(confidence, MIN_CONFIDENCE),
-        )
+        unsure = f"the words are hardly understood (confidence {confidence:.2f}, required {MIN_CONFIDENCE:.1f})"
+        LOG.warning("%s: give their --language, if it is not English, or the words (--transcript)", unsure)
 
 
 TEXT, JSON = ".txt", ".json"

@@ -85,10 +85,7 @@ def transcribe(
         words = leave_out_late_lines(words, audio.duration_s)
     spoken = words.words if isinstance(words, TimedTranscript) else words or ()
     if is_other_language(spoken, lexicon):
-        LOG.warning(
-            "the transcript seems not to be English: its words are read by English rules, and the lips will be wrong; "
-            "give its language (--language)"
-        )
+        LOG.warning("the transcript is read by English rules, but seems not to be English; give its --language")
     else:
         warn_of_guesses(spoken, lexicon)
     is_heard = not isinstance(lexicon, LanguageLexicon) and uses_network(phones.kind)
@@ -302,10 +299,7 @@ def warn_of_misfit(fit: TranscriptFit, corrected: bool = False) -> None:
         )
     if fit.missing:
         done = "what is said there is recognised" if corrected else "the lips are wrong there"
-        LOG.warning(
-            "the transcript seems to leave out words %s: %s; add the words, or leave the whole transcript out",
-            *(places, done),
-        )
+        LOG.warning("the transcript seems to leave out words %s: %s; add them, or give no transcript", places, done)
 
 
 def warn_of_label_misfit(fit: TranscriptFit, filled: bool) -> None:

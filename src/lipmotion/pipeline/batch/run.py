@@ -402,10 +402,7 @@ def _find_finished(
         if approved is not None and not are_same_inputs(line, approved):
             outdated.append(line.name)
     if outdated:
-        LOG.warning(
-            "%d approved lines have another recording or other words now, and are kept: %s; mark them redo",
-            *(len(outdated), _some(outdated)),
-        )
+        LOG.warning("%d approved lines have changed and are kept: %s; mark them redo", len(outdated), _some(outdated))
     return finished
 
 
@@ -426,10 +423,8 @@ def _finish_lines(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, 
             deaths += 1
             suspects = [work for work in left.values() if work.place.work(work.line.name).is_dir()]
             if not suspects and deaths >= MAX_DEATHS:
-                raise CorpusError(
-                    f"the worker processes die before they begin ({error}); is there enough memory? what is finished "
-                    "is kept: run it again, with fewer --jobs"
-                ) from error
+                died = f"the worker processes die before they begin ({error}), perhaps for want of memory"
+                raise CorpusError(f"{died}; what is finished is kept: run it again, with fewer --jobs") from error
             for work in suspects:
                 del left[work.line.name]
                 try:

@@ -62,22 +62,16 @@ def warn_of_doubtful_transcripts(
         return
     for names, problem in ((wrong, "seem not to be what is said"), (short, "seem to leave out words that are said")):
         if names:
-            LOG.warning(
-                "%d of %d transcripts %s (%s): the model learns wrong lips from them; correct them, or remove them and "
-                "train again",
-                *(len(names), count, problem, _listed(names)),
-            )
+            counted = len(names), count, problem, _listed(names)
+            LOG.warning("%d of %d transcripts %s (%s), which teaches wrong lips; correct or remove them", *counted)
 
 
 def warn_of_missing_transcripts(utterances: Sequence[Utterance]) -> None:
     """Log a warning that names the utterances with neither words nor labelled phones, if others have them."""
     missing = [utterance.name for utterance in utterances if utterance.phones is None and not utterance.words]
     if 0 < len(missing) < len(utterances):
-        LOG.warning(
-            "%d of %d recordings have no transcript, or an empty one (%s): their phones are recognised, which is less "
-            "sure; write the words into a .txt beside each (docs/corpora.md)",
-            *(len(missing), len(utterances), _listed(missing)),
-        )
+        counted = len(missing), len(utterances), _listed(missing)
+        LOG.warning("%d of %d recordings have no transcript (%s): phones are recognised; add .txt files", *counted)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -237,10 +237,8 @@ def list_motionless(
     """
     for number, spoken in enumerate(voices, start=1):
         if not engine.inputs().speech_alone:
-            raise InputError(
-                f"the engine {engine.name!r} does not learn from other voices without motion; use one that does "
-                "(--engine coupled), or leave the voices out"
-            )
+            refused = f"the engine {engine.name!r} does not learn from voices without motion"
+            raise InputError(f"{refused}; use one that does (--engine coupled), or leave the voices out")
         monitor(Progress("aligning other voices", number, number, 0.0))
         features = analysed(spoken.audio).mfcc()
         frames = len(features.values)
