@@ -434,8 +434,8 @@ def _open_remote(url: str) -> tuple[Path, Callable[[str], None]]:
                 for name in system.ls(source, detail=False):
                     (unfinished / Path(name).name).write_bytes(system.cat_file(name))
         except Exception as error:
-            file = f"{url.rstrip('/')}/{part}"
-            raise CorpusError(f"{file}: cannot be read ({error!r}); is it a prepared corpus?") from error
+            address = f"{url.rstrip('/')}/{part}"
+            raise CorpusError(f"{address}: cannot be read ({error!r}); is it a prepared corpus?") from error
 
     return folder, fetch
 

@@ -114,10 +114,8 @@ class PhoneIs(PhoneStep):
     phone: str
 
     def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
-        place = self._index(units, self.number)
-        spans = list(units)
-        spans[place] = replace(spans[place], label=_read_unit(self.phone, spans[place].label.word))
-        return Timeline(tuple(spans))
+        phone = units[self._index(units, self.number)]
+        return with_span(units, [replace(phone, label=_read_unit(self.phone, phone.label.word))])
 
 
 @dataclass(frozen=True)
@@ -192,12 +190,10 @@ class PhoneSplit(PhoneStep):
     time_s: float
 
     def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
-        place = self._index(units, self.number)
-        phone = units[place]
+        phone = units[self._index(units, self.number)]
         self._check_border(self.time_s, phone.start_s, phone.end_s)
         label = replace(phone.label, confidence=None)
-        parts = (Span(phone.start_s, self.time_s, label), Span(self.time_s, phone.end_s, label))
-        return Timeline((*units.spans[:place], *parts, *units.spans[place + 1 :]))
+        return with_span(units, [Span(phone.start_s, self.time_s, label), Span(self.time_s, phone.end_s, label)])
 
 
 def with_span(units: Timeline[Unit], spans: Sequence[Span[Unit]]) -> Timeline[Unit]:

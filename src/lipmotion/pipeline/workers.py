@@ -20,7 +20,7 @@ from itertools import chain, islice
 from multiprocessing import connection as pipes
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeVar
 
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError
 from lipmotion.extensions import find_version, install_command
@@ -282,16 +282,9 @@ CONNECT_S = 20
 ITEMS_AHEAD = 4  # items a worker of a cluster that are sent ahead, so that none waits, and memory is flat
 
 
-Pool: TypeAlias = ParallelMap
-"""A map in other processes whose results come as they are ready.
-
-Raises WorkerDiedError: a worker ended; which items are done is not known.
-"""
-
-
 @contextmanager
-def cluster_pool(address: str, out: str | Path = ".") -> Iterator[Pool]:
-    """Give the workers of a Dask cluster as a pool.
+def cluster_pool(address: str, out: str | Path = ".") -> Iterator[ParallelMap]:
+    """Give a map in the workers of a Dask cluster whose results come as they are ready.
 
     address : of its scheduler, as ``tcp://HOST:8786``
     out     : the folder of the outputs, which every worker must see under the same path

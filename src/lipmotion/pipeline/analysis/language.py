@@ -20,7 +20,7 @@ from lipmotion.speech.recognition.recogniser import open_recogniser
 from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.storage.files import atomic_file, check_distinct, check_target
 from lipmotion.storage.json_text import as_json
-from lipmotion.types import Audio, Span, TimedTranscript, TimedWord, Timeline, TranscriptLine
+from lipmotion.types import Audio, TimedTranscript, TimedWord, Timeline, TranscriptLine
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
 from lipmotion.units.ipa_phones import read_tokens
 from lipmotion.units.lexicon import detect_language, is_english
@@ -162,12 +162,9 @@ def format_words(words: Timeline[RecognisedWord]) -> str:
 
 def describe_words(words: Timeline[RecognisedWord]) -> list[dict[str, Any]]:
     """Return words for JSON: ``word``, ``start`` and ``end`` in seconds, and the confidence ``conf``, as Vosk's."""
-
-    def describe(span: Span[RecognisedWord]) -> dict[str, Any]:
-        times = {"start": round(span.start_s, 3), "end": round(span.end_s, 3)}
-        return {"word": span.label.text, **times, "conf": round(span.label.confidence, 3)}
-
-    return [describe(span) for span in words]
+    times = [{"start": round(span.start_s, 3), "end": round(span.end_s, 3)} for span in words]
+    labels = [span.label for span in words]
+    return [{"word": w.text, **t, "conf": round(w.confidence, 3)} for w, t in zip(labels, times, strict=True)]
 
 
 def write_words(words: Timeline[RecognisedWord], paths: Sequence[Path]) -> None:

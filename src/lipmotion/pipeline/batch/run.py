@@ -52,11 +52,11 @@ from lipmotion.pipeline.job import Job, check_outputs, open_face, run, write_out
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.output import ShownFace
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.workers import ItemT, Pool, ResultT, WorkerDiedError, cluster_pool, open_workers, process_count
+from lipmotion.pipeline.workers import ItemT, ResultT, WorkerDiedError, cluster_pool, open_workers, process_count
 from lipmotion.storage.files import check_target, confine, make_folder, put_in_place, remove
 from lipmotion.storage.locks import open_temporary
 from lipmotion.storage.sources import Source, check_apart, hash_file
-from lipmotion.types import SPEECH_RATE_HZ, Audio, Generation, Span, Timeline, Unit
+from lipmotion.types import SPEECH_RATE_HZ, Audio, Generation, ParallelMap, Span, Timeline, Unit
 from lipmotion.types.progress import Item, Monitor, Progress, silent_monitor
 from lipmotion.units import Lexicon
 from lipmotion.units.phone_timelines import group_words
@@ -260,8 +260,8 @@ def check_line_job(job: Job, of_run: str) -> None:
 
 
 @contextmanager
-def open_local_pool(jobs: int) -> Iterator[Pool]:
-    """Give a pool of processes on this machine; with one job, this process itself."""
+def open_local_pool(jobs: int) -> Iterator[ParallelMap]:
+    """Give a map in processes here (one job: in this one) whose results come as they are ready."""
 
     def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
         with open_workers(jobs) as workers:
@@ -410,7 +410,7 @@ def _some(names: Sequence[str]) -> str:
     return ", ".join(map(shorten, names[:MAX_NAMED_LINES])) + ", ..." * (len(names) > MAX_NAMED_LINES)
 
 
-def _finish_lines(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, None, None]:
+def _finish_lines(each: ParallelMap, waiting: Sequence[LineWork]) -> Generator[Record, None, None]:
     """Yield the record of every line. Where a worker dies, the lines go on that it had; one that kills again fails."""
     left, deaths = {work.line.name: work for work in waiting}, 0
     while left:
