@@ -18,10 +18,9 @@ HEAVY = ("numpy", "scipy", "av", "PIL", "pocketsphinx", "tqdm", "cv2", "mediapip
 
 def typed_names() -> dict[str, str]:
     """Return what type checkers see: every imported name with its module."""
-    (block,) = [node for node in ast.parse(Path(lipmotion.__file__).read_text()).body if isinstance(node, ast.If)]
     return {
         alias.name: node.module or ""
-        for node in block.body
+        for node in ast.parse(Path(lipmotion.__file__).with_suffix(".pyi").read_text()).body
         if isinstance(node, ast.ImportFrom) and node.module != "typing"
         for alias in node.names
     }

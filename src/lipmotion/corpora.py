@@ -296,7 +296,7 @@ class Corpus:
             counts = ", ".join(f"{each}: {len(self.names(each, speakers))}" for each in SPLITS)
             who = f" by {', '.join(speakers)}" if speakers else ""
             found = f"no utterances of split {split!r}{who} (there are {counts})"
-            raise CorpusError(f"{self.path}: {found}; choose another, or prepare with lists (docs/corpora.md)")
+            raise CorpusError(f"{self.path}: {found}; choose another, or list some in test.txt (docs/corpora.md)")
         return names
 
     def selected(self, selection: Selection) -> tuple[str, ...]:

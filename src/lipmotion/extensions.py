@@ -171,7 +171,7 @@ def _entries(group: str) -> Iterator[metadata.EntryPoint]:
                 list(distribution.entry_points)
             except Exception as reason:
                 what = f"entry_points.txt of the package {distribution.metadata['Name']!r} cannot be read"
-                raise InputError(f"{what}: {_describe(reason)}; install it again, or remove it") from error
+                raise InputError(f"{what}: {_describe(reason)}; install the package again, or remove it") from error
         raise
 
 

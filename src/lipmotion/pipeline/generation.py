@@ -108,7 +108,7 @@ def find_speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | Non
     if not speaker:
         return None
     if maps is None:
-        raise InputError(f"the model tells no speakers apart: there is no {speaker!r}; leave the speaker out")
+        raise InputError(f"the model tells no speakers apart, so that there is no {speaker!r}; leave the speaker out")
     if speaker not in maps:
         raise InputError(f"the model knows no speaker {speaker!r}, required one of: {', '.join(maps)}, or none")
     return maps[speaker]
@@ -337,11 +337,8 @@ def _join_rows(
     rest: NDArray[np.floating[Any]],
     like: NDArray[np.floating[Any]],
 ) -> NDArray[Any]:
-    """Return the rows of all passages in their places; the mouth goes to rest and comes from it beside them.
+    """Return the rows of all passages in their places; the mouth goes to ``rest`` and comes from it beside them.
 
-    rows : of each passage [shape=(T', P)]
-    rest : those of silence [shape=(REST_FRAMES, P)]
-    like : as long as the result, of its type [shape=(T, 0)]
     Without passages all rows are one in memory, which may not be changed: silence may last for hours.
     """
     still = rest.mean(axis=0)

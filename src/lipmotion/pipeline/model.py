@@ -125,7 +125,7 @@ def load_model(path: str | Path | Model | None = None) -> Model:
 def read_header(path: Path) -> dict[str, Any]:
     """Return the header of a model file. Raises as ``load_model``."""
     if not path.is_file():
-        raise InputError(f"{path}: no such model; train one (lipmotion train), or use the shipped one (lipmotion info)")
+        raise InputError(f"{path}: no such model; train one (lipmotion train), or use the one of: lipmotion info")
     return read_header_of(path, FORMAT, VERSION, "lipmotion model", "give a file that `lipmotion train` wrote")
 
 
@@ -142,8 +142,8 @@ def _read_shipped() -> Model:
 def _read(path: Path) -> Model:
     header = read_header(path)
     if header.get("engine") not in ENGINES.names:
-        known = ", ".join(ENGINES.names)
-        raise ModelFormatError(f"{path}: no engine {header.get('engine')!r}; there are: {known}; install its package")
+        name, known = header.get("engine"), ", ".join(ENGINES.names)
+        raise ModelFormatError(f"{path}: no engine {name!r}; there are: {known}; install the package that adds it")
     try:
         stored = read_archive(path)
         arrays = {folder: select_arrays(stored, f"{folder}/") for folder in _FOLDERS}

@@ -99,10 +99,7 @@ def _in_time(pieces: Iterator[Any]) -> Iterator[Any]:
 
 
 def _listen(device: str, rate_hz: int) -> Iterator[Any]:
-    """Yield the sound of a microphone; where it is unplugged, wait until it is back.
-
-    Raises MissingDependencyError: sounddevice is not installed. InputError: there is no such microphone.
-    """
+    """Yield the sound of a microphone; where it is unplugged, wait until it is back."""
     if is_recording(Path(device)):
         raise InputError(f"{device}: no such file; give a recording, the name of a microphone, or -")
     try:

@@ -63,11 +63,7 @@ def resolve_language(request: Request) -> Request:
 
 
 def _detect_language(request: Request, transcript: TimedTranscript | None) -> str:
-    """Return the language of a request that names none; a warning says which.
-
-    Without a transcript: ``AUTO``, where it is not English; English also where it is not known, as without the option.
-    Raises InputError: that of a transcript is not known.
-    """
+    """Return the language of a request that names none, which a warning tells; ``AUTO``: it is not English."""
     if transcript is not None and request.units is None:
         language = detect_language(transcript.words)
         if not language:

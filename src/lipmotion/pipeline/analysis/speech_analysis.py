@@ -486,7 +486,7 @@ def _cut_phones(units: Timeline[Unit], start_s: float, end_s: float) -> list[Spa
 def _check_units(units: Timeline[Unit], duration_s: float) -> None:
     """Raise InputError if given units are empty or too many; log a warning if they end after the recording."""
     if not len(units):
-        raise InputError("the units are an empty list, as of a .csv; give those of a .json, .npz or label file")
+        raise InputError("the units are an empty list, as of a .csv; give those of another file, or leave them out")
     check_phones(len(units), duration_s)
     first_s, last_s, end_s = units[0].start_s, units[-1].start_s, units[-1].end_s
     if duration_s <= first_s <= LATEST_S:

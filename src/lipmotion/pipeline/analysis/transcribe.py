@@ -199,8 +199,7 @@ def _select_recognised(
 ) -> list[list[Span[Unit]]]:
     """Return the recognised phones where something else is said than the transcript has, by words.
 
-    Whole words count by their middle, half of the way to the words beside them. Phones without words do from the last
-    one on that may be the end of the word before, to the first one that may be the beginning of the word after.
+    Words count by their middle; single phones between what may be the end of one word and the beginning of another.
     """
     if other.start_s == other.end_s:
         return []

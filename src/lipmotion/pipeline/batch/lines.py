@@ -114,7 +114,7 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
                 raise ExportError(f"{file}: would be written for {taken[key]} and for {line.recording}; {RENAME}")
             taken[key] = line.recording
     for key in folders.keys() & taken.keys():
-        raise ExportError(f"{key}: a file for {taken[key]}, and a folder for {folders[key]}; {RENAME}")
+        raise ExportError(f"{key}: a file for {taken[key]} would be the folder of {folders[key]}; {RENAME}")
 
 
 def file_key(name: str) -> str:

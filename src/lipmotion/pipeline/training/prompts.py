@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -11,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from lipmotion.corpora import Corpus, read_entry
 from lipmotion.errors import InputError
@@ -62,7 +62,7 @@ def prompts(
     have    : a corpus whose units count as covered; its utterances without words or phones are ignored
     lexicon : pronunciations of words, ahead of those of the dictionary
     Raises InputError: no such file, no sentence that can be used, or a count under 1.
-    Source: greedy weighted set cover (Chvátal 1979), gains recomputed only where they may matter (Minoux 1978).
+    Source: greedy weighted set cover (Chvátal 1979).
     """
     if count < 1:
         raise InputError(f"{count} prompts asked for, required at least 1")
@@ -102,23 +102,17 @@ def cover_greedily(
 
     sets    : elements of each set, as indices into ``weights``
     weights : of each element [shape=(E,)]; set to 0 for the elements that are covered
-    The gain of a set never increases, so a set that is still first after its gain was recomputed is the best of all.
     """
-    queue = [
-        (-float(weights[elements].sum()) / cost, i) for i, (elements, cost) in enumerate(zip(sets, costs, strict=True))
-    ]
-    heapq.heapify(queue)
+    ends = np.cumsum([0, *map(len, sets)])
+    holds = csr_array((np.ones(ends[-1]), np.concatenate(sets), ends), (len(sets), len(weights)))
     taken: list[int] = []
-    while queue and len(taken) < count:
-        _, i = heapq.heappop(queue)
-        recomputed = (-float(weights[sets[i]].sum()) / costs[i], i)
-        if queue and recomputed > queue[0]:
-            heapq.heappush(queue, recomputed)
-        elif recomputed[0] == 0:
+    while len(taken) < count:
+        gains = holds @ weights / np.array(costs)
+        best = int(gains.argmax())
+        if not gains[best]:
             break
-        else:
-            taken.append(i)
-            weights[sets[i]] = 0
+        taken.append(best)
+        weights[sets[best]] = 0
     return taken
 
 

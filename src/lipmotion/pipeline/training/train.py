@@ -237,7 +237,7 @@ def list_motionless(
     """
     for number, spoken in enumerate(voices, start=1):
         if not engine.inputs().speech_alone:
-            refused = f"the engine {engine.name!r} does not learn from voices without motion"
+            refused = f"the engine {engine.name!r} does not learn from other voices without motion"
             raise InputError(f"{refused}; use one that does (--engine coupled), or leave the voices out")
         monitor(Progress("aligning other voices", number, number, 0.0))
         features = analysed(spoken.audio).mfcc()
@@ -259,8 +259,7 @@ def _train_phone_models(
 ) -> UnitHmm:
     """Return phone models of all transcribed or labelled utterances, or those of the shipped model.
 
-    The frequencies of many recordings are warped as by vocal tracts of other lengths (``WARP_CYCLE``), so that the
-    models also fit other speakers. Raises CorpusError: no transcript fits into its recording.
+    The frequencies of many recordings are warped as by vocal tracts of other lengths, to fit other speakers, too.
     Source: Jaitly & Hinton 2013 (vocal tract length perturbation), without random draws or more data.
     """
     transcribed: list[tuple[Audio, tuple[str, ...]]] = []
