@@ -107,13 +107,12 @@ class Registry(Generic[ExtensionT]):
         entry = self._installed[name]
         try:
             with redirect_stdout(sys.stderr):
-                added: ExtensionT = entry.load()
+                return entry.load()
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # also sys.exit(), which would end the program without a word
             what = f"the {self.kind} {name!r} cannot be imported from the {_locate(entry)}: {_describe(error)}"
             raise InputError(f"{what}; install a version that works with this lipmotion, or remove it") from error
-        return added
 
     @cached_property
     def _own(self) -> Mapping[str, metadata.EntryPoint]:

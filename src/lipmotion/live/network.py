@@ -101,7 +101,6 @@ def mono_samples(samples: Any) -> NDArray[np.float32]:
 
 
 Array = NDArray[np.float32]
-WEIGHTS = "live.npz"
 STEP_FRAMES = 2  # frames of 10 ms in a step
 STEP_S = STEP_FRAMES / FRAME_RATE_HZ
 LAGS = (-1, 2, 6, 14, 30)
@@ -254,7 +253,7 @@ class LiveNetwork(NamedTuple):
 @cache
 def live_network() -> LiveNetwork:
     """Return the network of the package."""
-    path = resources.files("lipmotion") / "models" / WEIGHTS
+    path = resources.files("lipmotion") / "models" / "live.npz"
     with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
         arrays = dict(stored)
     network = SHAPE.from_arrays({name: arrays[name] for name in SHAPE.specs}, len(LAGS) * OUTPUTS)

@@ -317,10 +317,9 @@ class _Smoother:
         self.rest = self.silent[-1, : len(ARTICULATORS)].astype(float)
 
     def solve(self, answers: deque[NDArray[np.float32]], before: list[Array]) -> tuple[Array, Array]:
-        """Return articulators [shape=(8,)] of the frame that is known now, and visemes from it on [shape=(N, 15)].
+        """Return articulators [shape=(8,)] of the frame known now, and visemes from it on [shape=(N, 15)].
 
-        answers : of the last steps [each shape=(5, 23)]
-        before  : articulators of the frame before, and of the one before that
+        From the answers of the last steps [each shape=(5, 23)], and the articulators of the two frames before.
         """
         rows = np.stack(
             [answers[place][choice] for place, choice in zip(self._steps.tolist(), self._choice.tolist(), strict=True)]

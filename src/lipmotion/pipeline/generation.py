@@ -428,6 +428,8 @@ def cut_speech(speech: Speech, frames: slice) -> Speech:
     features = Features(speech.features.values[frames], (frames.stop - 1 - frames.start) / FRAME_RATE_HZ)
     steps, halves = (slice(frames.start // each, -(-frames.stop // each)) for each in (STEP, 2))
     posteriors, prior, confidence, parts = speech.posteriors, speech.prior, speech.confidence, None
+    if prior is not None:
+        prior = PriorOutput(prior.articulators[steps], prior.hidden[steps], prior.distortion[steps])
     if speech.parts is not None:
         parts = tuple(
             _cut_part(part, frames)
@@ -441,9 +443,7 @@ def cut_speech(speech: Speech, frames: slice) -> Speech:
         units_known=speech.units_known,
         spectrum=None if speech.spectrum is None else speech.spectrum[frames],
         confidence=confidence[frames] if isinstance(confidence, np.ndarray) else confidence,
-        prior=None
-        if prior is None
-        else PriorOutput(prior.articulators[steps], prior.hidden[steps], prior.distortion[steps]),
+        prior=prior,
         voice=speech.voice,
         posteriors=None if posteriors is None else replace(posteriors, values=posteriors.values[halves]),
         encoding=None if speech.encoding is None else speech.encoding[frames],

@@ -71,13 +71,10 @@ def _detect_language(request: Request, transcript: TimedTranscript | None) -> st
         LOG.warning("the transcript is taken for %s; --language says otherwise", LANGUAGES[language].name)
         return language
     english = detect_english(read_recording(request))
-    LOG.warning(
-        {
-            True: "the speech is taken for English; --language says otherwise",
-            False: "the speech is not English, in which language it is is not known; give it with --language",
-            None: "the language of the speech is not known, English is assumed; give it with --language",
-        }[english]
-    )
+    found = "language of the speech is not known, English is assumed"
+    if english is not None:
+        found = f"speech is {'taken for' if english else 'not'} English"
+    LOG.warning("the %s; --language says which it is", found)
     return AUTO if english is False else ENGLISH
 
 

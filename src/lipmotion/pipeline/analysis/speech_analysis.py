@@ -403,8 +403,7 @@ def _follow_units(
 ) -> tuple[Timeline[Unit], TranscriptFit | None]:
     """Return the given phones of a request, completed, and how well they fit; None: they were not compared.
 
-    Given phones are followed, right or wrong. Spans of unknown phones have those of their word, aligned in them, or
-    else what is recognised; so have stretches that the phones leave open, where a phone recogniser hears speech.
+    Unknown phones are those of their word, aligned, or recognised; so are stretches left open in which speech is heard.
     """
     from lipmotion.pipeline.analysis.transcribe import compute_phone_posteriors, warn_of_label_misfit
     from lipmotion.speech.recognition.agreement import label_fit

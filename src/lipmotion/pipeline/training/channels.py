@@ -105,10 +105,8 @@ def with_common_channels(utterances: Sequence[Utterance]) -> list[Utterance]:
         found = "; ".join(map(names_of, kinds))
         raise CorpusError(f"{len(kinds)} kinds of motion without a common channel: {found}; train on one (--speaker)")
     left_out = sorted({channel.name for kind in kinds for channel in kind if channel not in common})
-    LOG.warning(
-        "%d kinds of motion: training on the %d channels that all have (%s); left out: %s",
-        *(len(kinds), len(common), names_of(common), printable(shorten(", ".join(left_out)))),
-    )
+    counted = len(kinds), len(common), names_of(common), printable(shorten(", ".join(left_out)))
+    LOG.warning("%d kinds of motion: training on the %d channels that all have (%s); left out: %s", *counted)
     reduced = list(utterances)
     for number, utterance in enumerate(utterances):
         motion = utterance.track.motion

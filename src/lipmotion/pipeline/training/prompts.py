@@ -17,7 +17,6 @@ from lipmotion.errors import InputError
 from lipmotion.formats.label_files import read_plain_text
 from lipmotion.units import SILENCE, VISEME_OF, Lexicon, is_silent, split_words
 
-SHIPPED = "english.txt"
 PHONE, DIPHONE, CONTEXT = "phone", "diphone", "beside"
 WEIGHTS = {PHONE: 8.0, DIPHONE: 2.0, CONTEXT: 1.0}
 """Weight of the first occurrence of each kind of unit: a phone; a phone after a phone; a phone beside a viseme class.
@@ -127,7 +126,7 @@ def pronounce_sentences(text: str | Path | None, lexicon: Lexicon) -> tuple[dict
     lexicon : pronunciations of words; the first one of each word is taken
     Raises InputError: no such file, or no sentence that can be used.
     """
-    path = Path(text) if text is not None else Path(str(resources.files("lipmotion") / "prompts" / SHIPPED))
+    path = Path(text) if text is not None else Path(str(resources.files("lipmotion") / "prompts" / "english.txt"))
     usable: dict[str, tuple[str, ...]] = {}
     left_out: dict[str, str] = {}
     lines = (" ".join(line.split()) for line in read_plain_text(path).splitlines())
