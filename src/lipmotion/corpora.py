@@ -266,13 +266,9 @@ class Corpus:
 
     def names(self, split: str | None = None, speakers: Sequence[str] = ()) -> tuple[str, ...]:
         """Return the sorted names of the utterances of one split or of all, and of some speakers or of all."""
-        return tuple(
-            sorted(
-                name
-                for name, entry in self._index.items()
-                if split in (None, entry["split"]) and (not speakers or entry["speaker"] in speakers)
-            )
-        )
+        entries = self._index.items()
+        chosen = {name: entry for name, entry in entries if split in (None, entry["split"])}
+        return tuple(sorted(name for name, entry in chosen.items() if not speakers or entry["speaker"] in speakers))
 
     def divided(self, lists: Mapping[str, Collection[str]]) -> Corpus:
         """Return the same corpus with some of its utterances alone, in other lists ``train``, ``val`` and ``test``.

@@ -68,9 +68,7 @@ def doctor() -> Iterator[InstalledPart]:
     yield InstalledPart("lipmotion", "works", f"{find_version()}, Python {system}")
     declared = list_requirements()
     if not declared:
-        yield InstalledPart(
-            "packages", "absent", "not known: lipmotion runs from its sources; to install it: pip install ."
-        )
+        yield InstalledPart("packages", "absent", "not known: lipmotion runs from its sources; pip install .")
     needed = sorted((each for each in declared if "extra ==" not in str(each.marker)), key=_applies)
     for each in {each.name: each for each in needed}.values():  # of several by one name, that for this Python
         installed = _find_installed(each.name)

@@ -86,11 +86,8 @@ def mono_samples(samples: Any) -> NDArray[np.float32]:
         values = np.asarray(samples)
     except ValueError as error:
         raise InputError(f"no samples ({error}), required an array of shape (N,) or (N, C)") from error
-    if (
-        values.ndim not in (1, 2)
-        or 0 in values.shape[1:]
-        or not (values.dtype.kind == "f" or (values.dtype.kind == "i" and values.itemsize == 2))
-    ):
+    is_number = values.dtype.kind == "f" or (values.dtype.kind == "i" and values.itemsize == 2)
+    if not is_number or values.ndim not in (1, 2) or 0 in values.shape[1:]:
         found = f"samples of shape {values.shape} and type {values.dtype}"
         raise InputError(f"{found}, required (N,) or (N, C), floats or int16")
     with np.errstate(over="ignore"):

@@ -321,9 +321,8 @@ class _Smoother:
 
         From the answers of the last steps [each shape=(5, 23)], and the articulators of the two frames before.
         """
-        rows = np.stack(
-            [answers[place][choice] for place, choice in zip(self._steps.tolist(), self._choice.tolist(), strict=True)]
-        ).astype(float)
+        places = zip(self._steps.tolist(), self._choice.tolist(), strict=True)
+        rows = np.stack([answers[place][choice] for place, choice in places]).astype(float)
         wanted = rows[:, : len(ARTICULATORS)] * self._gains * self._of_answers
         previous = np.stack([before[1], before[0]]) * self._of_before
         return wanted.sum(axis=0) + previous.sum(axis=0), rows[:, len(ARTICULATORS) :]

@@ -109,8 +109,8 @@ def check_sound(recording: Path, sha256: str) -> None:
     """Raise InputError unless a recording is the one of a digest, whose phones were found, or it cannot be read."""
     check_source(recording, "recording")
     if (digest := hash_file(recording)) != sha256:
-        digests = f"SHA-256 {digest[:12]}, required {sha256[:12]}"
-        raise InputError(f"{recording}: is not the recording that was edited ({digests}); put it back, or begin anew")
+        found = f"another recording than the edited one (SHA-256 {digest[:12]}, required {sha256[:12]})"
+        raise InputError(f"{recording}: is {found}; put that back, or begin anew under another name")
 
 
 def edit_file(edits: EditFile | Edits | str | Path | None) -> EditFile:

@@ -206,9 +206,8 @@ def with_person(model: Model, name: str, person: SpeakerMap) -> Model:
     known = model.speakers or {}
     if not name or name in known:
         raise InputError(f"a person named {name!r}, required another name than: {', '.join(('', *known))}")
-    channels = next((other.channels for other in known.values()), person.channels)
-    lips = next((other.lips for other in known.values()), person.lips)
-    speakers = {**known, name: replace(person.reorder(channels), lips=lips)}
+    first = next(iter(known.values()), person)
+    speakers = {**known, name: replace(person.reorder(first.channels), lips=first.lips)}
     return replace(model, speakers=speakers, about={**model.about, "speakers": list(speakers)})
 
 

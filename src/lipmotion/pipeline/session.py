@@ -223,7 +223,7 @@ class Session:
         request = self.request
         if self._lasts_s is not None and abs(self._audio.duration_s - self._lasts_s) > LATE_S:
             lasts = f"the recording lasts {self._audio.duration_s:.2f} s, the edited one {self._lasts_s:.2f} s"
-            raise InputError(f"{lasts}: the edits are of another one; begin anew: lipmotion edit FILE --of RECORDING")
+            raise InputError(f"{lasts}: edits of another recording; begin anew: lipmotion edit FILE --of RECORDING")
         if self._lasts_s is not None or self._known_audio is not None:
             request = replace(request, recording=self._audio)
         return analyse_speech(self.model, request, self._work, self._monitor)

@@ -402,7 +402,8 @@ def _find_finished(
         if approved is not None and not are_same_inputs(line, approved):
             outdated.append(line.name)
     if outdated:
-        LOG.warning("%d approved lines have changed and are kept: %s; mark them redo", len(outdated), _some(outdated))
+        changed = "another recording or other words now, and are kept"
+        LOG.warning("%d approved lines have %s: %s; mark them redo", len(outdated), changed, _some(outdated))
     return finished
 
 
