@@ -154,9 +154,8 @@ def describe_failed_extension(error: BaseException) -> str | None:
         package = entry.value.partition(":")[0].partition(".")[0].strip()
         if package in modules:
             _, file, line = next(frame for frame in reversed(frames) if frame[0] == package)
-            return (
-                f"the {_locate(entry)} failed: {_describe(error)} ({file}, line {line}); tell its authors, or remove it"
-            )
+            what = f"the {_locate(entry)} failed: {_describe(error)} ({file}, line {line})"
+            return f"{what}; tell its authors, or remove it"
     return None
 
 

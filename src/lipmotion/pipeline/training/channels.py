@@ -107,14 +107,9 @@ def with_common_channels(utterances: Sequence[Utterance]) -> list[Utterance]:
     left_out = sorted({channel.name for kind in kinds for channel in kind if channel not in common})
     counted = len(kinds), len(common), names_of(common), printable(shorten(", ".join(left_out)))
     LOG.warning("%d kinds of motion: training on the %d channels that all have (%s); left out: %s", *counted)
-    reduced = list(utterances)
-    for number, utterance in enumerate(utterances):
-        motion = utterance.track.motion
-        if motion.channels != common:
-            columns = [motion.channels.index(channel) for channel in common]
-            chosen = Motion(np.asarray(motion.values)[:, columns], motion.rate_hz, common)
-            reduced[number] = replace(utterance, track=replace(utterance.track, motion=chosen))
-    return reduced
+    names = [channel.name for channel in common]
+    motions = [utterance.track.motion.selected(names) for utterance in utterances]
+    return [replace(u, track=replace(u.track, motion=motion)) for u, motion in zip(utterances, motions, strict=True)]
 
 
 def _crops(utterance: Utterance) -> NDArray[np.uint8]:
