@@ -75,9 +75,8 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
     Raises ExportError: it cannot be written.
     """
     if not is_utterance_name(utterance.name) or make_portable(utterance.name) != utterance.name:
-        raise InputError(
-            f"an utterance cannot be named {utterance.name!r}: required: the name of a visible folder, on Windows, too"
-        )
+        required = "required the name of a visible folder, on Windows, too"
+        raise InputError(f"an utterance cannot be named {utterance.name!r}, {required}")
     motion, seen = utterance.track.motion, utterance.track.seen
     crops, phones = utterance.track.crops, utterance.phones
     check_curves(motion)
@@ -224,10 +223,8 @@ class Corpus:
         if format_name != FORMAT:
             raise CorpusError(f"{file}: format is {format_name!r}, required {FORMAT!r}; give a prepared corpus")
         if version != VERSION:
-            raise CorpusError(
-                f"{file}: corpus version {version}, this lipmotion reads version {VERSION}; upgrade lipmotion, or "
-                "prepare the recordings again into a new folder"
-            )
+            found = f"corpus version {version}, this lipmotion reads version {VERSION}"
+            raise CorpusError(f"{file}: {found}; upgrade lipmotion, or prepare the recordings again in a new folder")
         try:
             index: dict[str, dict[str, Any]] = content["utterances"]
             _INDEX(index)
@@ -269,13 +266,9 @@ class Corpus:
 
     def names(self, split: str | None = None, speakers: Sequence[str] = ()) -> tuple[str, ...]:
         """Return the sorted names of the utterances of one split or of all, and of some speakers or of all."""
-        return tuple(
-            sorted(
-                name
-                for name, entry in self._index.items()
-                if split in (None, entry["split"]) and (not speakers or entry["speaker"] in speakers)
-            )
-        )
+        entries = self._index.items()
+        chosen = {name: entry for name, entry in entries if split in (None, entry["split"])}
+        return tuple(sorted(name for name, entry in chosen.items() if not speakers or entry["speaker"] in speakers))
 
     def divided(self, lists: Mapping[str, Collection[str]]) -> Corpus:
         """Return the same corpus with some of its utterances alone, in other lists ``train``, ``val`` and ``test``.
@@ -298,10 +291,8 @@ class Corpus:
         if not names:
             counts = ", ".join(f"{each}: {len(self.names(each, speakers))}" for each in SPLITS)
             who = f" by {', '.join(speakers)}" if speakers else ""
-            raise CorpusError(
-                f"{self.path}: no utterances of split {split!r}{who} (there are {counts}); choose another split, or "
-                "name recordings in a list beside them, test.txt for instance, and prepare them again (docs/corpora.md)"
-            )
+            found = f"no utterances of split {split!r}{who} (there are {counts})"
+            raise CorpusError(f"{self.path}: {found}; choose another, or list some in test.txt (docs/corpora.md)")
         return names
 
     def selected(self, selection: Selection) -> tuple[str, ...]:
@@ -439,9 +430,8 @@ def _open_remote(url: str) -> tuple[Path, Callable[[str], None]]:
                 for name in system.ls(source, detail=False):
                     (unfinished / Path(name).name).write_bytes(system.cat_file(name))
         except Exception as error:
-            raise CorpusError(
-                f"{url.rstrip('/')}/{part}: cannot be read ({error!r}); is it a prepared corpus?"
-            ) from error
+            address = f"{url.rstrip('/')}/{part}"
+            raise CorpusError(f"{address}: cannot be read ({error!r}); is it a prepared corpus?") from error
 
     return folder, fetch
 

@@ -152,9 +152,8 @@ def describe_failed_extension(error: BaseException) -> str | None:
         package = entry.value.partition(":")[0].partition(".")[0].strip()
         if package in modules:
             _, file, line = next(frame for frame in reversed(frames) if frame[0] == package)
-            return (
-                f"the {_locate(entry)} failed: {_describe(error)} ({file}, line {line}); tell its authors, or remove it"
-            )
+            what = f"the {_locate(entry)} failed: {_describe(error)} ({file}, line {line})"
+            return f"{what}; tell its authors, or remove it"
     return None
 
 
@@ -167,10 +166,8 @@ def _entries(group: str) -> Iterator[metadata.EntryPoint]:
             try:
                 list(distribution.entry_points)
             except Exception as reason:
-                raise InputError(
-                    f"entry_points.txt of the package {distribution.metadata['Name']!r} cannot be read: "
-                    f"{_describe(reason)}; install the package again, or remove it"
-                ) from error
+                what = f"entry_points.txt of the package {distribution.metadata['Name']!r} cannot be read"
+                raise InputError(f"{what}: {_describe(reason)}; install the package again, or remove it") from error
         raise
 
 

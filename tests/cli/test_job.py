@@ -183,14 +183,14 @@ def test_what_is_edited_is_replayed_by_all_verbs(run, speech, toy_model_file, tm
     """The same bytes, from the recording and from the file alone."""
     file = tmp_path / "a.edits.json"
     of = ("--of", speech, "--model", toy_model_file, "--recogniser", "own")
-    done = run("edit", file, "phone 3 is p", *of, "--list")
+    done = run("edit", file, *of, "phone 3 is p", "--list")
     assert done.code == 0
     assert any(line.startswith("   3 ") and line.split()[3:4] == ["p"] for line in done.out)
     assert run("edit", file, "--machine-readable").code == 0
     assert run("edit", file, "pin jawOpen 0.7 at 1.2", "set intensity 1.2", "remove phone 99").code == 3
     assert json.loads(file.read_text())["steps"] == ["phone 3 is p"]  # none of them, for one is not possible
     assert run("edit", file, "pin jawOpen 0.7 at 1.2", "set intensity 1.2").code == 0
-    assert run("edit", file, "pin opening 0.1 at 1", "--undo", 1).code == 0
+    assert run("edit", "--undo", 1, file, "pin opening 0.1 at 1").code == 0
     assert json.loads(file.read_text())["steps"] == ["phone 3 is p", "pin jawOpen 0.7 at 1.2", "pin opening 0.1 at 1.0"]
     assert run("edit", file, "set intensity 1.2").code == 0
     kinds = ("json", "livelink.csv", "TextGrid")
@@ -212,16 +212,16 @@ def test_what_edit_refuses(run, speech, toy_model_file, tmp_path):
         (["render", file, "-o", tmp_path / "a.csv"], "a.edits.json: cannot be read"),
         (["animate", speech, "--edits", file, "-o", tmp_path / "a.csv"], "a.edits.json: no such edits file"),
         (["edit", tmp_path / "a.csv", *of], "a file of edits is called .json"),
-        (["edit", file, *of], ""),
+        (["edit", file, *of, "set intensity 1.2"], ""),
         (["edit", file, "--of", speech], "exists; add edits without --of"),
-        (["edit", file, "--undo", 2], "2 edits to take back, required 0 to 0"),
+        (["edit", "--und", 2, file], "2 edits to take back, required 0 to 1"),
         (["render", file, "--sound", speech, "-o", tmp_path / "a.csv"], "leave --sound and --units out"),
         (["animate", speech, "--edits", file, "-o", file], "a.edits.json"),
     ):
         done = run(*words)
         assert (done.code != 0) == bool(message)
         assert message in "\n".join(done.err)
-    assert json.loads(file.read_text())["steps"] == []
+    assert json.loads(file.read_text())["steps"] == ["set intensity 1.2"]
 
 
 def test_a_folder_of_recordings(run, takes, toy_model_file, here):

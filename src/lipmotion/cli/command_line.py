@@ -75,7 +75,7 @@ def parse_words(words: Sequence[str], options: argparse.Namespace) -> argparse.N
         near = get_close_matches(verb, verbs, n=1)
         hint = f"did you mean: {program.prog} {near[0]}" if near else f"the verbs are: {', '.join(verbs)}"
         program.error(f"no verb {verb!r}; {hint}")
-    words = _put_recording_first(program, words)
+    words = _put_positionals_first(program, words)
     empty = argparse.Namespace(**vars(options))
     options, unknown = program.parse_known_args(words, options)
     if getattr(options, "job", None) or getattr(options, "detail", None):  # what they say are the defaults by now
@@ -105,39 +105,36 @@ def _verbs(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser
     return dict(next((action.choices for action in actions), {}))
 
 
-def _put_recording_first(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str]:
-    """Return the words of a command with its recording ahead of the outputs.
+def _put_positionals_first(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str]:
+    """Return the words of a command with those that belong to no option first: argparse takes them in one place alone.
 
-    An option that takes several words, as ``-o``, takes those that argparse finds behind it: of ``-o OUT RECORDING``
-    also the recording, if it stands nowhere else. Then the last word is the recording, and so are those before it that
-    exist and end alike, where a verb takes several.
+    Of ``-o OUT RECORDING`` argparse would take the recording for an output, too. If no word stands elsewhere, the last
+    one is the recording, and so are those before it that exist and end alike, where a verb takes several.
     Raises WrongCommandLineError: an option that the verb has not.
     """
     verb, verbs = next((at for at, word in enumerate(words) if not word.startswith("-")), len(words)), _verbs(parser)
     if verb < len(words) and words[verb] in verbs:
-        return [*words[: verb + 1], *_put_recording_first(verbs[words[verb]], words[verb + 1 :])]
-    known, free, taken, at = parser._option_string_actions, 0, list[int](), 0
+        return [*words[: verb + 1], *_put_positionals_first(verbs[words[verb]], words[verb + 1 :])]
+    known, moved, taken, at = parser._option_string_actions, list[int](), list[int](), 0
     words = [  # "-o OUT" may be one word, as for Rhubarb
         part for word in words for part in (word.split(maxsplit=1) if word.partition(" ")[0] in known else (word,))
     ]
     while at < len(words) and words[at] != "--":
         option, at = _find_option(parser, words[at]), at + 1
+        is_apart = "=" not in words[at - 1] and (words[at - 1].startswith("--") or words[at - 1] in known)
         if option is None:
-            free += 1
-        elif option.nargs == "+" and "=" not in words[at - 1]:
+            moved.append(at - 1)
+        elif option.nargs == "+" and is_apart:
             behind = next((end for end in range(at, len(words)) if _is_option(words[end])), len(words))
             taken, at = list(range(at + 1, behind)), behind
-        elif option.nargs is None and words[at - 1] in option.option_strings:
+        elif option.nargs is None and is_apart:
             at += 1
     wanted = next((action for action in parser._actions if not action.option_strings), None)
-    if free or wanted is None or not taken or at < len(words) or "--job" in words:
-        return words
-    last = words[taken[-1]]
-    if wanted.nargs == "?" and Path(last).suffix and " " not in last:
-        return words
-    end = Path(last).suffix
-    alike = [each for each in taken if Path(words[each]).suffix == end and Path(words[each]).exists()]
-    moved = sorted({taken[-1], *(alike if wanted.nargs == "+" else ())})
+    if at == len(words) and not moved and wanted is not None and taken and "--job" not in words:
+        last, end = words[taken[-1]], Path(words[taken[-1]]).suffix
+        if wanted.nargs != "?" or not end or " " in last:
+            alike = [each for each in taken if Path(words[each]).suffix == end and Path(words[each]).exists()]
+            moved = sorted({taken[-1], *(alike if wanted.nargs == "+" else ())})
     return [*(words[each] for each in moved), *(word for each, word in enumerate(words) if each not in moved)]
 
 

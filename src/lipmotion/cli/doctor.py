@@ -46,9 +46,6 @@ CLOSED, OPEN = ((260, 70),), ((730, 70), (1090, 100), (2440, 160))
 """Resonances of the mouth in m and in a: their frequencies and widths, Hz (Klatt 1980)."""
 MIN_OPENING = 0.03  # opening of the lips that *mama* has at least, in distances between the outer eye corners
 OPENCV = "opencv-python-headless"
-OPENCV_HINT = (
-    "another OpenCV lies over it, as pip installs with MediaPipe; without it: requirements/video.txt (docs/start.md)"
-)
 
 
 @dataclass(frozen=True)
@@ -71,9 +68,7 @@ def doctor() -> Iterator[InstalledPart]:
     yield InstalledPart("lipmotion", "works", f"{find_version()}, Python {system}")
     declared = list_requirements()
     if not declared:
-        yield InstalledPart(
-            "packages", "absent", "not known: lipmotion runs from its sources; to install it: pip install ."
-        )
+        yield InstalledPart("packages", "absent", "not known: lipmotion runs from its sources; pip install .")
     needed = sorted((each for each in declared if "extra ==" not in str(each.marker)), key=_applies)
     for each in {each.name: each for each in needed}.values():  # of several by one name, that for this Python
         installed = _find_installed(each.name)
@@ -194,8 +189,8 @@ def _face_tracking() -> str:
         raise _AbsentError(str(error)) from error
     found = f"OpenCV {opencv}, MediaPipe {metadata.version('mediapipe')}"
     declared = _find_installed(OPENCV)
-    is_own = declared.startswith(opencv)
-    return found if is_own else f"{found}; {OPENCV} is {declared or 'not installed'}: {OPENCV_HINT}"
+    over = f"{OPENCV} is {declared or 'not installed'}: another OpenCV lies over it, as pip installs with MediaPipe"
+    return found if declared.startswith(opencv) else f"{found}; {over}; see requirements/video.txt (docs/start.md)"
 
 
 def _model() -> str:

@@ -86,25 +86,18 @@ def mono_samples(samples: Any) -> NDArray[np.float32]:
         values = np.asarray(samples)
     except ValueError as error:
         raise InputError(f"no samples ({error}), required an array of shape (N,) or (N, C)") from error
-    if (
-        values.ndim not in (1, 2)
-        or 0 in values.shape[1:]
-        or not (values.dtype.kind == "f" or (values.dtype.kind == "i" and values.itemsize == 2))
-    ):
-        raise InputError(
-            f"samples of shape {values.shape} and type {values.dtype}, required (N,) or (N, C), floats or int16"
-        )
+    is_number = values.dtype.kind == "f" or (values.dtype.kind == "i" and values.itemsize == 2)
+    if not is_number or values.ndim not in (1, 2) or 0 in values.shape[1:]:
+        found = f"samples of shape {values.shape} and type {values.dtype}"
+        raise InputError(f"{found}, required (N,) or (N, C), floats or int16")
     with np.errstate(over="ignore"):
         floats = values.astype(np.float32) / np.float32(32768 if values.dtype.kind == "i" else 1)
     if not (np.abs(floats) <= LARGEST_SAMPLE).all():
-        raise InputError(
-            f"samples that are not finite, or beyond {LARGEST_SAMPLE:g}, required full scale 1; put 0 there"
-        )
+        raise InputError(f"samples not finite, or beyond {LARGEST_SAMPLE:g}, required full scale 1; put 0 there")
     return floats.mean(axis=1, dtype=np.float32) if floats.ndim == 2 else floats
 
 
 Array = NDArray[np.float32]
-WEIGHTS = "live.npz"
 STEP_FRAMES = 2  # frames of 10 ms in a step
 STEP_S = STEP_FRAMES / FRAME_RATE_HZ
 LAGS = (-1, 2, 6, 14, 30)
@@ -257,7 +250,7 @@ class LiveNetwork(NamedTuple):
 @cache
 def live_network() -> LiveNetwork:
     """Return the network of the package."""
-    path = resources.files("lipmotion") / "models" / WEIGHTS
+    path = resources.files("lipmotion") / "models" / "live.npz"
     with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
         arrays = dict(stored)
     network = SHAPE.from_arrays({name: arrays[name] for name in SHAPE.specs}, len(LAGS) * OUTPUTS)

@@ -87,9 +87,8 @@ class Stream:
         seed: int | None = 0,
     ) -> None:
         if not LOWEST_RATE_HZ <= sample_rate <= HIGHEST_RATE_HZ or sample_rate != int(sample_rate):
-            raise InputError(
-                f"a stream of {sample_rate} Hz, required a whole number from {LOWEST_RATE_HZ} to {HIGHEST_RATE_HZ}"
-            )
+            allowed = f"a whole number from {LOWEST_RATE_HZ} to {HIGHEST_RATE_HZ}"
+            raise InputError(f"a stream of {sample_rate} Hz, required {allowed}")
         if look_ahead_ms is not None and not 0 <= look_ahead_ms <= LONGEST_LOOK_AHEAD_MS:
             raise InputError(f"a look-ahead of {look_ahead_ms} ms, required 0 to {LONGEST_LOOK_AHEAD_MS:g}, or None")
         if pauses not in get_args(Pauses):
@@ -318,14 +317,12 @@ class _Smoother:
         self.rest = self.silent[-1, : len(ARTICULATORS)].astype(float)
 
     def solve(self, answers: deque[NDArray[np.float32]], before: list[Array]) -> tuple[Array, Array]:
-        """Return articulators [shape=(8,)] of the frame that is known now, and visemes from it on [shape=(N, 15)].
+        """Return articulators [shape=(8,)] of the frame known now, and visemes from it on [shape=(N, 15)].
 
-        answers : of the last steps [each shape=(5, 23)]
-        before  : articulators of the frame before, and of the one before that
+        From the answers of the last steps [each shape=(5, 23)], and the articulators of the two frames before.
         """
-        rows = np.stack(
-            [answers[place][choice] for place, choice in zip(self._steps.tolist(), self._choice.tolist(), strict=True)]
-        ).astype(float)
+        places = zip(self._steps.tolist(), self._choice.tolist(), strict=True)
+        rows = np.stack([answers[place][choice] for place, choice in places]).astype(float)
         wanted = rows[:, : len(ARTICULATORS)] * self._gains * self._of_answers
         previous = np.stack([before[1], before[0]]) * self._of_before
         return wanted.sum(axis=0) + previous.sum(axis=0), rows[:, len(ARTICULATORS) :]

@@ -42,16 +42,12 @@ class TimedPhones:
             try:
                 label, begin_s, stop_s = (str(timing[0]), *map(float, timing[1:]))
             except (TypeError, ValueError, LookupError, OverflowError) as error:
-                raise InputError(
-                    f"{shorten(repr(timing))}, required a text with its start and end, seconds ({error})"
-                ) from error
+                required = f"required a text with its start and end, seconds ({error})"
+                raise InputError(f"{shorten(repr(timing))}, {required}") from error
             ahead_s = begin_s - max(end_s, now_s)
             if not (ahead_s < LONGEST_GAP_S and end_s - 1e-6 <= begin_s < stop_s < begin_s + LONGEST_S):
-                raise InputError(
-                    f"{shorten(label)!r} from {begin_s} to {stop_s}, required seconds that go on from "
-                    f"{max(end_s, 0):.3f}, a start before its end by less than {LONGEST_S:g} s, and less than "
-                    f"{LONGEST_GAP_S:g} s after what is known"
-                )
+                required = f"from {max(end_s, 0):.3f} or up to {LONGEST_GAP_S:g} s on, for less than {LONGEST_S:g} s"
+                raise InputError(f"{shorten(label)!r} from {begin_s} to {stop_s}, required seconds {required}")
             start_s = max(begin_s, end_s)
             before_s = start_s - BEFORE_S if end_s < now_s - REMEMBERED_S else end_s
             if start_s - before_s > STEP_S / 2:

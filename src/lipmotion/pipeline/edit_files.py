@@ -109,10 +109,8 @@ def check_sound(recording: Path, sha256: str) -> None:
     """Raise InputError unless a recording is the one of a digest, whose phones were found, or it cannot be read."""
     check_source(recording, "recording")
     if (digest := hash_file(recording)) != sha256:
-        raise InputError(
-            f"{recording}: is another recording than when its phones were found (SHA-256 {digest[:12]}, required "
-            f"{sha256[:12]}); put the old one back, or begin anew with this one, under another name"
-        )
+        found = f"another recording than the edited one (SHA-256 {digest[:12]}, required {sha256[:12]})"
+        raise InputError(f"{recording}: is {found}; put that back, or begin anew under another name")
 
 
 def edit_file(edits: EditFile | Edits | str | Path | None) -> EditFile:

@@ -38,7 +38,14 @@ _READ: dict[Any, tuple[str, Any]] = {
 
 @dataclass(frozen=True)
 class Step:
-    """An edit that one sentence states (``STEPS``)."""
+    """An edit that one sentence states (``STEPS``). Raises InputError: a word that it spells out has no phones."""
+
+    def __post_init__(self) -> None:
+        for word, phones in self.said.items():
+            if not phones:
+                raise InputError(f"{str(self)!r}: {shorten(repr(word))} has no phones; required WORD PHONES, WORD …")
+            if any(is_silent(_read_unit(phone).phone) for phone in phones):
+                raise InputError(f"{str(self)!r}: a word has no silence in it; say two words")
 
     @property
     def stated(self) -> Any:
@@ -114,10 +121,8 @@ class PhoneIs(PhoneStep):
     phone: str
 
     def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
-        place = self._index(units, self.number)
-        spans = list(units)
-        spans[place] = replace(spans[place], label=_read_unit(self.phone, spans[place].label.word))
-        return Timeline(tuple(spans))
+        phone = units[self._index(units, self.number)]
+        return with_span(units, [replace(phone, label=_read_unit(self.phone, phone.label.word))])
 
 
 @dataclass(frozen=True)
@@ -192,12 +197,10 @@ class PhoneSplit(PhoneStep):
     time_s: float
 
     def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
-        place = self._index(units, self.number)
-        phone = units[place]
+        phone = units[self._index(units, self.number)]
         self._check_border(self.time_s, phone.start_s, phone.end_s)
         label = replace(phone.label, confidence=None)
-        parts = (Span(phone.start_s, self.time_s, label), Span(self.time_s, phone.end_s, label))
-        return Timeline((*units.spans[:place], *parts, *units.spans[place + 1 :]))
+        return with_span(units, [Span(phone.start_s, self.time_s, label), Span(self.time_s, phone.end_s, label)])
 
 
 def with_span(units: Timeline[Unit], spans: Sequence[Span[Unit]]) -> Timeline[Unit]:
@@ -224,21 +227,9 @@ class WordSaid(Step):
     word: str
     phones: Text
 
-    def __post_init__(self) -> None:
-        _check_said(self)
-
     @property
     def said(self) -> dict[str, tuple[str, ...]]:  # noqa: D102
         return {self.word: tuple(self.phones.split())}
-
-
-def _check_said(step: Step) -> None:
-    """Raise InputError unless every word that an edit spells out has phones, and no silence among them."""
-    for word, phones in step.said.items():
-        if not phones:
-            raise InputError(f"{str(step)!r}: {shorten(repr(word))} has no phones; required WORD PHONES, WORD …")
-        if any(is_silent(_read_unit(phone).phone) for phone in phones):
-            raise InputError(f"{str(step)!r}: a word has no silence in it; say two words")
 
 
 @dataclass(frozen=True)
@@ -250,6 +241,7 @@ class WordsSaid(Step):
     end_s: float
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not 0 <= self.start_s < self.end_s:
             raise InputError(f"{str(self)!r}: required an end after the start")
 
@@ -259,10 +251,6 @@ class WordsSaidSo(WordsSaid):
     """Other words are said from one time to another, some of them with these phones: ``zoe z ow iy, qi k iy``."""
 
     pronunciations: Text
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check_said(self)
 
     @property
     def said(self) -> dict[str, tuple[str, ...]]:  # noqa: D102

@@ -108,15 +108,9 @@ def find_speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | Non
     if not speaker:
         return None
     if maps is None:
-        raise InputError(
-            f"the model tells no speakers apart, so that there is no {speaker!r}; leave the speaker out, or train on "
-            "several people"
-        )
+        raise InputError(f"the model tells no speakers apart, so that there is no {speaker!r}; leave the speaker out")
     if speaker not in maps:
-        raise InputError(
-            f"the model knows no speaker {speaker!r}, only: {', '.join(maps)}; give one of these, or none for the "
-            "mean person"
-        )
+        raise InputError(f"the model knows no speaker {speaker!r}, required one of: {', '.join(maps)}, or none")
     return maps[speaker]
 
 
@@ -128,10 +122,8 @@ def find_person(model: Model, request: Request) -> SpeakerMap | None:
     person = find_speaker_map(model.speakers, request.speaker)
     if request.onto is None:
         if request.onto_speaker:
-            raise InputError(
-                f"onto the speaker {request.onto_speaker!r}, but of what? give a corpus or a model (--onto), or leave "
-                "the name out"
-            )
+            name = request.onto_speaker
+            raise InputError(f"onto the speaker {name!r}, but of what? give a corpus or a model (--onto), or no name")
         return person
     from lipmotion.motion.speaker_maps import compose_maps
 
@@ -345,11 +337,8 @@ def _join_rows(
     rest: NDArray[np.floating[Any]],
     like: NDArray[np.floating[Any]],
 ) -> NDArray[Any]:
-    """Return the rows of all passages in their places; the mouth goes to rest and comes from it beside them.
+    """Return the rows of all passages in their places; the mouth goes to ``rest`` and comes from it beside them.
 
-    rows : of each passage [shape=(T', P)]
-    rest : those of silence [shape=(REST_FRAMES, P)]
-    like : as long as the result, of its type [shape=(T, 0)]
     Without passages all rows are one in memory, which may not be changed: silence may last for hours.
     """
     still = rest.mean(axis=0)
@@ -439,6 +428,8 @@ def cut_speech(speech: Speech, frames: slice) -> Speech:
     features = Features(speech.features.values[frames], (frames.stop - 1 - frames.start) / FRAME_RATE_HZ)
     steps, halves = (slice(frames.start // each, -(-frames.stop // each)) for each in (STEP, 2))
     posteriors, prior, confidence, parts = speech.posteriors, speech.prior, speech.confidence, None
+    if prior is not None:
+        prior = PriorOutput(prior.articulators[steps], prior.hidden[steps], prior.distortion[steps])
     if speech.parts is not None:
         parts = tuple(
             _cut_part(part, frames)
@@ -452,9 +443,7 @@ def cut_speech(speech: Speech, frames: slice) -> Speech:
         units_known=speech.units_known,
         spectrum=None if speech.spectrum is None else speech.spectrum[frames],
         confidence=confidence[frames] if isinstance(confidence, np.ndarray) else confidence,
-        prior=None
-        if prior is None
-        else PriorOutput(prior.articulators[steps], prior.hidden[steps], prior.distortion[steps]),
+        prior=prior,
         voice=speech.voice,
         posteriors=None if posteriors is None else replace(posteriors, values=posteriors.values[halves]),
         encoding=None if speech.encoding is None else speech.encoding[frames],

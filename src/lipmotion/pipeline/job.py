@@ -262,10 +262,8 @@ def plan_outputs(recordings: Sequence[Path], outputs: Sequence[str], kinds: Sequ
         is_file = not is_for_several(output)
         if is_file and (len(recordings) > 1 or output == "-"):
             several = f"there are {len(recordings)} recordings" if len(recordings) > 1 else "no folder"
-            raise ExportError(
-                f"{output}: is one file, and {several}; give a folder, with a slash at its end, or {NAME} in the name "
-                f"of the file: 'out/{NAME}{Path(output).suffix or '.json'}'"
-            )
+            example = f"'out/{NAME}{Path(output).suffix or '.json'}'"
+            raise ExportError(f"{output}: is one file, and {several}; give a folder, as out/, or a name, as {example}")
         templates += [output] if is_file or NAME in output else [str(Path(output) / f"{NAME}.{kind}") for kind in kinds]
     planned = [[each.replace(NAME, recording.stem) for each in templates] for recording in recordings]
     named = [part for template in templates for part in Path(template).parts if NAME in part]

@@ -125,10 +125,7 @@ def load_model(path: str | Path | Model | None = None) -> Model:
 def read_header(path: Path) -> dict[str, Any]:
     """Return the header of a model file. Raises as ``load_model``."""
     if not path.is_file():
-        raise InputError(
-            f"{path}: no such model; train one (lipmotion train), or use the one that ships: lipmotion "
-            "info names its file"
-        )
+        raise InputError(f"{path}: no such model; train one (lipmotion train), or use the one of: lipmotion info")
     return read_header_of(path, FORMAT, VERSION, "lipmotion model", "give a file that `lipmotion train` wrote")
 
 
@@ -145,10 +142,8 @@ def _read_shipped() -> Model:
 def _read(path: Path) -> Model:
     header = read_header(path)
     if header.get("engine") not in ENGINES.names:
-        raise ModelFormatError(
-            f"{path}: no engine {header.get('engine')!r}; there are: {', '.join(ENGINES.names)}; install the package "
-            "that adds it, or give another model"
-        )
+        name, known = header.get("engine"), ", ".join(ENGINES.names)
+        raise ModelFormatError(f"{path}: no engine {name!r}; there are: {known}; install the package that adds it")
     try:
         stored = read_archive(path)
         arrays = {folder: select_arrays(stored, f"{folder}/") for folder in _FOLDERS}
@@ -211,9 +206,8 @@ def with_person(model: Model, name: str, person: SpeakerMap) -> Model:
     known = model.speakers or {}
     if not name or name in known:
         raise InputError(f"a person named {name!r}, required another name than: {', '.join(('', *known))}")
-    channels = next((other.channels for other in known.values()), person.channels)
-    lips = next((other.lips for other in known.values()), person.lips)
-    speakers = {**known, name: replace(person.reorder(channels), lips=lips)}
+    first = next(iter(known.values()), person)
+    speakers = {**known, name: replace(person.reorder(first.channels), lips=first.lips)}
     return replace(model, speakers=speakers, about={**model.about, "speakers": list(speakers)})
 
 

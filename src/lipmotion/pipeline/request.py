@@ -1,7 +1,7 @@
 """What is animated, and what is written: ``Request`` and ``Outputs``, the same values everywhere.
 
 Every option of ``animate`` is a field here, or in another part of a job (``pipeline.job``), and nowhere else: with its
-default, its check and what the help says of it (``types.configuration.option``).
+default and its check (``types.configuration.option``). What the help says of it is in ``options.csv``.
 """
 # ruff: noqa: RUF009 (``option`` returns the field of a dataclass)
 
@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar, get_args
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.extensions import load_provided
-from lipmotion.storage.sources import is_file
+from lipmotion.storage.sources import is_file, read_shipped_table
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
 
@@ -37,10 +38,19 @@ Mark = Literal["metadata", "visible", "none"]
 RATE = Rule(1, most=1000, unit=" a second")  # frame rates of a file; a mistyped rate must not fill the memory
 
 
-def _file(reads: str, metavar: str, help: str, **more: Any) -> Any:
+def _file(reads: str, **more: Any) -> Any:
     """Return the option of a file that is read, None where there is none; ``reads``: what it is, in messages."""
-    more |= {"metavar": metavar} if metavar else {}
-    return option(None, kind=Path, reads=reads, help=help, **more)
+    return option(None, kind=Path, reads=reads, **more)
+
+
+def _add_help(part: type[PartT]) -> type[PartT]:
+    """Give the options of a part their texts for the command line, from ``options.csv``."""
+    texts_of = {row["option"]: row for row in read_shipped_table("lipmotion.pipeline", "options.csv")}
+    for each in fields(part):
+        texts = texts_of.get(f"{part.__name__}.{each.name}", {})
+        shown = {name: texts[name] for name in ("metavar", "help") if texts.get(name)}
+        each.metadata = MappingProxyType({**each.metadata, **shown})
+    return part
 
 
 def _shipped() -> Path:
@@ -49,6 +59,7 @@ def _shipped() -> Path:
     return find_shipped()
 
 
+@_add_help
 @dataclass(frozen=True)
 class Request(Configuration):
     """What is animated: a recording, with all that its user knows of it, and whose motion it gets.
@@ -91,11 +102,7 @@ class Request(Configuration):
     """
 
     recording: str | Path | Audio | None = _file(
-        "recording",
-        "",
-        "audio or video file, -: standard input",
-        flags=("speech",),
-        values={"Audio": "samples as lipmotion.Audio(samples, rate_hz)"},
+        "recording", flags=("speech",), values={"Audio": "samples as lipmotion.Audio(samples, rate_hz)"}
     )
     transcript: str | Path | TimedTranscript | None = option(
         None,
@@ -103,78 +110,22 @@ class Request(Configuration):
         values={"Path": "a Path of a file", "TimedTranscript": "a TimedTranscript"},
         reads="transcript",
         replaceable=True,
-        metavar="TEXT|FILE",
-        help="the words that are spoken, if known: also subtitles, and what recognisers write",
     )
-    lexicon: str | Path | Lexicon | None = _file(
-        "lexicon",
-        "FILE",
-        "pronunciations, one per line: WORD PHONE PHONE ...",
-        replaceable=True,
-        values={"Lexicon": "a Lexicon"},
-    )
-    language: str = option(
-        ENGLISH,
-        Rule(choices=(*LANGUAGES, AUTO)),
-        metavar="CODE",
-        help="that is spoken: en, es, fr, de, it, pt, nl, ja, ko, zh, ... or auto (default: en; docs/transcripts.md)",
-    )
+    lexicon: str | Path | Lexicon | None = _file("lexicon", replaceable=True, values={"Lexicon": "a Lexicon"})
+    language: str = option(ENGLISH, Rule(choices=(*LANGUAGES, AUTO)))
     units: str | Path | Timeline[Unit] | None = _file(
-        "units file",
-        "FILE",
-        "phones in time from an earlier .json, .npz or .TextGrid, edited or not, or from Audacity labels",
-        replaceable=True,
-        values={"Timeline": "a Timeline of spans of units"},
+        "units file", replaceable=True, values={"Timeline": "a Timeline of spans of units"}
     )
-    tier: str = option(
-        "",
-        metavar="NAME",
-        help="of labels with several tiers or speakers, the tier or the speaker that is read (default: all speakers)",
-    )
-    edits: Path | None = _file("edits", "FILE", "file of edits from lipmotion edit (docs/edit.md)", replaceable=True)
-    recogniser: str = option(
-        "auto",
-        metavar="KIND",
-        help="auto, fast (phones alone), own (phone models of the model), general (of many voices) (default: auto)",
-    )
-    speaker: str = option(
-        "",
-        metavar="NAME",
-        help="whose motion, of the people that the model was trained on (default: the mean person; see lipmotion info)",
-    )
-    pauses: Pauses = option(
-        "rest",
-        Rule(choices=get_args(Pauses)),
-        help="rest: lips close softly in pauses (default); natural: as people do, who breathe and hold a sound",
-    )
-    manner: Manner = option(
-        "detected",
-        Rule(choices=get_args(Manner)),
-        omit_default=True,
-        help="detected: laughter and breaths in the sound move the mouth (default); asked: none does",
-    )
-    asymmetry: float = option(
-        0.0,
-        Rule(0, most=1),
-        metavar="X",
-        help="0: both sides of the mouth move alike; 1: as on the speaker's own face (default: 0)",
-    )
-    model: Path | None = _file(
-        "model",
-        "",
-        "trained model (default: the one that ships with the package)",
-        replaceable=True,
-        default_path=_shipped,
-    )
-    onto: Onto | None = _file(
-        "footage of the other person",
-        "VIDEO|CORPUS|MODEL",
-        "another person, onto whose face the motion is mapped: a video of them, a prepared corpus or a model",
-        values={"object": ""},
-    )
-    onto_speaker: str = option(
-        "", metavar="NAME", help="which person, if the corpus or the model of --onto has several"
-    )
+    tier: str = option("")
+    edits: Path | None = _file("edits", replaceable=True)
+    recogniser: str = option("auto")
+    speaker: str = option("")
+    pauses: Pauses = option("rest", Rule(choices=get_args(Pauses)))
+    manner: Manner = option("detected", Rule(choices=get_args(Manner)), omit_default=True)
+    asymmetry: float = option(0.0, Rule(0, most=1))
+    model: Path | None = _file("model", replaceable=True, default_path=_shipped)
+    onto: Onto | None = _file("footage of the other person", values={"object": ""})
+    onto_speaker: str = option("")
     spoken_so: bool = option(False, omit_default=True)
 
     def __post_init__(self) -> None:
@@ -207,6 +158,7 @@ def as_request(
     return replace(speech, transcript=transcript)
 
 
+@_add_help
 @dataclass(frozen=True)
 class Outputs(Configuration):
     """What is written: files, their rates and channels, the face of videos and the character of curves.
@@ -215,90 +167,23 @@ class Outputs(Configuration):
     30
     """
 
-    files: tuple[str, ...] = option((), flags=("-o", "--output"), writes=True, help="files of motion and videos")
-    rate_hz: float | None = option(
-        None,
-        RATE,
-        kind=float,
-        what="frame rate",
-        flags=("--rate",),
-        metavar="HZ",
-        help="frames per second of motion files (default: --fps, or 100)",
-    )
-    channels: tuple[str, ...] = option(
-        (), metavar="NAME,NAME", help="write only these to motion files: opening,width,..."
-    )
-    fps: float | None = option(
-        None,
-        RATE,
-        kind=float,
-        what="frame rate",
-        help="frames per second of videos (default: 25; of filmed faces, those of the footage)",
-    )
-    articulation: bool = option(
-        False, help="add tongue, lip_tuck, protrusion, spread, lip_press, teeth to motion files"
-    )
-    face: str = option(
-        "portrait",
-        reads="face",
-        metavar="NAME|FILE.svg|FILE.face|FOLDER",
-        help="face that videos show: woman, man, head, cartoon, a drawing, a filmed face, or a folder of one drawing a "
-        "mouth shape (default: portrait, the woman)",
-    )
-    background: str | Path | None = option(
-        None,
-        kind=str,
-        values={"Path": "a Path of a file"},
-        reads="background",
-        metavar="VIDEO|COLOUR",
-        help="footage of the same person (default: that in its file); of a drawn face: transparent, or as #40a0ff",
-    )
-    jaw: Jaw = option(
-        "motion",
-        Rule(choices=get_args(Jaw)),
-        help="what the jaw of a filmed face follows: motion, energy or none (default: motion)",
-    )
-    refinement: Refinement = option(
-        "steady",
-        Rule(choices=get_args(Refinement)),
-        help="detail of a filmed mouth: steady, or of the nearest picture, as in the paper (default: steady)",
-    )
-    overlay: Overlay | None = option(
-        None,
-        Rule(choices=get_args(Overlay)),
-        kind=str,
-        help="show the video of the speech with a large mouth of the filmed face, in a corner or over the speaker's "
-        "own",
-    )
-    mark: Mark = option(
-        "metadata",
-        Rule(choices=get_args(Mark)),
-        help="how a video of a filmed face says that it is synthetic (default: metadata; docs/consent.md)",
-    )
-    character: Path | None = _file(
-        "character",
-        "FILE",
-        "your own character in videos: FILE.glb .gltf .vrm .obj, or a folder of .obj; motion files get its weights",
-    )
-    lip_points: Path | None = _file(
-        "table of lip points",
-        "FILE.csv",
-        "the vertices of lip points: point,vertex (default: found by the blendshape that opens the mouth)",
-    )
-    binding: Path | None = _file("binding", "FILE", "weights of control points: stored (.binding) or painted (.csv)")
-    control_points: bool = option(False, help="move it by control points, though it has blendshapes")
-    curves: str = option(
-        "",
-        metavar="SET",
-        help="what motion files hold: arkit, face, visemes, held-visemes, vowels, fap, or the controls of a rig "
-        "(FILE.csv; docs/meshes.md)",
-    )
-    kinds: tuple[str, ...] = option(
-        ("json",),
-        flags=("--to",),
-        metavar="KIND,KIND",
-        help="what is written of each recording, as json,mp4 (default: json)",
-    )
+    files: tuple[str, ...] = option((), flags=("-o", "--output"), writes=True)
+    rate_hz: float | None = option(None, RATE, kind=float, what="frame rate", flags=("--rate",))
+    channels: tuple[str, ...] = option(())
+    fps: float | None = option(None, RATE, kind=float, what="frame rate")
+    articulation: bool = option(False)
+    face: str = option("portrait", reads="face")
+    background: str | Path | None = option(None, kind=str, values={"Path": "a Path of a file"}, reads="background")
+    jaw: Jaw = option("motion", Rule(choices=get_args(Jaw)))
+    refinement: Refinement = option("steady", Rule(choices=get_args(Refinement)))
+    overlay: Overlay | None = option(None, Rule(choices=get_args(Overlay)), kind=str)
+    mark: Mark = option("metadata", Rule(choices=get_args(Mark)))
+    character: Path | None = _file("character")
+    lip_points: Path | None = _file("table of lip points")
+    binding: Path | None = _file("binding")
+    control_points: bool = option(False)
+    curves: str = option("")
+    kinds: tuple[str, ...] = option(("json",), flags=("--to",))
 
     @property
     def motion_hz(self) -> float | None:

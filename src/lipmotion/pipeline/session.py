@@ -7,10 +7,10 @@ Each stage is cached under the edits that it depends on.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -222,10 +222,8 @@ class Session:
         self.speaker  # noqa: B018 # what is refused is refused before the long work
         request = self.request
         if self._lasts_s is not None and abs(self._audio.duration_s - self._lasts_s) > LATE_S:
-            raise InputError(
-                f"the recording lasts {self._audio.duration_s:.2f} s, the edited one {self._lasts_s:.2f} s: the "
-                "edits are of another recording; make some of this one: lipmotion edit FILE --of RECORDING"
-            )
+            lasts = f"the recording lasts {self._audio.duration_s:.2f} s, the edited one {self._lasts_s:.2f} s"
+            raise InputError(f"{lasts}: edits of another recording; begin anew: lipmotion edit FILE --of RECORDING")
         if self._lasts_s is not None or self._known_audio is not None:
             request = replace(request, recording=self._audio)
         return analyse_speech(self.model, request, self._work, self._monitor)
@@ -282,9 +280,8 @@ class Session:
         try:
             spans = self._cache.cached("aligned", (text, tuple(pronunciations.items()), start_s, end_s), align)
         except AlignmentError as error:
-            raise InputError(
-                f"{str(step)!r}: does not fit into {where} ({error}); make room with 'phone N ends TIME' first"
-            ) from error
+            room = "make room with 'phone N ends TIME' first"
+            raise InputError(f"{str(step)!r}: does not fit into {where} ({error}); {room}") from error
         return with_span(units, spans)
 
     def _edited_speech(self, steps: tuple[Step, ...]) -> SpeechAnalysis:
@@ -305,17 +302,23 @@ class Session:
         locks = find_locks(steps)
         if not locks:
             return generation
-        from lipmotion.articulation.curve_edits import apply_stretch
+        from lipmotion.articulation.curve_edits import apply_stretch, cut_locked_stretch
         from lipmotion.articulation.phone_targets import SAID, with_gestures
 
-        asked = with_gestures(generation.motion, generation.units, SAID)
-        generation = generation.with_motion(asked)  # what phones beside a lock ask must not reach into it
+        def add_gestures(generation: Generation, names: Sequence[str]) -> Generation:
+            return generation.with_motion(with_gestures(generation.motion, generation.units, names))
+
+        def cut(before: tuple[Step, ...], lock: LockStep) -> MotionStretch:
+            return cut_locked_stretch(add_gestures(self._after(before), SAID), lock.start_s, lock.end_s)
+
+        generation = add_gestures(generation, SAID)  # what phones beside a lock ask must not reach into it
         for place, lock in locks.items():
             for later in steps[place + 1 :]:
                 if lock.holds(later):
                     raise InputError(f"{str(later)!r} lies in what is locked ({str(lock)!r}); take the lock out first")
-            stretch = self._locked(steps[:place], lock)  # also with channels of edits that were taken back since
-            generation = generation.with_motion(with_gestures(generation.motion, generation.units, stretch.names))
+            key = (steps[:place], lock, self.is_sketching)
+            stretch = self._cache.cached("locked", key, partial(cut, steps[:place], lock))
+            generation = add_gestures(generation, stretch.names)  # also of edits that were taken back since
             generation = apply_stretch(generation, stretch)
             earlier = [edit for step in steps[:place] if isinstance(step, CurveStep) for edit in step.parts]
             before = tuple(edit for edit in generation.curve_edits if edit in earlier)
@@ -323,18 +326,6 @@ class Session:
                 locked = Locked(lock.start_s, lock.end_s, before)
                 generation = replace(generation, curve_edits=(*generation.curve_edits, locked))
         return generation
-
-    def _locked(self, before: tuple[Step, ...], lock: LockStep) -> MotionStretch:
-        """Return what a lock keeps: the motion after the edits before it."""
-        from lipmotion.articulation.curve_edits import cut_locked_stretch
-        from lipmotion.articulation.phone_targets import SAID, with_gestures
-
-        def cut() -> MotionStretch:
-            generation = self._after(before)
-            asked = with_gestures(generation.motion, generation.units, SAID)
-            return cut_locked_stretch(generation.with_motion(asked), lock.start_s, lock.end_s)
-
-        return self._cache.cached("locked", (before, lock, self.is_sketching), cut)
 
     def _after(self, steps: tuple[Step, ...]) -> Generation:
         return self._cache.cached("edited", (steps, self.is_sketching), lambda: self._with_locks(steps))

@@ -20,7 +20,7 @@ from itertools import chain, islice
 from multiprocessing import connection as pipes
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeVar
 
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError
 from lipmotion.extensions import find_version, install_command
@@ -282,16 +282,9 @@ CONNECT_S = 20
 ITEMS_AHEAD = 4  # items a worker of a cluster that are sent ahead, so that none waits, and memory is flat
 
 
-Pool: TypeAlias = ParallelMap
-"""A map in other processes whose results come as they are ready.
-
-Raises WorkerDiedError: a worker ended; which items are done is not known.
-"""
-
-
 @contextmanager
-def cluster_pool(address: str, out: str | Path = ".") -> Iterator[Pool]:
-    """Give the workers of a Dask cluster as a pool.
+def cluster_pool(address: str, out: str | Path = ".") -> Iterator[ParallelMap]:
+    """Give a map in the workers of a Dask cluster whose results come as they are ready.
 
     address : of its scheduler, as ``tcp://HOST:8786``
     out     : the folder of the outputs, which every worker must see under the same path
@@ -302,9 +295,8 @@ def cluster_pool(address: str, out: str | Path = ".") -> Iterator[Pool]:
     try:
         from distributed import Client, KilledWorker, as_completed
     except ImportError as error:
-        raise MissingDependencyError(
-            f"a cluster needs the package distributed: {install_command('cluster')}, here and on all workers"
-        ) from error
+        advice = f"{install_command('cluster')}, here and on all workers"
+        raise MissingDependencyError(f"a cluster needs the package distributed: {advice}") from error
     with ExitStack() as stack:
         try:
             client = stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
@@ -338,9 +330,7 @@ def cluster_pool(address: str, out: str | Path = ".") -> Iterator[Pool]:
 def _check_worker(worker: str, answer: Any, out: str | Path) -> None:
     """Raise InputError where a worker cannot do the work; warn where its processor is another kind."""
     if isinstance(answer, BaseException):
-        raise InputError(
-            f"{worker}: this worker cannot run lipmotion ({answer}); install the same version there"
-        ) from answer
+        raise InputError(f"{worker}: cannot run lipmotion ({answer}); install the same version there") from answer
     version, sees_folder, processor = answer
     if version != find_version():
         raise InputError(f"{worker}: has lipmotion {version}, required {find_version()}; install it there")

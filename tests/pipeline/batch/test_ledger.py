@@ -373,7 +373,7 @@ def test_lists_that_are_refused(tmp_path):
         ("file,transcript\na.wav,x\n,hello\n", "row 3: no recording in the column 'file'"),
         ("a.wav\n" * (MAX_LINES + 1), f"{MAX_LINES + 1} lines, required at most {MAX_LINES}"),
         *((text, "control characters") for text in ("a\0b.wav\n", "file,output\na.wav,x\ty\n")),
-        *((text, "rename one of them") for text in same),
+        *((text, "rename the recording") for text in same),
     ):
         with pytest.raises(ExportError if text in same else InputError, match=message):
             listed(tmp_path, text)
@@ -387,7 +387,7 @@ def test_lists_that_are_refused(tmp_path):
         (["report.csv/b"], "be the folder of"),
         (["x" * 251], "more than 255 bytes"),
         (["é" * 130 + "/x"], "more than 255 bytes"),
-        (["take.LiveLink"], "would be called as .livelink.csv"),
+        (["take.LiveLink"], "would be a .livelink.csv"),
         (["Report"], "the batch itself"),
         (["a", "a.cues"], "would be written for"),  # as json and as cues.json
         *(([name], "outside the folder") for name in ("../a", "/a", ".a", "a/.batch/b", "")),

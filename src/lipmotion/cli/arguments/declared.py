@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import stat
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
@@ -118,14 +117,7 @@ def is_pipe(path: Path | str) -> bool:
 
     Not a named pipe: nobody may ever write to it.
     """
-    if str(path) == PIPE:
-        return True
-    if not str(path).startswith(OPENED):
-        return False
-    try:
-        return stat.S_ISFIFO(Path(path).stat().st_mode)
-    except (OSError, ValueError):
-        return False
+    return str(path) == PIPE or (str(path).startswith(OPENED) and Path(path).is_fifo())
 
 
 @contextmanager

@@ -110,7 +110,8 @@ def animate_one_by_one(job: Job, paths: Sequence[Path], options: argparse.Namesp
 
     if len(paths) == 1 and not (paths[0].is_dir() or any(map(is_for_several, job.outputs.files))):
         return False
-    _check_named(paths)
+    if piped := next(filter(is_pipe, paths), None):
+        raise InputError(f"{piped}: what comes through a pipe has no name; give it alone: -o FILE.json")
     recordings = list_recordings(paths)
     alone = {name: getattr(job.request, name) for name in ("transcript", "units", "edits")}
     for name, value in alone.items():
@@ -146,13 +147,3 @@ def animate_one_by_one(job: Job, paths: Sequence[Path], options: argparse.Namesp
     _, speech, worst = max(failures, key=lambda failure: failure[0])
     kind = type(worst) if isinstance(worst, LipMotionError) else LipMotionError
     raise kind(f"{len(failures)} of {len(jobs)} recordings were not animated, {speech} for one") from worst
-
-
-def _check_named(recordings: Sequence[Path]) -> None:
-    """Raise InputError where a recording has no name for a file in a folder."""
-    for recording in recordings:
-        if is_pipe(recording):
-            raise InputError(
-                f"{recording}: what comes through a pipe has no name for a file in a folder; give it alone, with "
-                "the name of a file: -o FILE.json"
-            )

@@ -20,9 +20,6 @@ SAME_SIGNAL_S = 1.0
 """A second signal ends the program at once; within this time it counts as the first one, sent again by a launcher."""
 
 
-def _print_nothing(*_: object) -> None: ...
-
-
 class Stopped(KeyboardInterrupt):
     """A signal was received.
 
@@ -81,8 +78,8 @@ class Stopper:
         self._since_s = now_s
         if not self._settled:
             self.code = 128 + number
-            sys.excepthook = _print_nothing  # code that swallows an exception may print it
-            sys.unraisablehook = _print_nothing
+            sys.excepthook = lambda *_: None  # code that swallows an exception may print it
+            sys.unraisablehook = lambda _: None
             raise Stopped
 
 

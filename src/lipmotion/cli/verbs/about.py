@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lipmotion.cli.arguments.declared import add_input, add_output
 from lipmotion.cli.arguments.options import add_machine_readable
@@ -63,15 +63,12 @@ def list_model_citations(header: Mapping[str, Any]) -> str:
     return list_engine_citations(str(header.get("engine")), *keys, owners=others)
 
 
-if TYPE_CHECKING:
-    Verbs = argparse._SubParsersAction[argparse.ArgumentParser]
-
 SHELLS = ("bash", "zsh", "fish", "powershell")
 OF_PRIOR = ("engine", "corpus", "split", "utterances", "minutes", "licence", "attribution")
 """What ``info`` prints of the model on which a model stands and which is part of its file."""
 
 
-def add_addon(verbs: Verbs) -> None:
+def add_addon(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb that writes the add-on for another program, as a file that it installs."""
     parser = verbs.add_parser("addon", help="write the add-on for Blender, which keys characters from motion files")
     parser.add_argument("program", metavar="PROGRAM", help="blender")
@@ -86,7 +83,7 @@ def _run_addon(options: argparse.Namespace) -> None:
     print_line(options.output)
 
 
-def add_cite(verbs: Verbs) -> None:
+def add_cite(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb that prints what to cite, as BibTeX."""
     parser = verbs.add_parser("cite", help="print what to cite, as BibTeX: lipmotion, an engine's papers, a corpus")
     what = "a model file, an engine, or a citation key; default: the model that ships with the package"
@@ -111,7 +108,7 @@ def _run_cite(options: argparse.Namespace) -> None:
         raise InputError(f"nothing to cite is called {name!r}; give a model file, or one of: {known}")
 
 
-def add_completion(verbs: Verbs) -> None:
+def add_completion(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb that prints the script by which a shell completes the command line."""
     parser = verbs.add_parser("completion", help="print the script by which a shell completes verbs and options")
     parser.add_argument("shell", choices=SHELLS, help="bash and zsh: eval it; fish: | source")
@@ -140,7 +137,7 @@ def _complete_files(parser: argparse.ArgumentParser) -> None:
             action.complete = shtab.FILE  # type: ignore[attr-defined] # where shtab looks for it
 
 
-def add_doctor(verbs: Verbs) -> None:
+def add_doctor(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb that prints what is installed, what is missing, and whether the main path works."""
     parser = verbs.add_parser("doctor", help="print what is installed, what missing parts would bring, and what fails")
     add_machine_readable(parser)
@@ -164,7 +161,7 @@ def _run_doctor(options: argparse.Namespace) -> None:
         report.finish("all that is needed works", broken=broken)
 
 
-def add_info(verbs: Verbs) -> None:
+def add_info(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb that prints the header of a model, or its decision trees."""
     parser = verbs.add_parser("info", help="print what a model is, and whose recordings it was trained on")
     add_input(parser, "model", what="model", nargs="?", help="default: the model that ships with the package")

@@ -62,21 +62,15 @@ def add_words(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 def run_words(options: argparse.Namespace) -> None:
     """Recognise words; print them, or the paths of the files that were written."""
-    from lipmotion.pipeline.analysis.language import (
-        check_word_outputs,
-        describe_words,
-        format_words,
-        recognise_words,
-        write_words,
-    )
+    from lipmotion.pipeline.analysis import language
 
     with report_progress(options) as report:
-        paths = check_word_outputs(options.output, options.speech)
+        paths = language.check_word_outputs(options.output, options.speech)
         request = Request(options.speech, recogniser=options.recogniser)
-        recognition = recognise_words(request, model=options.model, workers=count_workers(options))
-        write_words(recognition.words, paths)
+        recognition = language.recognise_words(request, model=options.model, workers=count_workers(options))
+        language.write_words(recognition.words, paths)
         report.finish(
-            "\n".join(map(str, options.output)) or format_words(recognition.words).removesuffix("\n"),
-            words=describe_words(recognition.words),
+            "\n".join(map(str, options.output)) or language.format_words(recognition.words).removesuffix("\n"),
+            words=language.describe_words(recognition.words),
             confidence=round(recognition.confidence or 0.0, 3),
         )

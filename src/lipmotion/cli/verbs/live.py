@@ -99,19 +99,14 @@ def _in_time(pieces: Iterator[Any]) -> Iterator[Any]:
 
 
 def _listen(device: str, rate_hz: int) -> Iterator[Any]:
-    """Yield the sound of a microphone; where it is unplugged, wait until it is back.
-
-    Raises MissingDependencyError: sounddevice is not installed. InputError: there is no such microphone.
-    """
+    """Yield the sound of a microphone; where it is unplugged, wait until it is back."""
     if is_recording(Path(device)):
         raise InputError(f"{device}: no such file; give a recording, the name of a microphone, or -")
     try:
         import sounddevice
     except (ImportError, OSError) as error:
-        raise MissingDependencyError(
-            f"{device + ' is no file, and ' if device else ''}a microphone needs sounddevice, and PortAudio ({error}); "
-            "pip install sounddevice, or give a FILE or -"
-        ) from error
+        why = f"{device + ' is no file, and ' if device else ''}a microphone needs sounddevice, and PortAudio ({error})"
+        raise MissingDependencyError(f"{why}; pip install sounddevice, or give a FILE or -") from error
     chosen: str | int | None = int(device) if device.isdecimal() else device or None
     opened = False
     while True:

@@ -20,7 +20,7 @@ from lipmotion.speech.recognition.recogniser import open_recogniser
 from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.storage.files import atomic_file, check_distinct, check_target
 from lipmotion.storage.json_text import as_json
-from lipmotion.types import Audio, Span, TimedTranscript, TimedWord, Timeline, TranscriptLine
+from lipmotion.types import Audio, TimedTranscript, TimedWord, Timeline, TranscriptLine
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
 from lipmotion.units.ipa_phones import read_tokens
 from lipmotion.units.lexicon import detect_language, is_english
@@ -63,11 +63,7 @@ def resolve_language(request: Request) -> Request:
 
 
 def _detect_language(request: Request, transcript: TimedTranscript | None) -> str:
-    """Return the language of a request that names none; a warning says which.
-
-    Without a transcript: ``AUTO``, where it is not English; English also where it is not known, as without the option.
-    Raises InputError: that of a transcript is not known.
-    """
+    """Return the language of a request that names none, which a warning tells; ``AUTO``: it is not English."""
     if transcript is not None and request.units is None:
         language = detect_language(transcript.words)
         if not language:
@@ -75,13 +71,10 @@ def _detect_language(request: Request, transcript: TimedTranscript | None) -> st
         LOG.warning("the transcript is taken for %s; --language says otherwise", LANGUAGES[language].name)
         return language
     english = detect_english(read_recording(request))
-    LOG.warning(
-        {
-            True: "the speech is taken for English; --language says otherwise",
-            False: "the speech is not English, in which language it is is not known; give it with --language",
-            None: "the language of the speech is not known, English is assumed; give it with --language",
-        }[english]
-    )
+    found = "language of the speech is not known, English is assumed"
+    if english is not None:
+        found = f"speech is {'taken for' if english else 'not'} English"
+    LOG.warning("the %s; --language says which it is", found)
     return AUTO if english is False else ENGLISH
 
 
@@ -112,11 +105,8 @@ def warn_of_another_language(recognition: Recognition) -> None:
     """Log a warning where English words were recognised in what is hardly English."""
     confidence = weigh_words(recognition)
     if recognition.word_s >= MIN_TOLD_S and confidence < MIN_CONFIDENCE:
-        LOG.warning(
-            "the words are hardly understood (confidence %.2f, required %.1f): the speech may not be English, then "
-            "give its language (--language es, fr, de, ...); or it is noisy, then give its words (--transcript)",
-            *(confidence, MIN_CONFIDENCE),
-        )
+        unsure = f"the words are hardly understood (confidence {confidence:.2f}, required {MIN_CONFIDENCE:.1f})"
+        LOG.warning("%s: give their --language, if it is not English, or the words (--transcript)", unsure)
 
 
 TEXT, JSON = ".txt", ".json"
@@ -165,12 +155,9 @@ def format_words(words: Timeline[RecognisedWord]) -> str:
 
 def describe_words(words: Timeline[RecognisedWord]) -> list[dict[str, Any]]:
     """Return words for JSON: ``word``, ``start`` and ``end`` in seconds, and the confidence ``conf``, as Vosk's."""
-
-    def describe(span: Span[RecognisedWord]) -> dict[str, Any]:
-        times = {"start": round(span.start_s, 3), "end": round(span.end_s, 3)}
-        return {"word": span.label.text, **times, "conf": round(span.label.confidence, 3)}
-
-    return [describe(span) for span in words]
+    times = [{"start": round(span.start_s, 3), "end": round(span.end_s, 3)} for span in words]
+    labels = [span.label for span in words]
+    return [{"word": w.text, **t, "conf": round(w.confidence, 3)} for w, t in zip(labels, times, strict=True)]
 
 
 def write_words(words: Timeline[RecognisedWord], paths: Sequence[Path]) -> None:

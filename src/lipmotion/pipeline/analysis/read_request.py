@@ -45,8 +45,7 @@ def read_request(request: Request, *, words_beside: bool = False, is_typed: bool
         from lipmotion.formats.label_files import find_labels
 
         labels = find_labels(request.recording)
-        if labels is not None:
-            transcript, units = labels.transcript, labels.phones if labels.transcript is None else None
+        transcript, units = labels.transcript, labels.phones if labels.transcript is None else None
     return replace(
         request,
         transcript=transcript,

@@ -403,8 +403,7 @@ def _follow_units(
 ) -> tuple[Timeline[Unit], TranscriptFit | None]:
     """Return the given phones of a request, completed, and how well they fit; None: they were not compared.
 
-    Given phones are followed, right or wrong. Spans of unknown phones have those of their word, aligned in them, or
-    else what is recognised; so have stretches that the phones leave open, where a phone recogniser hears speech.
+    Unknown phones are those of their word, aligned, or recognised; so are stretches left open in which speech is heard.
     """
     from lipmotion.pipeline.analysis.transcribe import compute_phone_posteriors, warn_of_label_misfit
     from lipmotion.speech.recognition.agreement import label_fit
@@ -486,10 +485,7 @@ def _cut_phones(units: Timeline[Unit], start_s: float, end_s: float) -> list[Spa
 def _check_units(units: Timeline[Unit], duration_s: float) -> None:
     """Raise InputError if given units are empty or too many; log a warning if they end after the recording."""
     if not len(units):
-        raise InputError(
-            "the units are an empty list (a .csv has none); give those of a .json, .npz or label file, or leave "
-            "them out"
-        )
+        raise InputError("the units are an empty list, as of a .csv; give those of another file, or leave them out")
     check_phones(len(units), duration_s)
     first_s, last_s, end_s = units[0].start_s, units[-1].start_s, units[-1].end_s
     if duration_s <= first_s <= LATEST_S:
@@ -502,8 +498,5 @@ def _check_units(units: Timeline[Unit], duration_s: float) -> None:
         guess = f"their times in {unit}, where seconds are required" if unit else "they those of another recording"
         LOG.warning("the units go on to %.2f s, the recording ends at %.2f s: are %s?", end_s, duration_s, guess)
     elif len(spoken_s) >= MIN_TIMED and spoken_s[len(spoken_s) // 2] < SHORTEST_PHONE_S:
-        LOG.warning(
-            "the units last %.1f ms each and end at %.2f s of %.2f s, faster than anybody speaks: are their times in "
-            "seconds?",
-            *(1000 * spoken_s[len(spoken_s) // 2], end_s, duration_s),
-        )
+        pace = f"the units last {1000 * spoken_s[len(spoken_s) // 2]:.1f} ms each, {end_s:.2f} of {duration_s:.2f} s"
+        LOG.warning("%s, faster than anybody speaks: are their times in seconds?", pace)

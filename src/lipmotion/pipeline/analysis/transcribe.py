@@ -85,10 +85,7 @@ def transcribe(
         words = leave_out_late_lines(words, audio.duration_s)
     spoken = words.words if isinstance(words, TimedTranscript) else words or ()
     if is_other_language(spoken, lexicon):
-        LOG.warning(
-            "the transcript seems not to be English: its words are read by English rules, and the lips will be wrong; "
-            "give its language (--language)"
-        )
+        LOG.warning("the transcript is read by English rules, but seems not to be English; give its --language")
     else:
         warn_of_guesses(spoken, lexicon)
     is_heard = not isinstance(lexicon, LanguageLexicon) and uses_network(phones.kind)
@@ -138,12 +135,10 @@ def compute_phone_posteriors(audio: AnalysedAudio) -> tuple[NDArray[np.float64],
 
 
 def _compare(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> TranscriptEvidence:
-    """Return evidence of a transcript that is wrong somewhere, compared with what is recognised.
+    """Return evidence of a transcript that is wrong somewhere, compared with what is recognised (``_match_words``).
 
-    Words are said, and there, where recognition finds most of their phones; words that were doubted together, if it
-    finds all of them, or before and after one or two of which it does not. Where it finds nothing, nothing is missing.
-    Short words that are left out go unnoticed by themselves, for their neighbours are stretched over them: once a
-    transcript is known to leave out something, recognised phones between those of its words are more of it.
+    Where nothing is recognised, nothing is missing. Neighbours are stretched over short words that are left out: so,
+    once something is known to be missing, recognised phones between those of the words are more of it.
     """
     spans = [span for span in recognised if not is_silent(span.label.phone)]
     words, taken = _match_words(evidence, spans)
@@ -165,7 +160,10 @@ def _compare(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> Transc
 
 
 def _match_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> tuple[list[WordEvidence], set[int]]:
-    """Return the words of ``_compare``, those that are found with the times that they have there, and their phones."""
+    """Return the words, said or not, with the times at which most of their phones are found, and these phones.
+
+    Words that were doubted together are said if all their phones are found, or lie before and after those that are not.
+    """
     words, phones = list(evidence.words), [span.label.phone for span in spans]
     wanted = [(number, phone) for number, word in enumerate(words) for phone in word.phones]
     matcher = SequenceMatcher(None, [phone for _, phone in wanted], phones, autojunk=False)
@@ -202,8 +200,7 @@ def _select_recognised(
 ) -> list[list[Span[Unit]]]:
     """Return the recognised phones where something else is said than the transcript has, by words.
 
-    Whole words count by their middle, half of the way to the words beside them. Phones without words do from the last
-    one on that may be the end of the word before, to the first one that may be the beginning of the word after.
+    Words count by their middle; single phones between what may be the end of one word and the beginning of another.
     """
     if other.start_s == other.end_s:
         return []
@@ -286,26 +283,19 @@ def warn_of_misfit(fit: TranscriptFit, corrected: bool = False) -> None:
         if fit.evidence is not None:
             count = sum(word.is_said for word in fit.evidence.words)
             why = f"{count} of its {len(fit.evidence.words)} words are heard"
-        LOG.warning(
-            "the transcript seems not to be what is said (%s)%s; %scheck it, or leave it out",
-            *(why, f" or to leave out words {places}" if fit.missing else ""),
-            "the sound is recognised instead: " if corrected else "",
-        )
+        also = f" or to leave out words {places}" if fit.missing else ""
+        done = "the sound is recognised instead: " if corrected else ""
+        LOG.warning("the transcript seems not to be what is said (%s)%s; %scheck it, or leave it out", why, also, done)
         return
     if fit.unsaid:
-        words = [f"{shorten(word.word)!r} at {word.start_s:.1f} s" for word in fit.unsaid[:MAX_STRETCHES]]
+        words = ", ".join(f"{shorten(word.word)!r} at {word.start_s:.1f} s" for word in fit.unsaid[:MAX_STRETCHES])
         more = len(fit.unsaid) - MAX_STRETCHES
-        LOG.warning(
-            "the transcript seems to have words that are not said: %s%s%s; correct it",
-            *(", ".join(words), f" and {more} more" if more > 0 else ""),
-            ", which are left out" if corrected else "",
-        )
+        words += f" and {more} more" if more > 0 else ""
+        done = ", which are left out" if corrected else ""
+        LOG.warning("the transcript seems to have words that are not said: %s%s; correct it", words, done)
     if fit.missing:
         done = "what is said there is recognised" if corrected else "the lips are wrong there"
-        LOG.warning(
-            "the transcript seems to leave out words %s: %s; add the words, or leave the whole transcript out",
-            *(places, done),
-        )
+        LOG.warning("the transcript seems to leave out words %s: %s; add them, or give no transcript", places, done)
 
 
 def warn_of_label_misfit(fit: TranscriptFit, filled: bool) -> None:

@@ -109,7 +109,6 @@ def _read_words(line: BatchLine, request: Request) -> tuple[str, ...]:
     return split_written_words(text) if text.strip() else ()
 
 
-STAGE = "checking"
 PAUSE_S, LETTERS_PER_S = 0.3, 15.0  # how long words take: so long, and so many letters a second more
 SHORT, LONG, LONGER_S = 0.5, 2.0, 1.0
 """A recording is too short or too long for its words below and above these shares of what they take; the last is how
@@ -174,7 +173,7 @@ def check(
         with open_local_pool(processes) as pool:
             for each in pool(partial(check_line, request=job.request), lines):
                 checked[each.name] = each
-                monitor(Progress(STAGE, len(checked), len(lines), len(checked) / len(lines)))
+                monitor(Progress("checking", len(checked), len(lines), len(checked) / len(lines)))
     except WorkerDiedError as error:
         raise CorpusError(f"a process that listened to recordings died ({error}); run it with --jobs 1") from error
     in_order = [checked[line.name] for line in lines]

@@ -58,9 +58,7 @@ def check_job(job: Job) -> None:
         raise InputError(f"the job of a batch has {used!r}, which belongs to one recording; leave it out")
     for name in ("lexicon", "onto"):
         if not isinstance(getattr(job.request, name), Path | None):
-            raise InputError(
-                f"the job of a batch has a value as {name!r}, required a file, whose content can be compared"
-            )
+            raise InputError(f"the job of a batch has a value as {name!r}, required a file: its content is compared")
 
 
 def fingerprint_job(job: Job) -> str:
@@ -301,9 +299,8 @@ class Ledger:
             self._file.write(content)
             self._file.flush()
         except OSError as error:
-            raise ExportError(
-                f"{self._path}: cannot be written: {error.strerror or error}; make room, then run it again"
-            ) from error
+            why = error.strerror or error
+            raise ExportError(f"{self._path}: cannot be written: {why}; make room, then run it again") from error
         self._last[_key(record["name"])] = record["fingerprint"], start
 
     def kept(self, line: BatchLine, of_settings: str, out: Path) -> Record | None:

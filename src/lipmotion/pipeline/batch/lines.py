@@ -28,6 +28,7 @@ LARGEST_LIST_BYTES, MAX_LINES = 1 << 27, 200_000
 """Maximum bytes of a list, and lines of a batch: the words of a very long game."""
 LONGEST_PART_BYTES = 255  # maximum bytes of the name of a file or a folder, on usual file systems
 MAX_NAMED_LINES = 3
+RENAME = "give another name in a column 'output' of the list, or rename the recording"
 CONTROL = re.compile(r"[\x00-\x1f]")
 
 
@@ -91,46 +92,29 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
     for line in lines:
         if CONTROL.search(line.name + line.recording):
             raise InputError(f"{line.recording!r}, {line.name!r}: control characters in a name; rename the recording")
-        path = PurePosixPath(line.name)
+        path, output = PurePosixPath(line.name), f"{line.recording}: the output {line.name!r}"
         is_inside = path.name and not path.is_absolute() and ".." not in path.parts
         if not is_inside or str(path) != line.name or any(part.startswith(".") for part in path.parts):
-            raise ExportError(
-                f"{line.recording}: the output {line.name!r} lies outside the folder of the outputs, or is hidden; "
-                "give a relative name without '..' and '//' and without names that begin with a dot"
-            )
+            required = "required a relative name without '..', '//' and leading dots"
+            raise ExportError(f"{output} lies outside the folder of the outputs, or is hidden; {required}")
         device = next((part for part in (*path.parts[:-1], f"{path.name}.x") if make_portable(part) != part), None)
         if device is not None:
-            raise ExportError(
-                f"{line.recording}: the output {line.name!r} has a name that Windows keeps for a device, or that ends "
-                "with a dot or a blank; rename the recording, or give another name in a column 'output' of the list"
-            )
+            raise ExportError(f"{output} is called as a device of Windows, or ends with a dot or a blank; {RENAME}")
         for folder in path.parents[:-1]:
             folders[file_key(str(folder))] = line.recording
         for kind in kinds:
             file = f"{line.name}.{kind}"
             if any(len(os.fsencode(part)) > LONGEST_PART_BYTES for part in file.split("/")):
-                raise ExportError(
-                    f"{line.recording}: the output {shorten(file)!r} has a part of more than {LONGEST_PART_BYTES} "
-                    "bytes; give a shorter name in a column 'output' of the list"
-                )
+                raise ExportError(f"{output}: a part of its name has more than {LONGEST_PART_BYTES} bytes; {RENAME}")
             other = next((each for each in longer[kind] if file.lower().endswith(each)), None)
             if other is not None:
-                raise ExportError(
-                    f"{line.recording}: the output {file!r} would be called as {other} and hold {kind}; give "
-                    f"{other[1:]} as the kind, or another name in a column 'output' of the list"
-                )
+                raise ExportError(f"{output} would be a {other} by its name; give {other[1:]} as the kind, or {RENAME}")
             key = file_key(file)
             if key in taken:
-                raise ExportError(
-                    f"{line.name}.{kind}: would be written for {taken[key]} and for {line.recording}; rename one of "
-                    "them, or name the outputs in a column 'output' of the list"
-                )
+                raise ExportError(f"{file}: would be written for {taken[key]} and for {line.recording}; {RENAME}")
             taken[key] = line.recording
     for key in folders.keys() & taken.keys():
-        raise ExportError(
-            f"{key}: would be written for {taken[key]}, and be the folder of the output of {folders[key]}; give one of "
-            "them another name in a column 'output' of the list"
-        )
+        raise ExportError(f"{key}: a file for {taken[key]} would be the folder of {folders[key]}; {RENAME}")
 
 
 def file_key(name: str) -> str:
@@ -187,14 +171,10 @@ def _read_table(source: Path, text: str) -> list[dict[str, str]] | None:
     rows = []
     for number, cells in cells_of:
         if len(cells) > len(header):
-            raise InputError(
-                f"{source}, row {number}: {len(cells)} columns, required at most the {len(header)} of the header; put "
-                "texts with commas into quotes"
-            )
+            found = f"{len(cells)} columns, required at most the {len(header)} of the header"
+            raise InputError(f"{source}, row {number}: {found}; put texts with commas into quotes")
         row = {name: cell.strip() for name, cell in zip(header, cells, strict=False)}
         if not row.get(file):
-            raise InputError(
-                f"{source}, row {number}: no recording in the column {file!r}; fill it in, or remove the row"
-            )
+            raise InputError(f"{source}, row {number}: no recording in the column {file!r}; fill it in, or remove it")
         rows.append({"file": row[file]} | {name: row.get(name, "") for name in COLUMNS})
     return rows

@@ -52,11 +52,11 @@ from lipmotion.pipeline.job import Job, check_outputs, open_face, run, write_out
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.output import ShownFace
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.workers import ItemT, Pool, ResultT, WorkerDiedError, cluster_pool, open_workers, process_count
+from lipmotion.pipeline.workers import ItemT, ResultT, WorkerDiedError, cluster_pool, open_workers, process_count
 from lipmotion.storage.files import check_target, confine, make_folder, put_in_place, remove
 from lipmotion.storage.locks import open_temporary
 from lipmotion.storage.sources import Source, check_apart, hash_file
-from lipmotion.types import SPEECH_RATE_HZ, Audio, Generation, Span, Timeline, Unit
+from lipmotion.types import SPEECH_RATE_HZ, Audio, Generation, ParallelMap, Span, Timeline, Unit
 from lipmotion.types.progress import Item, Monitor, Progress, silent_monitor
 from lipmotion.units import Lexicon
 from lipmotion.units.phone_timelines import group_words
@@ -260,8 +260,8 @@ def check_line_job(job: Job, of_run: str) -> None:
 
 
 @contextmanager
-def open_local_pool(jobs: int) -> Iterator[Pool]:
-    """Give a pool of processes on this machine; with one job, this process itself."""
+def open_local_pool(jobs: int) -> Iterator[ParallelMap]:
+    """Give a map in processes here (one job: in this one) whose results come as they are ready."""
 
     def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
         with open_workers(jobs) as workers:
@@ -402,10 +402,8 @@ def _find_finished(
         if approved is not None and not are_same_inputs(line, approved):
             outdated.append(line.name)
     if outdated:
-        LOG.warning(
-            "%d approved lines have another recording or other words now, and are kept: %s; mark them redo",
-            *(len(outdated), _some(outdated)),
-        )
+        changed = "another recording or other words now, and are kept"
+        LOG.warning("%d approved lines have %s: %s; mark them redo", len(outdated), changed, _some(outdated))
     return finished
 
 
@@ -413,7 +411,7 @@ def _some(names: Sequence[str]) -> str:
     return ", ".join(map(shorten, names[:MAX_NAMED_LINES])) + ", ..." * (len(names) > MAX_NAMED_LINES)
 
 
-def _finish_lines(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, None, None]:
+def _finish_lines(each: ParallelMap, waiting: Sequence[LineWork]) -> Generator[Record, None, None]:
     """Yield the record of every line. Where a worker dies, the lines go on that it had; one that kills again fails."""
     left, deaths = {work.line.name: work for work in waiting}, 0
     while left:
@@ -426,10 +424,8 @@ def _finish_lines(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, 
             deaths += 1
             suspects = [work for work in left.values() if work.place.work(work.line.name).is_dir()]
             if not suspects and deaths >= MAX_DEATHS:
-                raise CorpusError(
-                    f"the worker processes die before they begin ({error}); is there enough memory? what is finished "
-                    "is kept: run it again, with fewer --jobs"
-                ) from error
+                died = f"the worker processes die before they begin ({error}), perhaps for want of memory"
+                raise CorpusError(f"{died}; what is finished is kept: run it again, with fewer --jobs") from error
             for work in suspects:
                 del left[work.line.name]
                 try:

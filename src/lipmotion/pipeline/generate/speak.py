@@ -54,35 +54,26 @@ def speak_from_corpus(
     """
     engine, request = model.engine, request or Request()
     if not isinstance(engine, SelectsRecordings):
-        raise InputError(
-            f"a model of the engine {engine.name!r} has no recordings to speak with; train one: --engine selection"
-        )
+        raise InputError(f"the engine {engine.name!r} has no recordings to speak with; train one: --engine selection")
     names = engine.recordings(model.learned)
     known = set(corpus.names())
     missing = [name for name in names if name not in known]
     if missing:
-        raise InputError(
-            f"the corpus {corpus.path} lacks {len(missing)} of {len(names)} recordings of the model, {missing[0]} "
-            "among them; give the corpus that it was trained on"
-        )
+        lacks = f"lacks {len(missing)} of {len(names)} recordings of the model, as {missing[0]}"
+        raise InputError(f"the corpus {corpus.path} {lacks}; give the corpus that it was trained on")
     target = _plan_phones(text, read_lexicon(request), engine, model)
     utterances = {name: corpus.utterance(name) for name in names}
     people = sorted({utterance.speaker for utterance in utterances.values()})
     if len(people) > 1:
-        raise InputError(
-            f"the model has recordings of {len(people)} people ({', '.join(people)}), whose voices cannot be joined; "
-            "train one on the recordings of a single person"
-        )
+        raise InputError(f"the model has recordings of {', '.join(people)}, required one person; train another model")
     recorded_features = {
         name: np.asarray(utterance.features.values)[:, :FEATURES] for name, utterance in utterances.items()
     }
     stand_ins = engine.stand_ins(model.learned)
     absent = dict.fromkeys(span.label.phone for span in target if span.label.phone in stand_ins)
     if absent:
-        LOG.warning(
-            "phones that the recordings do not have, and what is said instead: %s; see lipmotion corpus coverage",
-            ", ".join(f"{phone} ({stand_ins[phone]})" for phone in absent),
-        )
+        instead = ", ".join(f"{phone} ({stand_ins[phone]})" for phone in absent)
+        LOG.warning("phones without recordings, and what is said instead: %s; see lipmotion corpus coverage", instead)
     pieces, units = engine.source_pieces(model.learned, target, recorded_features)
     sounds = [np.asarray(utterances[piece.recording].audio.samples) for piece in pieces]
     rate_hz = utterances[names[0]].audio.rate_hz

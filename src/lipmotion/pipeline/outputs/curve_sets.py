@@ -172,10 +172,8 @@ def check_edit(edit: CurveEdit, motion: Motion, others: Collection[str] = ()) ->
         near = get_close_matches(edit.channel.lower(), lower, 1)
         name = shorten(repr(edit.channel)) + (f" (is it {lower[near[0]]}?)" if near else "")
         of_mouth = ", ".join(each for each in names if not LIP_POINT.match(each))
-        raise InputError(
-            f"cannot {verb} {name}; channels that can be pinned: {of_mouth}; lip points, as y_14; curves, as jawOpen, "
-            "viseme_PP, open_jaw"
-        )
+        known_curves = "lip points, as y_14; curves, as jawOpen, viseme_PP, open_jaw"
+        raise InputError(f"cannot {verb} {name}; channels that can be pinned: {of_mouth}; {known_curves}")
     last_s = (len(motion.values) - 1) / motion.rate_hz
     if isinstance(edit, Pin):
         find_pinned_frame(edit, len(motion.values), motion.rate_hz, is_weight=edit.channel in WEIGHTS)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -225,12 +224,11 @@ def measure_prosody(speech: str | Path | Audio) -> Prosody:
 
 
 def _prosody(sound: Audio) -> Prosody:
-    ratio = Fraction(SPEECH_RATE_HZ, int(sound.rate_hz))
     samples = sound.samples.astype(np.float32)
-    if ratio != 1:
+    if sound.rate_hz != SPEECH_RATE_HZ:
         from scipy.signal import resample_poly
 
-        samples = resample_poly(samples, ratio.numerator, ratio.denominator).astype(np.float32)
+        samples = resample_poly(samples, SPEECH_RATE_HZ, int(sound.rate_hz)).astype(np.float32)
     missing = max(WINDOW - len(samples), 0)
     return find_prosody(Audio(np.pad(samples, (0, missing)), SPEECH_RATE_HZ))
 

@@ -102,33 +102,22 @@ def with_common_channels(utterances: Sequence[Utterance]) -> list[Utterance]:
         return list(utterances)
     common = tuple(channel for channel in kinds[0] if all(channel in kind for kind in kinds))
     if not common:
-        raise CorpusError(
-            f"{len(kinds)} kinds of motion without a common channel: {'; '.join(map(names_of, kinds))}; train on one "
-            "kind at a time (--speaker), or give their channels the same names and units"
-        )
+        found = "; ".join(map(names_of, kinds))
+        raise CorpusError(f"{len(kinds)} kinds of motion without a common channel: {found}; train on one (--speaker)")
     left_out = sorted({channel.name for kind in kinds for channel in kind if channel not in common})
-    LOG.warning(
-        "%d kinds of motion: training on the %d channels that all have (%s); left out: %s",
-        *(len(kinds), len(common), names_of(common), printable(shorten(", ".join(left_out)))),
-    )
-    reduced = list(utterances)
-    for number, utterance in enumerate(utterances):
-        motion = utterance.track.motion
-        if motion.channels != common:
-            columns = [motion.channels.index(channel) for channel in common]
-            chosen = Motion(np.asarray(motion.values)[:, columns], motion.rate_hz, common)
-            reduced[number] = replace(utterance, track=replace(utterance.track, motion=chosen))
-    return reduced
+    counted = len(kinds), len(common), names_of(common), printable(shorten(", ".join(left_out)))
+    LOG.warning("%d kinds of motion: training on the %d channels that all have (%s); left out: %s", *counted)
+    names = [channel.name for channel in common]
+    motions = [utterance.track.motion.selected(names) for utterance in utterances]
+    return [replace(u, track=replace(u.track, motion=motion)) for u, motion in zip(utterances, motions, strict=True)]
 
 
 def _crops(utterance: Utterance) -> NDArray[np.uint8]:
     """Return the mouth pictures of an utterance. Raises CorpusError: it has none."""
     crops = utterance.track.crops
     if crops is None:
-        raise CorpusError(
-            f"{utterance.name}: no mouth pictures, which eigenlips need; prepare its video again without --no-crops, "
-            "or train with --visual geometry"
-        )
+        advice = "prepare its video again without --no-crops, or train with --visual geometry"
+        raise CorpusError(f"{utterance.name}: no mouth pictures, which eigenlips need; {advice}")
     return np.asarray(crops)
 
 

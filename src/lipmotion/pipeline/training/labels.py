@@ -6,15 +6,14 @@ import hashlib
 import json
 import logging
 import platform
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import astuple, replace
 from functools import partial
 from importlib import metadata
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.corpora import Corpus
 from lipmotion.engines import Engine
@@ -62,22 +61,16 @@ def warn_of_doubtful_transcripts(
         return
     for names, problem in ((wrong, "seem not to be what is said"), (short, "seem to leave out words that are said")):
         if names:
-            LOG.warning(
-                "%d of %d transcripts %s (%s): the model learns wrong lips from them; correct them, or remove them and "
-                "train again",
-                *(len(names), count, problem, _listed(names)),
-            )
+            counted = len(names), count, problem, _listed(names)
+            LOG.warning("%d of %d transcripts %s (%s), which teaches wrong lips; correct or remove them", *counted)
 
 
 def warn_of_missing_transcripts(utterances: Sequence[Utterance]) -> None:
     """Log a warning that names the utterances with neither words nor labelled phones, if others have them."""
     missing = [utterance.name for utterance in utterances if utterance.phones is None and not utterance.words]
     if 0 < len(missing) < len(utterances):
-        LOG.warning(
-            "%d of %d recordings have no transcript, or an empty one (%s): their phones are recognised, which is less "
-            "sure; write the words into a .txt beside each (docs/corpora.md)",
-            *(len(missing), len(utterances), _listed(missing)),
-        )
+        counted = len(missing), len(utterances), _listed(missing)
+        LOG.warning("%d of %d recordings have no transcript (%s): phones are recognised; add .txt files", *counted)
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -101,16 +94,16 @@ def label_utterances(
     """
     starts = range(0, len(utterances), UTTERANCES_PER_CHECKPOINT)
     blocks = [utterances[start : start + UTTERANCES_PER_CHECKPOINT] for start in starts]
-    stored = [checkpoint.load(f"labels-{number}") for number in range(len(blocks))]
+    stored = [checkpoint.load(f"phones-{number}") for number in range(len(blocks))]
     unlabelled = (block for block, arrays in zip(blocks, stored, strict=True) if arrays is None)
     # without mouth pictures, which take time to send to another process
     missing = [[replace(each, track=replace(each.track, crops=None)) for each in block] for block in unlabelled]
     labelled = iter(checkpoint.parallel_map(partial(_label_block, labeller=labeller), missing))
     done = 0
     for number, (block, arrays) in enumerate(zip(blocks, stored, strict=True)):
-        results = _from_arrays(arrays) if arrays is not None else next(labelled)
+        results = next(labelled) if arrays is None else list(map(_read_result, arrays["results"].tolist()))
         if arrays is None:
-            checkpoint.save(f"labels-{number}", _to_arrays(results))
+            checkpoint.save(f"phones-{number}", {"results": np.array(list(map(_write_result, results)))})
         for utterance, phones in zip(block, results, strict=True):
             if isinstance(phones, str):
                 monitor(Item(utterance.name, "skipped", phones))
@@ -130,27 +123,14 @@ def _label_block(utterances: Sequence[Utterance], labeller: Labeller) -> list[Ph
     return results
 
 
-def _to_arrays(results: Sequence[PhonesOrReason]) -> dict[str, NDArray[Any]]:
-    """Serialise the labels of a block: counts of spans (-1: none), reasons, times in seconds, labels."""
-    spans = [span for phones in results if not isinstance(phones, str) for span in phones]
-    labels = [span.label for span in spans]
-    return {
-        "counts": np.array([-1 if isinstance(phones, str) else len(phones) for phones in results]),
-        "problems": np.array([phones if isinstance(phones, str) else "" for phones in results]),
-        "times": np.array([(span.start_s, span.end_s) for span in spans]).reshape(-1, 2),
-        "labels": np.array([(label.phone, label.unit, label.word) for label in labels], np.str_).reshape(-1, 3),
-    }
+def _write_result(phones: PhonesOrReason) -> str:
+    rows = phones if isinstance(phones, str) else [(each.start_s, each.end_s, *astuple(each.label)) for each in phones]
+    return json.dumps(rows, default=float)
 
 
-def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> list[PhonesOrReason]:
-    spans = iter(
-        Span(start_s, end_s, Unit(*label))
-        for (start_s, end_s), label in zip(arrays["times"].tolist(), arrays["labels"].tolist(), strict=True)
-    )
-    return [
-        reason if count < 0 else Timeline(tuple(next(spans) for _ in range(count)))
-        for count, reason in zip(arrays["counts"].tolist(), arrays["problems"].tolist(), strict=True)
-    ]
+def _read_result(text: str) -> PhonesOrReason:
+    rows = json.loads(text)
+    return rows if isinstance(rows, str) else Timeline(tuple(Span(a, b, Unit(*label)) for a, b, *label in rows))
 
 
 PICTURES = "crops.npy"  # file of the mouth pictures of an utterance: large, and needed for eigenlips only

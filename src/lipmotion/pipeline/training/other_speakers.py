@@ -126,10 +126,7 @@ def align_recordings(
             is_any_transcribed = True
             foreign = [word for word in words or () if not word.isascii() and not lexicon.known(word)]
             if foreign and labels.phones is None:  # what other languages do with their letters is no guide to English
-                raise InputError(
-                    f"no pronunciation of {shorten(foreign[0])!r}; required English words, or a lexicon file with the "
-                    "others"
-                )
+                raise InputError(f"no pronunciation of {shorten(foreign[0])!r}, required English words, or a lexicon")
             audio = read_audio(path)
             if labels.phones is None:
                 units = align_or_recognise(phones, audio, analysed(audio).mfcc(), words, lexicon)
@@ -137,10 +134,8 @@ def align_recordings(
                 units = labels.phones.between(0, audio.duration_s)
             score = score_agreement(audio, units)
             if score < DOUBTFUL_SCORE:
-                raise InputError(
-                    f"its transcript seems not to be what is said (its phones agree with the sound at {score:.1f}, "
-                    f"required {DOUBTFUL_SCORE} or more); check it"
-                )
+                found = f"its phones agree with the sound at {score:.1f}, required {DOUBTFUL_SCORE} or more"
+                raise InputError(f"its transcript seems not to be what is said ({found}); check it")
             yield SpokenSentence(name, speaker, audio, units)
         except (AlignmentError, InputError) as error:
             monitor(Item(name, "skipped", str(error)))

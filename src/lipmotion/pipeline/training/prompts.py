@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -11,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from lipmotion.corpora import Corpus, read_entry
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import read_plain_text
 from lipmotion.units import SILENCE, VISEME_OF, Lexicon, is_silent, split_words
 
-SHIPPED = "english.txt"
 PHONE, DIPHONE, CONTEXT = "phone", "diphone", "beside"
 WEIGHTS = {PHONE: 8.0, DIPHONE: 2.0, CONTEXT: 1.0}
 """Weight of the first occurrence of each kind of unit: a phone; a phone after a phone; a phone beside a viseme class.
@@ -62,7 +61,7 @@ def prompts(
     have    : a corpus whose units count as covered; its utterances without words or phones are ignored
     lexicon : pronunciations of words, ahead of those of the dictionary
     Raises InputError: no such file, no sentence that can be used, or a count under 1.
-    Source: greedy weighted set cover (Chvátal 1979), gains recomputed only where they may matter (Minoux 1978).
+    Source: greedy weighted set cover (Chvátal 1979).
     """
     if count < 1:
         raise InputError(f"{count} prompts asked for, required at least 1")
@@ -102,23 +101,17 @@ def cover_greedily(
 
     sets    : elements of each set, as indices into ``weights``
     weights : of each element [shape=(E,)]; set to 0 for the elements that are covered
-    The gain of a set never increases, so a set that is still first after its gain was recomputed is the best of all.
     """
-    queue = [
-        (-float(weights[elements].sum()) / cost, i) for i, (elements, cost) in enumerate(zip(sets, costs, strict=True))
-    ]
-    heapq.heapify(queue)
+    ends = np.cumsum([0, *map(len, sets)])
+    holds = csr_array((np.ones(ends[-1]), np.concatenate(sets), ends), (len(sets), len(weights)))
     taken: list[int] = []
-    while queue and len(taken) < count:
-        _, i = heapq.heappop(queue)
-        recomputed = (-float(weights[sets[i]].sum()) / costs[i], i)
-        if queue and recomputed > queue[0]:
-            heapq.heappush(queue, recomputed)
-        elif recomputed[0] == 0:
+    while len(taken) < count:
+        gains = holds @ weights / np.array(costs)
+        best = int(gains.argmax())
+        if not gains[best]:
             break
-        else:
-            taken.append(i)
-            weights[sets[i]] = 0
+        taken.append(best)
+        weights[sets[best]] = 0
     return taken
 
 
@@ -133,7 +126,7 @@ def pronounce_sentences(text: str | Path | None, lexicon: Lexicon) -> tuple[dict
     lexicon : pronunciations of words; the first one of each word is taken
     Raises InputError: no such file, or no sentence that can be used.
     """
-    path = Path(text) if text is not None else Path(str(resources.files("lipmotion") / "prompts" / SHIPPED))
+    path = Path(text) if text is not None else Path(str(resources.files("lipmotion") / "prompts" / "english.txt"))
     usable: dict[str, tuple[str, ...]] = {}
     left_out: dict[str, str] = {}
     lines = (" ".join(line.split()) for line in read_plain_text(path).splitlines())

@@ -25,19 +25,7 @@ from lipmotion.motion.space import resample_track
 from lipmotion.motion.speaker_estimation import add_habits, map_to_mean_person
 from lipmotion.pipeline.analysis.transcribe import align_or_recognise, warn_of_guesses
 from lipmotion.pipeline.model import GEOMETRY, Model, load_model, with_prior
-from lipmotion.pipeline.training.channels import (
-    check_visual,
-    train_eigenlips,
-    with_common_channels,
-    with_sound_inputs,
-    with_visual_channels,
-)
-from lipmotion.pipeline.training.labels import (
-    fingerprint_training,
-    label_utterances,
-    warn_of_doubtful_transcripts,
-    warn_of_missing_transcripts,
-)
+from lipmotion.pipeline.training import channels, labels
 from lipmotion.pipeline.training.other_speakers import SpokenSentence
 from lipmotion.pipeline.workers import open_training
 from lipmotion.speech.features.f0 import log_f0
@@ -155,7 +143,7 @@ def train(  # noqa: PLR0913
     >>> model.engine.name, len(report.used)
     ('trajectory', 1)
     """
-    check_visual(visual)
+    channels.check_visual(visual)
     if run.work is not None:
         check_apart((), [Source(corpus.path, "corpus")], folders=[run.work])
     if prior is not None and prior.prior is not None:
@@ -166,9 +154,10 @@ def train(  # noqa: PLR0913
     recogniser = recogniser or HmmConfig()
     speech_examples = list(list_motionless(engine, voices, run.monitor))
     utterances = [corpus.utterance(name) for name in chosen]
-    eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
-    utterances = with_common_channels([with_visual_channels(each, visual, eigenlips) for each in utterances])
-    job = fingerprint_training(corpus, chosen, engine, recogniser, lexicon, visual, prior) if run.work else ""
+    eigenlips = channels.train_eigenlips(utterances) if visual != GEOMETRY else None
+    seen = [channels.with_visual_channels(each, visual, eigenlips) for each in utterances]
+    utterances = channels.with_common_channels(seen)
+    job = labels.fingerprint_training(corpus, chosen, engine, recogniser, lexicon, visual, prior) if run.work else ""
     with open_training(run.workers, len(chosen)) as each:
         checkpoint = Checkpoint(run.work, job, each)
         monitor = sub_monitor(run.monitor, 0, 0.5)
@@ -178,7 +167,7 @@ def train(  # noqa: PLR0913
         several = len(set(filter(None, people))) > 1
         examples, speakers = map_to_mean_person(examples, people) if several else (examples, None)
         sound = {utterance.name: utterance.audio for utterance in utterances}
-        examples = with_sound_inputs(engine, examples, sound, sub_monitor(run.monitor, 0.5, 0.6), each)
+        examples = channels.with_sound_inputs(engine, examples, sound, sub_monitor(run.monitor, 0.5, 0.6), each)
         examples = [replace(example, speech=with_prior(prior, example.speech)) for example in examples]
         learning = sub_monitor(run.monitor, 0.6, 1, "learning motion: ")
         fit = engine.fit([*examples, *speech_examples], learning, checkpoint)
@@ -209,9 +198,9 @@ def fit_phones(
     examples: list[Example] = []
     skipped: dict[str, str] = {}
     labelled: list[tuple[Utterance, Timeline[Unit]]] = []
-    warn_of_missing_transcripts(utterances)
+    labels.warn_of_missing_transcripts(utterances)
     labeller = partial(label_phones, phones=Recogniser(phones), lexicon=lexicon)
-    for utterance, units in label_utterances(utterances, labeller, labelling, checkpoint):
+    for utterance, units in labels.label_utterances(utterances, labeller, labelling, checkpoint):
         if isinstance(units, str):
             skipped[utterance.name] = units
             continue
@@ -224,7 +213,7 @@ def fit_phones(
         name, reason = next(iter(skipped.items()))
         raise CorpusError(f"none of {len(skipped)} utterances could be used; the first, {name}: {reason}")
     general = Recogniser(phones, "general")
-    warn_of_doubtful_transcripts(labelled, partial(label_phones, phones=general, lexicon=lexicon))
+    labels.warn_of_doubtful_transcripts(labelled, partial(label_phones, phones=general, lexicon=lexicon))
     return phones, examples, skipped
 
 
@@ -237,10 +226,8 @@ def list_motionless(
     """
     for number, spoken in enumerate(voices, start=1):
         if not engine.inputs().speech_alone:
-            raise InputError(
-                f"the engine {engine.name!r} does not learn from other voices without motion; use one that does "
-                "(--engine coupled), or leave the voices out"
-            )
+            refused = f"the engine {engine.name!r} does not learn from other voices without motion"
+            raise InputError(f"{refused}; use one that does (--engine coupled), or leave the voices out")
         monitor(Progress("aligning other voices", number, number, 0.0))
         features = analysed(spoken.audio).mfcc()
         frames = len(features.values)
@@ -261,8 +248,7 @@ def _train_phone_models(
 ) -> UnitHmm:
     """Return phone models of all transcribed or labelled utterances, or those of the shipped model.
 
-    The frequencies of many recordings are warped as by vocal tracts of other lengths (``WARP_CYCLE``), so that the
-    models also fit other speakers. Raises CorpusError: no transcript fits into its recording.
+    The frequencies of many recordings are warped as by vocal tracts of other lengths, to fit other speakers, too.
     Source: Jaitly & Hinton 2013 (vocal tract length perturbation), without random draws or more data.
     """
     transcribed: list[tuple[Audio, tuple[str, ...]]] = []
