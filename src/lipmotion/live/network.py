@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.motion.articulation import ARTICULATORS
-from lipmotion.motion.network_steps import ConvolutionalShape
+from lipmotion.motion.network_steps import shape_convolutional
 from lipmotion.speech.features.mfcc import BANDS, FFT_SIZE, HOP, WINDOW, mel_filters
 from lipmotion.stats.networks import ConvolutionalNetwork
 from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS, SPEECH_RATE_HZ
@@ -112,7 +112,7 @@ LAGS = (-1, 2, 6, 14, 30)
 HEARD_S = (STEP_FRAMES - 1) / FRAME_RATE_HZ + WINDOW / 2 / SPEECH_RATE_HZ
 """So much after its time the sound of a step has come."""
 OUTPUTS = len(ARTICULATORS) + len(VISEMES_15)  # values of an answer: articulators, and how probable each viseme is
-SHAPE = ConvolutionalShape("live", "live-network", STEP_FRAMES * (SPECTRUM_BANDS + 1), 256, (1, 2, 4, 8, 16, 1, 2, 4))
+SHAPE = shape_convolutional("live", "live-network", STEP_FRAMES * (SPECTRUM_BANDS + 1), 256, (1, 2, 4, 8, 16, 1, 2, 4))
 """It hears the last 1.5 s."""
 START_LEVEL, QUIETEST_LEVEL = 1.0, -2.0
 """Natural logarithm of the power of loud speech that is assumed at first, and the least: quieter sound stays quiet."""

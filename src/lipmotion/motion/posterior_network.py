@@ -21,13 +21,13 @@ from lipmotion.motion.articulation import count_unseen
 from lipmotion.motion.network_steps import (
     MIN_DEVIATION,
     STEP,
-    ConvolutionalShape,
-    RecurrentShape,
     check_scale,
     cut_random_piece,
     interpolate_steps,
     measure_error_variances,
     measure_poses,
+    shape_convolutional,
+    shape_recurrent,
     stack_spectrum,
 )
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
@@ -47,14 +47,14 @@ INPUT_SCALE = 2.0
 """Standard deviation of the first principal component as input; the others keep their proportions to it."""
 SPECTRUM = STEP * SPECTRUM_BANDS  # the first inputs of a time step: the spectrum
 SPECTRUM_OFF = 0.3  # share of the training in which the spectrum is switched off (0)
-SHAPE = ConvolutionalShape("posterior", "posterior-network", SPECTRUM + ROWS * COMPONENTS, 128, (1, 2, 4, 8, 1, 2, 4))
+SHAPE = shape_convolutional("posterior", "posterior-network", SPECTRUM + ROWS * COMPONENTS, 128, (1, 2, 4, 8, 1, 2, 4))
 """Its input is 0.88 s before and after a frame."""
 SHIFTS = 2
 """Time steps begin at so many rows of posteriors: training draws one of them, the motion is the mean over all."""
 BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.4, 0
 STEPS, RECURRENT_STEPS = 50.0, 50.0
 """Optimiser steps of either network by the square root of the seconds of motion: 390 for 1 minute, 1,800 for 22."""
-RECURRENT = RecurrentShape("recurrent", "recurrent-network", SHAPE.inputs, 96, 2)
+RECURRENT = shape_recurrent("recurrent", "recurrent-network", SHAPE.inputs, 96, 2)
 RECURRENT_BATCH, RECURRENT_DROPOUT = 8, 0.5
 RECURRENT_RATE, LARGEST_RECURRENT_RATE = 0.36, 3e-2
 """Learning rate, by one over the square root of the seconds of motion, and the largest one: large steps keep a network

@@ -29,17 +29,12 @@ MAX_WIDENINGS = 40  # doublings of windows without room; then every word may lie
 
 @dataclass(frozen=True, eq=False)
 class Anchors:
-    """Times of words [each of shape=(W,)].
+    """Times of words [each of shape=(W,)]."""
 
-    start_s, end_s : NaN where they are not known
-    tolerance_s    : by how much the word may be earlier or later
-    groups         : number of the word's time, which other words of its line may share
-    """
-
-    start_s: NDArray[np.float64]
-    end_s: NDArray[np.float64]
-    tolerance_s: NDArray[np.float64]
-    groups: NDArray[np.intp]
+    start_s: NDArray[np.float64]  # NaN where it is not known
+    end_s: NDArray[np.float64]  # NaN where it is not known
+    tolerance_s: NDArray[np.float64]  # by how much the word may be earlier or later
+    groups: NDArray[np.intp]  # number of the word's time, which other words of its line may share
 
 
 def find_anchors(transcript: TimedTranscript) -> Anchors:

@@ -28,20 +28,13 @@ COMPARED_FORMS = FULL_FORMS | {PAUSE: SILENCE} | dict.fromkeys(NOISES, SILENCE)
 
 @dataclass(frozen=True, eq=False)
 class AlignedWords:
-    """Words aligned with a stretch of N frames.
-
-    words     : the words
-    phones    : phones, pauses and silences, in order
-    of_word   : the word of each phone, by number; -1: none [shape=(len(phones),)]
-    bounds    : the first frame of each phone, from that of the stretch, and N [shape=(len(phones) + 1,)]
-    densities : the density of every frame [shape=(N,)]
-    """
+    """Words aligned with a stretch of N frames."""
 
     words: tuple[str, ...]
-    phones: tuple[str, ...]
-    of_word: NDArray[np.intp]
-    bounds: NDArray[np.intp]
-    densities: NDArray[np.intp]
+    phones: tuple[str, ...]  # phones, pauses and silences, in order
+    of_word: NDArray[np.intp]  # the word of each phone, by number; -1: none [shape=(len(phones),)]
+    bounds: NDArray[np.intp]  # each phone's first frame, from that of the stretch, and N [shape=(len(phones) + 1,)]
+    densities: NDArray[np.intp]  # the density of every frame [shape=(N,)]
 
     @property
     def of_frame(self) -> NDArray[np.intp]:
@@ -149,14 +142,11 @@ class RecognisedWord:
 
 
 class LabelledFrames(NamedTuple):
-    """A phone that begins in a frame.
-
-    word : the number of its word among those that were recognised; -1 where none is known
-    """
+    """A phone that begins in a frame."""
 
     first: int
     phone: str
-    word: int = -1
+    word: int = -1  # the number of its word among those that were recognised; -1 where none is known
 
 
 LabelledStretch = tuple[Stretch, list[LabelledFrames]]  # frames, and the phones in them
@@ -164,22 +154,14 @@ LabelledStretch = tuple[Stretch, list[LabelledFrames]]  # frames, and the phones
 
 @dataclass(frozen=True, eq=False)
 class Recognition:
-    """The result of a recognition.
+    """The result of a recognition."""
 
-    units      : phones in time, with their words where words decided
-    words      : these words in time
-    word_s     : seconds of speech of which recognised words decided the phones
-    phone_s    : seconds of speech that was recognised as phones
-    similarity : the speaker similarity score; None where it was not needed
-    posterior  : the mean posterior of the phones that a phone recogniser finds, 0 to 1; None: it did not decide
-    """
-
-    units: Timeline[Unit]
-    words: Timeline[RecognisedWord]
-    word_s: float
-    phone_s: float
-    similarity: float | None
-    posterior: float | None = None
+    units: Timeline[Unit]  # phones in time, with their words where words decided
+    words: Timeline[RecognisedWord]  # these words in time
+    word_s: float  # seconds of speech of which recognised words decided the phones
+    phone_s: float  # seconds of speech that was recognised as phones
+    similarity: float | None  # the speaker similarity score; None where it was not needed
+    posterior: float | None = None  # mean of the phones that a phone recogniser finds, 0 to 1; None: it did not decide
 
     @property
     def confidence(self) -> float | None:

@@ -130,16 +130,11 @@ DEFAULT_VOICES = (("espeak-ng", "en-us+f2"), ("flite", "slt"))
 
 
 class VoicedSentence(NamedTuple):
-    """A sentence that a voice has said.
+    """A sentence that a voice has said."""
 
-    audio : the sound at 16 kHz
-    units : phones in time, from 0 s to the end of the sound
-    sound : the file with the sound at the synthesiser's own rate; it is there until the next sentence is asked for
-    """
-
-    audio: Audio
-    units: Timeline[Unit]
-    sound: Path
+    audio: Audio  # the sound at 16 kHz
+    units: Timeline[Unit]  # phones in time, from 0 s to the end of the sound
+    sound: Path  # of the synthesiser's own rate; the file is there until the next sentence is asked for
 
     def own_sound(self) -> Audio:
         """Return the sound at the synthesiser's own rate. Raises InputError: its file is gone, or no sound file."""

@@ -52,18 +52,12 @@ def complete_map(labels: Iterable[str], table: PhoneMap, *, ipa: bool) -> tuple[
 
 @dataclass(frozen=True)
 class SyntheticVoice:
-    """A voice of an installed synthesiser.
+    """A voice of an installed synthesiser."""
 
-    name        : by which the synthesiser knows it
-    synthesiser : ``flite``, ``festival`` or ``espeak-ng``
-    speaker     : whose voice it is: two voices made from recordings of one person have the same speaker
-    language    : what it speaks, as in ``en-us``, ``de``, ``pt-br``
-    """
-
-    name: str
-    synthesiser: str
-    speaker: str
-    language: str = "en-us"
+    name: str  # by which the synthesiser knows it
+    synthesiser: str  # ``flite``, ``festival`` or ``espeak-ng``
+    speaker: str  # whose voice it is: two voices made from recordings of one person have the same speaker
+    language: str = "en-us"  # what it speaks, as in ``en-us``, ``de``, ``pt-br``
 
     @property
     def full_name(self) -> str:
@@ -73,20 +67,13 @@ class SyntheticVoice:
 
 @dataclass(frozen=True, eq=False)
 class SynthesisedSentence:
-    """One sentence from a synthesiser.
+    """One sentence from a synthesiser."""
 
-    audio   : at 16 kHz
-    phones  : in time, by the synthesiser's own names
-    sound   : the file with the sound at the synthesiser's own rate; it is there until the next sentence is asked for
-    words   : as they are written, in time, where the synthesiser tells (None: it does not)
-    phone_map : its names to phones of the inventory, where they are not those of the synthesiser's English (None)
-    """
-
-    audio: Audio
-    phones: Timeline[str]
-    sound: Path
-    words: Timeline[str] | None = None
-    phone_map: PhoneMap | None = None
+    audio: Audio  # at 16 kHz
+    phones: Timeline[str]  # in time, by the synthesiser's own names
+    sound: Path  # of the synthesiser's own rate; the file is there until the next sentence is asked for
+    words: Timeline[str] | None = None  # as they are written, in time, where the synthesiser tells (None: it does not)
+    phone_map: PhoneMap | None = None  # its names to phones, where they are not those of the English voices
 
 
 @dataclass(frozen=True)
