@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -209,14 +209,8 @@ def fit_articulation_prior(
             matrix[:, column] = 0
             row = ARTICULATORS.index(name)
             matrix[row, column] = deviations[known.index(row)]
-    contexts = count_contexts(example.speech.units for example in examples)
-    return ArticulationPrior(np.median(poses, axis=0), matrix, contexts)
-
-
-def count_contexts(timelines: Iterable[Timeline[Unit]]) -> dict[Context, int]:
-    """Return how often each phone occurs between its neighbours; pauses count as silence."""
-    counts = Counter(context for units in timelines for context, _ in _list_contexts(units))
-    return dict(sorted(counts.items()))
+    contexts = Counter(context for example in examples for context, _ in _list_contexts(example.speech.units))
+    return ArticulationPrior(np.median(poses, axis=0), matrix, dict(sorted(contexts.items())))
 
 
 def articulation_to_arrays(prior: ArticulationPrior | None) -> dict[str, NDArray[Any]]:

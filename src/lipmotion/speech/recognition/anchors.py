@@ -183,9 +183,14 @@ def align_within(
             placed, windows, tolerance_s = wide
         elif better.any():
             placed, windows, tolerance_s = place_words(np.where(better[anchors.groups], wider_s, tolerance_s))
-    free = _align_freely(placed, anchors, frames, search)
-    if free is not None:
-        return free
+    together = np.zeros(len(anchors.groups), np.intp)
+    fit = average_fits(placed, together, frames)[0]
+    if fit < BAD_FIT and frames <= FREE_FRAMES:
+        everywhere = Windows(together, np.full(len(together), frames, np.intp))
+        free = search(everywhere)
+        if average_fits(free, together, frames)[0] >= fit + MIN_IMPROVEMENT:
+            LOG.warning("the times of the transcript do not fit the sound; they are not used")
+            return free, everywhere
     last_fits = average_fits(placed, anchors.groups, frames)
     wrong = np.flatnonzero(_average_neighbours(last_fits) < WORST_FIT)
     if len(wrong):
@@ -195,22 +200,6 @@ def align_within(
             *(len(wrong), len(last_fits), float(known[-1]) if len(known) else 0.0),
         )
     return placed, windows
-
-
-def _align_freely(
-    placed: list[PlacedWord], anchors: Anchors, frames: int, search: Callable[[Windows], list[PlacedWord]]
-) -> tuple[list[PlacedWord], Windows] | None:
-    """Return words aligned without times, where they fit badly within them and better without; None elsewhere."""
-    everywhere = np.zeros(len(anchors.groups), np.intp)
-    fit = float(average_fits(placed, everywhere, frames)[0])
-    if fit >= BAD_FIT or frames > FREE_FRAMES:
-        return None
-    windows = Windows(everywhere, np.full(len(everywhere), frames, np.intp))
-    free = search(windows)
-    if float(average_fits(free, everywhere, frames)[0]) < fit + MIN_IMPROVEMENT:
-        return None
-    LOG.warning("the times of the transcript do not fit the sound; they are not used")
-    return free, windows
 
 
 def _average_neighbours(values: NDArray[np.float64]) -> NDArray[np.float64]:

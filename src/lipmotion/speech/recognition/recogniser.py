@@ -19,12 +19,7 @@ from lipmotion.kernels.paths import Windows
 from lipmotion.speech.recognition.adaptation import Adaptation
 from lipmotion.speech.recognition.anchors import Anchors, align_within
 from lipmotion.speech.recognition.general import CombinedPhones, combine_likelihoods, combine_phones
-from lipmotion.speech.recognition.network.posteriors import (
-    PosteriorStretch,
-    find_installed_recogniser,
-    find_stretches,
-    mean_posterior,
-)
+from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser, find_stretches, mean_posterior
 from lipmotion.speech.recognition.recognised_speech import (
     WORD_POSTERIORS,
     LabelledFrames,
@@ -126,7 +121,7 @@ class Recogniser:
         if uses_network(self.kind) and not known:
             stretches = find_stretches(audio, each)
             if mean_posterior(stretches) >= WORD_POSTERIORS[0] or not english:
-                return self._network_recognition(audio, similarity, stretches, english=english)
+                return self._network_recognition(audio, similarity, english=english)
         spoken = begin_decoding(audio, each) if self.kind == "auto" and not known else None
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
         path = self._loop.network.best_path(log_likelihoods)
@@ -139,16 +134,10 @@ class Recogniser:
         return build_recognition(labels, recognised, len(path), features.duration_s, similarity)
 
     def _network_recognition(
-        self,
-        audio: AnalysedAudio,
-        similarity: SpeakerSimilarity | None,
-        stretches: Sequence[PosteriorStretch],
-        *,
-        english: bool,
+        self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None, *, english: bool
     ) -> Recognition:
         """Return what a phone recogniser finds in a recording: words, or phones that our models find as well."""
-        features = audio.mfcc()
-        loud = find_loud_frames(audio.log_energy)
+        features, stretches, loud = audio.mfcc(), find_stretches(audio), find_loud_frames(audio.log_energy)
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity, aligning=english)
         if english:
             parts, recognised = decode_network(hmm, log_likelihoods, loud, stretches)

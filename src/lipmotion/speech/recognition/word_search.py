@@ -115,7 +115,8 @@ WORD_FIT, STRETCH_FIT = -2.0, -1.5
 WORD_BONUS, WORD_REACH_FRAMES = 2.0, 2
 """Where words are not believed, their phones are still more probable than others, by so many nats a frame, and so many
 frames earlier or later than in their alignment, linearly less."""
-FIT_WEIGHT, POSTERIOR_WEIGHT, CONSTANT = 0.62, 3.4, -1.9  # coefficients of the confidence
+FIT_WEIGHT, POSTERIOR_WEIGHT, CONSTANT = 0.62, 3.4, -1.9
+"""Coefficients of the logistic regression that says how sure a word is (docs/decisions/recognition.md)."""
 MIN_FIT, MAX_FIT = -4.0, 1.0  # fits count within these limits
 SHORT_FRAMES = 3000
 """The words of so little sound are recognised in this process: to start another one would take as long."""
@@ -168,17 +169,13 @@ def match_words(
                 drawn = loop.network.best_path(wrap_log_likelihoods(free.stretch(*stretch) + bonus))
                 decided = [(stretch, splice(recognise_free(loop, drawn, stretch.first), decided, stretch.end))]
             parts += decided
-        scores = map(score_words, fits.tolist(), (word.posterior for word in words))
-        recognised += map(RecognisedWord, texts, scores)
+        for word, fit in zip(words, np.clip(fits, MIN_FIT, MAX_FIT).tolist(), strict=True):
+            confidence = _logistic(FIT_WEIGHT * fit + POSTERIOR_WEIGHT * word.posterior + CONSTANT)
+            recognised.append(RecognisedWord(word.text, confidence))
     return parts, recognised
 
 
-def score_words(fit: float, posterior: float) -> float:
-    """Return the probability that a word is right, 0 to 1: by logistic regression (docs/decisions/recognition.md).
-
-    fit       : of the word (``AlignedWords.fits``), in nats
-    """
-    score = FIT_WEIGHT * min(max(fit, MIN_FIT), MAX_FIT) + POSTERIOR_WEIGHT * posterior + CONSTANT
+def _logistic(score: float) -> float:
     return float(1 / (1 + np.exp(-score)))
 
 
@@ -238,7 +235,7 @@ def list_spoken(posteriors: PhonePosteriors) -> list[tuple[RecognisedWord, tuple
         if word.text:
             agreement = max(1 - count_phone_edits(each, heard) / max(len(each), len(heard)) for each in variants)
             score = AGREEMENT_WEIGHT * agreement + NETWORK_WEIGHT * posteriors.mean_posterior(word.first, word.end)
-            confidence = float(1 / (1 + np.exp(-(score + NETWORK_CONSTANT))))
+            confidence = _logistic(score + NETWORK_CONSTANT)
         items.append((RecognisedWord(word.text, confidence), variants))
     return items
 
