@@ -15,14 +15,10 @@ def motion(rate_hz: float = 25.0, **curves: list[float] | np.ndarray) -> Motion:
     return Motion(values, rate_hz, tuple(Channel(name) for name in curves))
 
 
-def values_of(mouth: object, frame: int) -> dict[str, float]:
-    return {name: float(curve[frame]) for name, curve in vars(mouth).items() if name != "rate_hz"}
-
-
 def in_phone(phone: str, opening: float = 0.06, width: float = 0.57) -> dict[str, float]:
     """Return the mouth in the middle of a phone after silence, whatever is measured there."""
     moved = motion(100.0, opening=np.full(101, opening), width=np.where(np.arange(101) < 25, 0.57, width))
-    return values_of(find_mouth(moved, said((0, 0.2, "sil"), (0.3, 0.7, phone))), 50)
+    return list(find_mouth(moved, said((0, 0.2, "sil"), (0.3, 0.7, phone))).rows())[50]
 
 
 def test_speakers_with_different_rest_poses_move_alike():
@@ -32,8 +28,8 @@ def test_speakers_with_different_rest_poses_move_alike():
         find_mouth(motion(opening=opening, width=width * stretch, outer=outer + opening), NOTHING_SAID)
         for width, outer in ((0.64, 0.25), (0.50, 0.20))
     )
-    for frame in range(100):
-        assert values_of(wide, frame) == pytest.approx(values_of(narrow, frame))
+    for one, other in zip(wide.rows(), narrow.rows(), strict=True):
+        assert one == pytest.approx(other)
 
 
 def test_the_rest_is_taken_from_silence():

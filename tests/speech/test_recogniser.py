@@ -25,7 +25,7 @@ from lipmotion.speech.recognition.recognised_speech import (
 )
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.stats.constrained_mllr import log_determinant
-from lipmotion.types import Audio, Timeline, Unit
+from lipmotion.types import Audio, Features, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon
 from lipmotion.units.phones import SHORT_PAUSE_S, count_phone_edits
 from pipeline.made import features_of, read_sound
@@ -245,7 +245,8 @@ def test_labels_are_those_of_the_words_that_are_believed() -> None:
 
 def test_what_was_recognised() -> None:
     labels = [LabelledFrames(*each) for each in ((0, "sil"), (10, "b", 0), (20, "iy", 0), (40, "z"))]
-    found, doubtful = (build_recognition(labels, [RecognisedWord("bee", sure)], 51, 0.5, None) for sure in (0.8, 0.3))
+    clip = Features(np.zeros((51, 39), np.float32), 0.5)
+    found, doubtful = (build_recognition(labels, [RecognisedWord("bee", sure)], clip, None) for sure in (0.8, 0.3))
     (word,) = found.words
     assert (word.start_s, word.end_s, word.label.text) == (pytest.approx(0.1), pytest.approx(0.4), "bee")
     assert [span.label.word for span in found.units] == ["", "bee", "bee", ""]
@@ -254,7 +255,7 @@ def test_what_was_recognised() -> None:
     assert (found.reliability, doubtful.reliability) == pytest.approx((1, 0))
     shares = [replace(found, posterior=posterior).reliability for posterior in (0.6, 0.8, 0.95)]
     assert shares == pytest.approx([0, 0.5, 1])
-    wordless = build_recognition([LabelledFrames(0, "sil")], [], 51, 0.5, None)
+    wordless = build_recognition([LabelledFrames(0, "sil")], [], clip, None)
     assert replace(wordless, posterior=0.575).reliability == pytest.approx(0.5)
 
 

@@ -27,6 +27,7 @@ from lipmotion.types import FRAME_RATE_HZ, Motion, Prosody, Timeline, Unit
 from lipmotion.units import group_words, is_silent
 
 Curve = NDArray[np.float64]
+Spans = list[tuple[float, float]]  # starts and ends, s
 
 BLINK_S, MEAN_BLINK_S, MIN_BLINK_S = 0.24, 4.1, 1.1  # duration of a blink; mean and least time between two
 FIRST_BLINK_S, SHUT_S = (1.0, 2.6), 0.08
@@ -152,9 +153,9 @@ def compute_liveliness(  # noqa: PLR0913
     return Liveliness(lids, raised, eyes, turn, units_shown)
 
 
-def find_phrases(units: Timeline[Unit], pause_s: float = PHRASE_PAUSE_S) -> list[tuple[float, float]]:
+def find_phrases(units: Timeline[Unit], pause_s: float = PHRASE_PAUSE_S) -> Spans:
     """Return start and end, in seconds, of every stretch of speech without a pause of ``pause_s``."""
-    phrases: list[tuple[float, float]] = []
+    phrases = Spans()
     for span in units:
         if not is_silent(span.label.phone):
             if phrases and span.start_s - phrases[-1][1] < pause_s:
@@ -164,9 +165,7 @@ def find_phrases(units: Timeline[Unit], pause_s: float = PHRASE_PAUSE_S) -> list
     return phrases
 
 
-def blink_times(
-    end_s: float, spoken: list[tuple[float, float]], words: list[tuple[float, float]], rng: np.random.Generator
-) -> list[float]:
+def blink_times(end_s: float, spoken: Spans, words: Spans, rng: np.random.Generator) -> list[float]:
     """Return when blinks begin, in seconds: at random, rather at the end of a phrase, never in the middle of a word."""
     ends = np.array([end for _, end in spoken] or [-np.inf])
     starts_s, ends_s = np.array(words).reshape(-1, 2).T
@@ -235,7 +234,7 @@ def _at(curve: Curve, time_s: Curve) -> Curve:
     return np.interp(time_s, np.arange(len(curve)) / FRAME_RATE_HZ, curve)
 
 
-def _find_talking(spoken: list[tuple[float, float]], time_s: Curve) -> Curve:
+def _find_talking(spoken: Spans, time_s: Curve) -> Curve:
     """Return 1 in phrases and 0 away from them, with soft edges [shape=(N,)]."""
     level = np.zeros(len(time_s))
     for begin, end in spoken:
@@ -255,9 +254,7 @@ def sway(time_s: Curve, rng: np.random.Generator, slowest_hz: float, fastest_hz:
     return np.asarray(strengths @ waves / np.sqrt(np.sum(strengths**2) / 2))
 
 
-def _turn_head(
-    time_s: Curve, accent: Curve, talking: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator
-) -> Curve:
+def _turn_head(time_s: Curve, accent: Curve, talking: Curve, spoken: Spans, rng: np.random.Generator) -> Curve:
     lively = STILL_SHARE + (1 - STILL_SHARE) * talking
     yaw, pitch, roll = (size * sway(time_s, rng, *SWAY_HZ) for size in SWAY)
     nod = _at(_smooth(accent, 0.11), time_s + 0.04)
@@ -273,7 +270,7 @@ def _turn_head(
     return np.stack([lively * yaw, lively * pitch - NOD_RAD * nod - PHRASE_FALL_RAD * tilt, lively * roll], axis=1)
 
 
-def _raise_brows(time_s: Curve, accent: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator) -> Curve:
+def _raise_brows(time_s: Curve, accent: Curve, spoken: Spans, rng: np.random.Generator) -> Curve:
     raised = BROW_RAISE * _at(_smooth(accent, 0.1), time_s + BROW_LEAD_S)
     raised += 0.003 * (1 + np.tanh(sway(time_s, rng, 0.05, 0.3)))
     for begin, _ in spoken:  # some phrases begin with raised brows
@@ -300,7 +297,7 @@ def draw_fixation(
     return (float(rng.normal(0, 0.018)), float(rng.normal(0, 0.012))), float(rng.uniform(0.5, 2.0))
 
 
-def _aim_eyes(time_s: Curve, end_s: float, spoken: list[tuple[float, float]], rng: np.random.Generator) -> Curve:
+def _aim_eyes(time_s: Curve, end_s: float, spoken: Spans, rng: np.random.Generator) -> Curve:
     """Return where the eyes look, to the left and upwards in radians [shape=(F, 2)]: steps between fixations."""
     moments, targets = [0.0], [(0.0, 0.0)]
     begins = np.array([begin for begin, _ in spoken] or [np.inf])

@@ -5,6 +5,7 @@ Lengths are in eye distances (the distance between the outer corners of the eyes
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -122,6 +123,12 @@ class SpokenMouth:
     def within(self, frames: slice) -> SpokenMouth:
         """Return the mouth in some frames alone."""
         return SpokenMouth(self.rate_hz, *(curve[frames] for curve in self._curves().values()))
+
+    def rows(self) -> Iterator[dict[str, float]]:
+        """Yield the values of every frame by the names of the curves."""
+        curves = self._curves()
+        for values in np.stack(list(curves.values()), axis=1).tolist():
+            yield dict(zip(curves, values, strict=True))
 
     def _curves(self) -> dict[str, Curve]:
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "rate_hz"}

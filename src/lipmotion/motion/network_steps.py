@@ -92,6 +92,7 @@ def cut_random_piece(sequence: TrainingSequence, rng: np.random.Generator) -> Tr
     return TrainingSequence(sequence.inputs[piece], sequence.targets[piece], sequence.valid[piece])
 
 
+Draw = Callable[[np.random.Generator, int], TrainingSequence]  # returns a version of a numbered example
 Layers = Iterable[Sequence[NDArray[np.float32]]]  # the arrays of each layer
 
 
@@ -127,13 +128,7 @@ class NetworkShape(Generic[NetworkT]):
         first, weights, *others, output = (stored[name] for name in self.specs)
         return self.network(zip([first, *weights], *others, strict=True), LinearMap(output[:-1], output[-1]))
 
-    def train(
-        self,
-        training: PredictorTraining,
-        outputs: int,
-        draw: Callable[[np.random.Generator, int], TrainingSequence],
-        plan: TrainingPlan,
-    ) -> NetworkT:
+    def train(self, training: PredictorTraining, outputs: int, draw: Draw, plan: TrainingPlan) -> NetworkT:
         """Return a network, trained on sequences that ``draw`` makes of numbered examples, or from its checkpoint."""
         stored = training.checkpoint.load(self.name)
         if stored is not None:

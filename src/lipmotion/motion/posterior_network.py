@@ -37,6 +37,7 @@ from lipmotion.storage.schema import LARGEST_MEAN, POSITIVE, Arrays, ArraySpec, 
 from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS, Example, Speech, TokenPosteriors
 
 Array = NDArray[np.float64]
+Shifted = Sequence[Sequence[TrainingSequence]]  # each example from each of ``SHIFTS`` on
 ROWS = 2  # rows of posteriors, of 20 ms each, in a time step of the network
 ROW_FRAMES = STEP // ROWS
 COMPONENTS = 120
@@ -191,9 +192,7 @@ def list_posteriors(examples: Sequence[Example]) -> list[TokenPosteriors] | None
     return known if known and len(known) == len(examples) else None
 
 
-def _train_convolutional(
-    training: PredictorTraining, sequences: Sequence[Sequence[TrainingSequence]], motion_s: float
-) -> ConvolutionalNetwork:
+def _train_convolutional(training: PredictorTraining, sequences: Shifted, motion_s: float) -> ConvolutionalNetwork:
     def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
         piece = _draw_piece(sequences, rng, number)
         if rng.random() >= SPECTRUM_OFF:
@@ -207,18 +206,14 @@ def _train_convolutional(
     return SHAPE.train(training, sequences[0][0].targets.shape[1], draw, plan)
 
 
-def _train_recurrent(
-    training: PredictorTraining, sequences: Sequence[Sequence[TrainingSequence]], motion_s: float
-) -> RecurrentNetwork:
+def _train_recurrent(training: PredictorTraining, sequences: Shifted, motion_s: float) -> RecurrentNetwork:
     rate = min(RECURRENT_RATE / math.sqrt(motion_s), LARGEST_RECURRENT_RATE)
     steps = max(round(RECURRENT_STEPS * math.sqrt(motion_s)), 1)
     plan = TrainingPlan(steps, min(RECURRENT_BATCH, len(sequences)), rate, RECURRENT_DROPOUT, SEED)
     return RECURRENT.train(training, sequences[0][0].targets.shape[1], partial(_draw_piece, sequences), plan)
 
 
-def _draw_piece(
-    sequences: Sequence[Sequence[TrainingSequence]], rng: np.random.Generator, number: int
-) -> TrainingSequence:
+def _draw_piece(sequences: Shifted, rng: np.random.Generator, number: int) -> TrainingSequence:
     """Return one of the shifts of an example, or a piece of it."""
     shifted = sequences[number]
     return cut_random_piece(shifted[int(rng.integers(len(shifted)))], rng)

@@ -71,8 +71,6 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
         units = (name.partition(".")[0] for name in combined.hmm.table.names)
         silent = np.array([is_silent(unit) or unit in NOISES for unit in units])
         speech_s = float((~silent[densities]).sum() / FRAME_RATE_HZ)
-        if not speech_s:
-            raise InputError("no speech found in the recordings; give some of the voice to adapt to")
         if speech_s < MIN_SPEECH_S:
             raise InputError(
                 f"found {speech_s:.1f} s of speech, required at least {MIN_SPEECH_S:.0f} s; give more of this voice"

@@ -24,6 +24,7 @@ BAD_FIT, WORST_FIT = -3.5, -6.0
 """Words that fit worse than the first, in nats a frame, may be elsewhere; worse than the second, they are not there."""
 FREE_FRAMES = 60_000  # recordings of up to ten minutes are aligned without times where these belong to something else
 NEIGHBOURS = 3  # words on each side of one without room whose windows are widened too, with all that share its time
+Placed = list[PlacedWord]
 MAX_WIDENINGS = 40  # doublings of windows without room; then every word may lie anywhere
 
 
@@ -147,12 +148,8 @@ def average_fits(placed: Sequence[PlacedWord], groups: NDArray[np.intp], frames:
 
 
 def align_within(
-    anchors: Anchors,
-    min_frames: NDArray[np.intp],
-    edge: int,
-    frames: int,
-    search: Callable[[Windows], list[PlacedWord]],
-) -> tuple[list[PlacedWord], Windows]:
+    anchors: Anchors, min_frames: NDArray[np.intp], edge: int, frames: int, search: Callable[[Windows], Placed]
+) -> tuple[Placed, Windows]:
     """Return words aligned within their windows, and these.
 
     min_frames, edge : as of ``find_windows``
@@ -163,7 +160,7 @@ def align_within(
     the times are not used. What fits badly in the end is logged as a warning.
     """
 
-    def place_words(tolerance_s: NDArray[np.float64]) -> tuple[list[PlacedWord], Windows, NDArray[np.float64]]:
+    def place_words(tolerance_s: NDArray[np.float64]) -> tuple[Placed, Windows, NDArray[np.float64]]:
         windows, tolerance_s = find_windows(anchors, tolerance_s, min_frames, edge, frames)
         return search(windows), windows, tolerance_s
 

@@ -16,9 +16,8 @@ from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import penalise, wrap_log_likelihoods
 from lipmotion.speech.recognition.general import NOISES
 from lipmotion.speech.sound.analysed_audio import SILENT_ENERGY, Passage
-from lipmotion.speech.sound.speaker_similarity import SpeakerSimilarity
 from lipmotion.speech.sound.voice_activity import Stretch
-from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Features, Span, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, find_similar_phone, is_silent
 from lipmotion.units.phones import FULL_FORMS, SHORT_PAUSE_S
 
@@ -214,18 +213,14 @@ def time_phones(labels: Sequence[tuple[str, str]], bounds: NDArray[np.intp], dur
 
 
 def build_recognition(
-    labels: Sequence[LabelledFrames],
-    recognised: Sequence[RecognisedWord],
-    frames: int,
-    duration_s: float,
-    similarity: SpeakerSimilarity | None,
+    labels: Sequence[LabelledFrames], recognised: Sequence[RecognisedWord], features: Features, similarity: float | None
 ) -> Recognition:
     """Return a recognition of labels of a recording; ``recognised`` are the words that they number."""
     named = [(label.phone, recognised[label.word].text if label.word >= 0 else "") for label in labels]
     firsts = [label.first for label in labels]
-    units = time_phones(named, np.array([*firsts, frames]), duration_s)
+    units = time_phones(named, np.array([*firsts, len(features.values)]), features.duration_s)
     words = []
-    ends = [*firsts[1:], round(duration_s * FRAME_RATE_HZ)]
+    ends = [*firsts[1:], round(features.duration_s * FRAME_RATE_HZ)]
     for number, group in groupby(zip(labels, ends, strict=True), key=lambda pair: pair[0].word):
         if number >= 0:
             phones = list(group)
@@ -233,7 +228,7 @@ def build_recognition(
     spoken = [span for span in units if not is_silent(span.label.phone)]
     word_s = sum(span.duration_s for span in spoken if span.label.word)
     phone_s = sum(span.duration_s for span in spoken) - word_s
-    return Recognition(units, Timeline(tuple(words)), word_s, phone_s, similarity.score if similarity else None)
+    return Recognition(units, Timeline(tuple(words)), word_s, phone_s, similarity)
 
 
 def place_units(units: Timeline[LabelT], first: int, own: slice) -> Timeline[LabelT]:

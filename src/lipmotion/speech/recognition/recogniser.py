@@ -30,13 +30,7 @@ from lipmotion.speech.recognition.recognised_speech import (
     splice,
     time_phones,
 )
-from lipmotion.speech.recognition.word_search import (
-    begin_decoding,
-    decode_network,
-    list_wordless,
-    match_words,
-    recognise_free,
-)
+from lipmotion.speech.recognition.word_search import decode_network, find_words, list_phones, list_wordless, match_words
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.speaker_similarity import OWN_SCORE, STRANGER_SCORE, SpeakerSimilarity, speaker_similarity
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Timeline, Unit
@@ -103,7 +97,7 @@ class Recogniser:
         """
         audio = analysed(audio, features)
         if not features.values.any() or not audio.passages:
-            return build_recognition([LabelledFrames(0, SILENCE)], (), len(features.values), features.duration_s, None)
+            return build_recognition([LabelledFrames(0, SILENCE)], (), features, None)
         if not audio.is_passage:
             if uses_network(self.kind):
                 find_stretches(audio, each)  # of all passages at once: several processes work on them
@@ -122,7 +116,7 @@ class Recogniser:
             stretches = find_stretches(audio, each)
             if mean_posterior(stretches) >= WORD_POSTERIORS[0] or not english:
                 return self._network_recognition(audio, similarity, english=english)
-        spoken = begin_decoding(audio, each) if self.kind == "auto" and not known else None
+        spoken = find_words(audio, each) if self.kind == "auto" and not known else None
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
         path = self._loop.network.best_path(log_likelihoods)
         labels, recognised = self._free_labels(audio, features, path), list[RecognisedWord]()
@@ -131,7 +125,7 @@ class Recogniser:
             loud, free = find_loud_frames(audio.log_energy), self._loop.network.emission[path]
             parts, recognised = match_words(hmm, self._loop, log_likelihoods, aligning, free, loud, spoken)
             labels = splice(labels, parts, len(path))
-        return build_recognition(labels, recognised, len(path), features.duration_s, similarity)
+        return build_recognition(labels, recognised, features, similarity and similarity.score)
 
     def _network_recognition(
         self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None, *, english: bool
@@ -144,12 +138,12 @@ class Recogniser:
         else:
             parts, recognised = list_wordless(hmm, self._loop, log_likelihoods, stretches), []
         labels = splice([LabelledFrames(0, SILENCE)], parts, len(loud))
-        recognition = build_recognition(labels, recognised, len(loud), features.duration_s, similarity)
+        recognition = build_recognition(labels, recognised, features, similarity and similarity.score)
         return replace(recognition, posterior=mean_posterior(stretches))
 
     def _free_labels(self, audio: AnalysedAudio, features: Features, path: NDArray[np.intp]) -> list[LabelledFrames]:
         """Return the phones of a recording as they are recognised without words, of their best path."""
-        labels = recognise_free(self._loop, path)
+        labels = list_phones(self._loop, path)
         if self.kind not in ("auto", "fast") or not self._has_few_gaussians:
             return labels
         named, bounds = [(label.phone, "") for label in labels], [label.first for label in labels]

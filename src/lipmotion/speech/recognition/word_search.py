@@ -16,12 +16,7 @@ from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import LogLikelihoods, UnitLoop, decode_path, wrap_log_likelihoods
 from lipmotion.speech.recognition.general import NOISES
 from lipmotion.speech.recognition.network.beam_search import decode_words, load_english, score_stretch
-from lipmotion.speech.recognition.network.posteriors import (
-    POSTERIOR_STEP,
-    WORD_BOUNDARY,
-    PhonePosteriors,
-    PosteriorStretch,
-)
+from lipmotion.speech.recognition.network.posteriors import POSTERIOR_STEP, PhonePosteriors, PosteriorStretch
 from lipmotion.speech.recognition.recognised_speech import (
     FORMS,
     LabelledFrames,
@@ -123,7 +118,7 @@ SHORT_FRAMES = 3000
 DICTIONARY = Lexicon()  # words that were recognised are in the dictionary
 
 
-def begin_decoding(audio: AnalysedAudio, each: ParallelMap = map) -> Iterable[tuple[Stretch, Sequence[FoundWord]]]:
+def find_words(audio: AnalysedAudio, each: ParallelMap = map) -> Iterable[tuple[Stretch, Sequence[FoundWord]]]:
     """Return all stretches of sound of a recording, with the words in them as soon as they are known.
 
     Where ``each`` starts processes, they begin now. Raises MissingDependencyError: as ``spot_words``.
@@ -148,7 +143,7 @@ def match_words(
     aligning   : log likelihoods for the alignment of words
     path       : the density of every frame on the best path of phones without words [shape=(T,)]
     loud       : frames that are too loud for silence [shape=(T,)]
-    spoken     : of ``begin_decoding``, whose errors it raises
+    spoken     : of ``find_words``, whose errors it raises
     """
     parts, recognised = list[LabelledStretch](), list[RecognisedWord]()
     for stretch, words in spoken:
@@ -167,7 +162,7 @@ def match_words(
                 present = np.eye(len(FORMS), dtype=np.float32)[forms[aligned.of_frame]]
                 bonus = weigh_densities(hmm, present, WORD_BONUS, WORD_REACH_FRAMES)
                 drawn = loop.network.best_path(wrap_log_likelihoods(free.stretch(*stretch) + bonus))
-                decided = [(stretch, splice(recognise_free(loop, drawn, stretch.first), decided, stretch.end))]
+                decided = [(stretch, splice(list_phones(loop, drawn, stretch.first), decided, stretch.end))]
             parts += decided
         for word, fit in zip(words, np.clip(fits, MIN_FIT, MAX_FIT).tolist(), strict=True):
             confidence = _logistic(FIT_WEIGHT * fit + POSTERIOR_WEIGHT * word.posterior + CONSTANT)
@@ -179,7 +174,7 @@ def _logistic(score: float) -> float:
     return float(1 / (1 + np.exp(-score)))
 
 
-def recognise_free(loop: UnitLoop, path: NDArray[np.intp], first: int = 0) -> list[LabelledFrames]:
+def list_phones(loop: UnitLoop, path: NDArray[np.intp], first: int = 0) -> list[LabelledFrames]:
     """Return the phones of a path through a loop [shape=(T,)] whose first frame is ``first``; noises are silence."""
     phones, starts = decode_path(loop, path)
     return [
@@ -223,7 +218,7 @@ def decode_network(
 
 def list_spoken(posteriors: PhonePosteriors) -> list[tuple[RecognisedWord, tuple[Pronunciation, ...]]]:
     """Return the words of a stretch of English with their pronunciations; phones of no word have an empty text."""
-    if not _finds_phones(posteriors):
+    if not posteriors.has_phones:
         return []
     items = []
     for word in decode_words(load_english(), score_stretch(posteriors)):
@@ -251,7 +246,7 @@ def list_wordless(
     """
     parts = list[LabelledStretch]()
     for stretch, posteriors in stretches:
-        if _finds_phones(posteriors):
+        if posteriors.has_phones:
             frames = stretch.end - stretch.first
             row = np.minimum(np.arange(frames) // POSTERIOR_STEP, len(posteriors.values) - 1)
             posterior = np.zeros((frames, len(FORMS)), np.float32)
@@ -260,9 +255,5 @@ def list_wordless(
                     posterior[:, FORMS.index(find_form(phone))] += np.exp(posteriors.of_phones[row, column])
             values = free.stretch(*stretch) + weigh_densities(hmm, posterior, POSTERIOR_BONUS, REACH_FRAMES)
             path = loop.network.best_path(wrap_log_likelihoods(values))
-            parts.append((stretch, recognise_free(loop, path, stretch.first)))
+            parts.append((stretch, list_phones(loop, path, stretch.first)))
     return parts
-
-
-def _finds_phones(posteriors: PhonePosteriors) -> bool:
-    return any(each.token != WORD_BOUNDARY for each in posteriors.best_tokens)

@@ -111,6 +111,11 @@ class PhonePosteriors:
         tokens = (FoundToken(self.tokens[best[first]], first, end) for first, end in bounds if end)
         return tuple(each for each in tokens if each.token != BLANK)
 
+    @property
+    def has_phones(self) -> bool:
+        """Whether a phone is on the best path."""
+        return any(each.token != WORD_BOUNDARY for each in self.best_tokens)
+
     def phones_between(self, first: int, end: int) -> list[str]:
         """Return the phones of the best path that begin in some rows: from ``first`` to before ``end``."""
         tokens = [each.token for each in self.best_tokens if first <= each.first < end]
