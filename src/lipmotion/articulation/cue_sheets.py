@@ -355,10 +355,8 @@ def build_cue_sheet(
         raise InputError(f"{len(rows)} mouth shapes in {end_s:g} s, required at most {MAX_CUES} in {LONGEST_S:g} s")
     late = next((place for place, (row, after) in enumerate(pairwise(rows), 1) if after[0] < row[0]), None)
     if late is not None:
-        raise InputError(
-            f"mouth shape {late + 1} begins at {rows[late][0]:.6g} s, before the one ahead of it at "
-            f"{rows[late - 1][0]:.6g} s, required in order of time; export the cues again"
-        )
+        times = f"at {rows[late][0]:.6g} s, the one ahead of it at {rows[late - 1][0]:.6g} s"
+        raise InputError(f"mouth shape {late + 1} begins {times}, required in order of time; export the cues again")
     all_rows = [(0.0, REST), *rows] if rows[0][0] > 0 else list(rows)
     ends = [*(start_s for start_s, _ in all_rows[1:]), end_s]
     spans = (Span(start_s, stop_s, shape) for (start_s, shape), stop_s in zip(all_rows, ends, strict=True))

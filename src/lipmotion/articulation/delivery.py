@@ -84,12 +84,11 @@ def shift_in_time(generation: Generation, delivery: Delivery) -> Generation:
     by_s = (delivery.offset_ms - delivery.anticipation_ms) / 1000
     if not (by_s or delivery.offset_ms) or not len(motion.values):
         return generation
-    duration_s = (len(motion.values) - 1) / rate_hz + delivery.offset_ms / 1000
+    motion_s = (len(motion.values) - 1) / rate_hz
+    duration_s = motion_s + delivery.offset_ms / 1000
     if duration_s < 0:
-        raise InputError(
-            f"the offset is {delivery.offset_ms:g} ms, and the motion lasts "
-            f"{duration_s - delivery.offset_ms / 1000:.2f} s: nothing is left; give a smaller one"
-        )
+        what = f"the offset is {delivery.offset_ms:g} ms, and the motion lasts {motion_s:.2f} s: nothing is left"
+        raise InputError(f"{what}; give a smaller one")
     position: Curve = np.arange(int(np.floor(duration_s * rate_hz + 1e-6)) + 1.0) - by_s * rate_hz
     nearest = np.clip(np.rint(position), 0, len(motion.values) - 1).astype(int)
     if abs(by_s * rate_hz - round(by_s * rate_hz)) < 1e-6:

@@ -83,10 +83,8 @@ class AcousticNetwork(Predictor):
         """
         examples = training.examples
         if not all(example.condition_spectra for example in examples):
-            raise CorpusError(
-                f"examples without acoustic conditions; a network is trained on {MIN_MOTION_S:g} s of measured "
-                "motion or more, with the option conditions from 1"
-            )
+            required = f"{MIN_MOTION_S:g} s of measured motion or more, and the option conditions from 1"
+            raise CorpusError(f"examples without acoustic conditions; a network needs {required}")
         mean, scale = measure_poses(training)
         network = _train(replace(training, monitor=sub_monitor(training.monitor, 0, 0.8)), mean, scale)
         trained = cls(network, mean, scale, np.ones((3, len(mean))))

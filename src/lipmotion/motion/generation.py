@@ -72,22 +72,14 @@ Pins = dict[tuple[int, int], float]  # pinned values by frame and dimension of t
 
 @dataclass(frozen=True, eq=False)
 class LearnedMotion:
-    """The parts of a model that turn predicted means and precisions into motion; the same for all engines.
+    """The parts of a model that turn predicted means and precisions into motion; the same for all engines."""
 
-    space   : the Q dimensions in which motion is modelled
-    closure : of the lips in p, b and m (None: the motion has no channel ``opening``)
-    limits  : of plausible motion in this space
-    scaling : variance scaling about the rest pose (None: movements are not scaled)
-    prior   : the table of articulation, for contexts that training saw little of (None: the means are used as they are)
-    modulation : restores fast movement after generation (None: the motion stays as it is)
-    """
-
-    space: MotionSpace
-    closure: Closure | None
-    limits: MotionLimits
-    scaling: VarianceScaling | None = None
-    prior: articulation.ArticulationPrior | None = None
-    modulation: ModulationFilter | None = None
+    space: MotionSpace  # the Q dimensions in which motion is modelled
+    closure: Closure | None  # of the lips in p, b and m (None: the motion has no channel ``opening``)
+    limits: MotionLimits  # of plausible motion in this space
+    scaling: VarianceScaling | None = None  # about the rest pose (None: movements are not scaled)
+    prior: articulation.ArticulationPrior | None = None  # for contexts that training saw little of (None: as generated)
+    modulation: ModulationFilter | None = None  # restores fast movement after generation (None: it stays as it is)
 
     def for_voice(self, voice: float) -> LearnedMotion:
         """Return the same with a modulation filter that is weaker, the less training knows the voice.

@@ -153,10 +153,9 @@ class PosteriorNetwork(Predictor):
         if posteriors is None:
             raise InputError("the speech has no posteriors; an engine that uses them says so by ``inputs``")
         if posteriors.source != self.source:
-            raise InputError(
-                f"the model was trained with the phone recogniser {self.source}, this one is {posteriors.source}; "
-                f"install that one (pip install {'=='.join(self.source.split()[:2])}), or use the recogniser fast"
-            )
+            what = f"the model was trained with the phone recogniser {self.source}, this one is {posteriors.source};"
+            package = "==".join(self.source.split()[:2])
+            raise InputError(f"{what} install that one (pip install {package}), or use the recogniser fast")
         return (limit_logarithms(posteriors) - self.mean) @ self.basis
 
     def arrays(self) -> dict[str, NDArray[Any]]:

@@ -159,10 +159,8 @@ def select_channels(motion: Motion, channels: Sequence[Channel], where: str) -> 
     """Return motion in the channels of a model. Raises InputError, which names the recording: a channel is missing."""
     missing = [channel for channel in channels if channel not in motion.channels]
     if missing:
-        raise InputError(
-            f"{where}: its motion has no channel {missing[0].name!r} in the unit {missing[0].unit!r}, which the model "
-            f"generates ({len(missing)} of {len(channels)} are missing); give recordings with the channels of the "
-            "model (lipmotion info), or another model"
-        )
+        first, share = missing[0], f"{len(missing)} of {len(channels)} channels of the model"
+        what = f"{where}: its motion lacks {share}, as {first.name!r} in the unit {first.unit!r};"
+        raise InputError(f"{what} give recordings with all of them (lipmotion info), or another model")
     columns = [motion.channels.index(channel) for channel in channels]
     return Motion(np.asarray(motion.values)[:, columns], motion.rate_hz, tuple(channels))

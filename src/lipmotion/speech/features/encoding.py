@@ -141,17 +141,12 @@ Linear = tuple[Array, Array]  # a matrix and a bias
 
 
 class Encoder(NamedTuple):
-    """Weights of the network; gains of layer normalisation are in the matrices that follow them.
+    """Weights of the network; gains of layer normalisation are in the matrices that follow them."""
 
-    convolutions : of three taps each, the second one with stride 2: kernels [shape=(3·inputs, N)] and biases
-    layers       : of queries, keys and values; of what is attended to; and of the two that follow
-    basis, shift : from the normalised output of the last layer to the features [shape=(N, D)], [shape=(D,)]
-    """
-
-    convolutions: tuple[Linear, ...]
-    layers: tuple[tuple[Linear, ...], ...]
-    basis: Array
-    shift: Array
+    convolutions: tuple[Linear, ...]  # kernels of three taps [shape=(3·inputs, N)]; the second one has stride 2
+    layers: tuple[tuple[Linear, ...], ...]  # queries, keys and values; what is attended to; and the two that follow
+    basis: Array  # from the normalised output of the last layer to the features [shape=(N, D)]
+    shift: Array  # [shape=(D,)]
 
 
 @cache

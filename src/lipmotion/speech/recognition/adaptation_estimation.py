@@ -72,9 +72,7 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
         silent = np.array([is_silent(unit) or unit in NOISES for unit in units])
         speech_s = float((~silent[densities]).sum() / FRAME_RATE_HZ)
         if speech_s < MIN_SPEECH_S:
-            raise InputError(
-                f"found {speech_s:.1f} s of speech, required at least {MIN_SPEECH_S:.0f} s; give more of this voice"
-            )
+            raise InputError(f"found {speech_s:.1f} s of speech, required at least {MIN_SPEECH_S:.0f} s; give more")
         short = speech_s < SHORT_S
         group = np.arange(FEATURES + 1) // (FEATURES // 3 if short else FEATURES)
         free = (group[:-1, None] == group) | (np.arange(FEATURES + 1) == FEATURES)

@@ -33,21 +33,14 @@ Place = tuple[float, float]  # start and end in seconds
 
 @dataclass(frozen=True)
 class TranscriptFit:
-    """How well a transcript fits a recording.
+    """How well a transcript fits a recording."""
 
-    score    : the agreement score (``score_agreement``)
-    missing  : stretches with speech that the transcript leaves out: their starts and ends in seconds, in order
-    speech_s : seconds of speech in the recording, those that are missing included
-    evidence : what a phone recogniser says of the transcript, which then decides (None: there is none)
-    idle, wrong : of phones that are given with their times: stretches in which nothing is said, or other phones
-    """
-
-    score: float
-    missing: tuple[Place, ...]
-    speech_s: float
-    evidence: TranscriptEvidence | None = None
-    idle: tuple[Place, ...] = ()
-    wrong: tuple[Place, ...] = ()
+    score: float  # the agreement score (``score_agreement``)
+    missing: tuple[Place, ...]  # stretches with speech that the transcript leaves out, in order
+    speech_s: float  # seconds of speech in the recording, those that are missing included
+    evidence: TranscriptEvidence | None = None  # by a phone recogniser; where there is some, it decides
+    idle: tuple[Place, ...] = ()  # of phones that are given with their times: stretches in which nothing is said
+    wrong: tuple[Place, ...] = ()  # of such phones: stretches in which others are said
 
     @property
     def is_doubtful(self) -> bool:

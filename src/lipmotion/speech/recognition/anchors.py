@@ -65,10 +65,8 @@ def leave_out_late_lines(transcript: TimedTranscript, duration_s: float) -> Time
     latest_s = duration_s + LINE_TOLERANCE_S
     lines = [line for line in transcript.lines if line.start_s is None or line.start_s <= latest_s]
     if not lines:
-        raise InputError(
-            f"the transcript begins at {transcript.lines[0].start_s:.2f} s, the recording ends at {duration_s:.2f} s; "
-            "give the transcript of this recording"
-        )
+        what = f"the transcript begins at {transcript.lines[0].start_s:.2f} s, the recording ends at {duration_s:.2f} s"
+        raise InputError(f"{what}; give the transcript of this recording")
     if left_out := len(transcript.lines) - len(lines):
         what = "the transcript goes on after the recording ends at %.2f s; its last %d lines are left out"
         LOG.warning(what, duration_s, left_out)

@@ -57,15 +57,12 @@ from 0.806 to 0.841 (transcripts)."""
 class Recogniser:
     """Forced alignment and recognition with a model's own phone models and those of many voices.
 
-    own        : the phone models of a corpus
-    kind       : one of ``RECOGNISER_KINDS``
-    adaptation : to one speaker, or None; with one, the speaker similarity is not computed
-    Raises InputError: another kind.
+    Raises InputError: another kind than ``RECOGNISER_KINDS``.
     """
 
-    own: UnitHmm
-    kind: str = "auto"
-    adaptation: Adaptation | None = None
+    own: UnitHmm  # the phone models of a corpus
+    kind: str = "auto"  # one of ``RECOGNISER_KINDS``
+    adaptation: Adaptation | None = None  # to one speaker; with one, the speaker similarity is not computed
 
     def __post_init__(self) -> None:
         if self.kind not in RECOGNISER_KINDS:

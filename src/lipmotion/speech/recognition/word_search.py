@@ -100,9 +100,8 @@ def _decoder() -> Any:
             **OPTIONS,
         )
     except (ImportError, RuntimeError) as error:
-        raise MissingDependencyError(
-            f"words are recognised by pocketsphinx and its language model ({error}): pip install pocketsphinx"
-        ) from error
+        message = f"words are recognised by pocketsphinx and its language model ({error}): pip install pocketsphinx"
+        raise MissingDependencyError(message) from error
 
 
 WORD_FIT, STRETCH_FIT = -2.0, -1.5

@@ -235,9 +235,7 @@ def speak_sentences(
         raise InputError(f"unknown synthesiser {voice.synthesiser!r}; required one of: {', '.join(SYNTHESISERS)}")
     names = [known.name for known in synthesiser.voices()]
     if not names:
-        raise MissingDependencyError(
-            f"{synthesiser.name} is not installed, or has no English voice: {explain_install(synthesiser)}"
-        )
+        raise MissingDependencyError(f"{synthesiser.name} has no English voice here: {explain_install(synthesiser)}")
     if voice.name not in names and not _is_other(voice.name, synthesiser):
         raise InputError(f"{synthesiser.name} has no voice {voice.name!r} here; it has: {', '.join(names)}")
     words = [split_words(text) for text in texts]

@@ -78,23 +78,16 @@ class SynthesisedSentence:
 
 @dataclass(frozen=True)
 class Synthesiser:
-    """A speech synthesis program.
-
-    package    : the Debian package with it; empty: it is a Python package
-    voices     : returns its installed American English voices; none where it is not installed
-    synthesise : yields the sentences of some texts in a voice (name, texts, a folder for temporary files), in order
-    phone_map  : its phones to those of the inventory (``phone_maps``)
-    others     : returns its voices of other languages and kinds of English
-    extra      : of lipmotion, that installs that
-    """
+    """A speech synthesis program."""
 
     name: str
-    package: str
-    voices: Callable[[], tuple[SyntheticVoice, ...]]
+    package: str  # the Debian package with it; empty: it is a Python package
+    voices: Callable[[], tuple[SyntheticVoice, ...]]  # those of American English; none where it is not installed
     synthesise: Callable[[str, Sequence[str], Path], Iterator[SynthesisedSentence]]
-    phone_map: PhoneMap
-    others: Callable[[], tuple[SyntheticVoice, ...]] = tuple
-    extra: str = ""
+    """Yields the sentences of some texts in a voice (name, texts, a folder for temporary files), in order."""
+    phone_map: PhoneMap  # its phones to those of the inventory
+    others: Callable[[], tuple[SyntheticVoice, ...]] = tuple  # its voices of other languages and kinds of English
+    extra: str = ""  # of lipmotion, that installs that
 
 
 START_S, EACH_S = 30.0, 5.0
