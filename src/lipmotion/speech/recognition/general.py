@@ -102,7 +102,7 @@ def load_general() -> GeneralModel:
         means, variances = (_gaussians((folder / name).read_bytes()) for name in ("means", "variances"))
         weights = _weights((folder / "sendump").read_bytes())
     except (OSError, ValueError) as error:
-        message = f"pocketsphinx's phone models are not those of version 5 ({error}): pip install 'pocketsphinx>=5.0.4'"
+        message = f"pocketsphinx's models are not those of its version 5 ({error}): pip install 'pocketsphinx>=5.0.4'"
         raise MissingDependencyError(message) from error
     forms, constants = [], []
     for stream in STREAMS:
