@@ -28,6 +28,7 @@ from lipmotion.units import group_words, is_silent
 
 Curve = NDArray[np.float64]
 Spans = list[tuple[float, float]]  # starts and ends, s
+Aim = tuple[float, float]  # to the left and upwards, rad
 
 BLINK_S, MEAN_BLINK_S, MIN_BLINK_S = 0.24, 4.1, 1.1  # duration of a blink; mean and least time between two
 FIRST_BLINK_S, SHUT_S = (1.0, 2.6), 0.08
@@ -130,14 +131,14 @@ def compute_liveliness(  # noqa: PLR0913
         accent = accent * _find_talking(spoken, np.arange(len(accent)) / FRAME_RATE_HZ)
     turn = np.zeros((len(time_s), 3))
     if head:
-        turn = _turn_head(time_s, accent, _find_talking(spoken, time_s), spoken, _generator(seed, 1))
+        turn = _turn_head(time_s, accent, _find_talking(spoken, time_s), spoken, np.random.default_rng([seed, 1]))
     words = [(span.start_s, span.end_s) for span in group_words(units) if span.label]
-    lids = lid_closure(time_s, blink_times(end_s, spoken, words, _generator(seed, 2))) if blinks else still
-    aim = _aim_eyes(time_s, end_s, spoken, _generator(seed, 3)) if gaze else np.zeros((len(time_s), 2))
-    raised = _raise_brows(time_s, accent, spoken, _generator(seed, 4)) if brows else still
+    lids = lid_closure(time_s, blink_times(end_s, spoken, words, np.random.default_rng([seed, 2]))) if blinks else still
+    aim = _aim_eyes(time_s, end_s, spoken, np.random.default_rng([seed, 3])) if gaze else np.zeros((len(time_s), 2))
+    raised = _raise_brows(time_s, accent, spoken, np.random.default_rng([seed, 4])) if brows else still
     mood, eyes = list_action_units(motion, time_s), aim - GAZE_COUNTER_SHARE * turn[:, :2]
     if mood and brows:  # it comes and goes in the upper face, and grows with accents
-        slow = np.tanh(sway(time_s, _generator(seed, 5), 0.06, 0.3))
+        slow = np.tanh(sway(time_s, np.random.default_rng([seed, 5]), 0.06, 0.3))
         accented = _at(_smooth(accent, 0.2), time_s + BROW_LEAD_S) - 0.4
         lively = 1 + MOOD_WANDER * slow + MOOD_ACCENT * accented
         mood |= {unit: np.clip(mood[unit] * lively, 0, 1) for unit in UPPER_FACE_UNITS.values() if unit in mood}
@@ -199,10 +200,6 @@ def lid_closure(time_s: Curve, blink_s: list[float]) -> Curve:
         shut = np.clip(np.where(share < 0.38, share / 0.3, (1 - share) / 0.55), 0, 1)
         closed[first:last] = np.maximum(closed[first:last], np.sin(shut * np.pi / 2) ** 2)
     return closed
-
-
-def _generator(seed: int, part: int) -> np.random.Generator:
-    return np.random.default_rng([seed, part])
 
 
 def _smooth(curve: Curve, deviation_s: float) -> Curve:
@@ -282,9 +279,7 @@ def _raise_brows(time_s: Curve, accent: Curve, spoken: Spans, rng: np.random.Gen
     return raised
 
 
-def draw_fixation(
-    rng: np.random.Generator, last: tuple[float, float], at_border: bool
-) -> tuple[tuple[float, float], float]:
+def draw_fixation(rng: np.random.Generator, last: Aim, at_border: bool) -> tuple[Aim, float]:
     """Return where the eyes look next, to the left and upwards, radians, and for how long, seconds.
 
     last      : where they look now: who looks away looks back

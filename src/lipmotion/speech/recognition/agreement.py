@@ -35,7 +35,9 @@ Place = tuple[float, float]  # start and end in seconds
 class TranscriptFit:
     """How well a transcript fits a recording."""
 
-    score: float  # the agreement score (``score_agreement``)
+    score: float
+    """How well phones agree with the sound: mean over phones of the mean over their frames of the log density of the
+    phone less that of the best one (at least ``WORST_SCORE``); 0 where none is more probable, or nothing is said."""
     missing: tuple[Place, ...]  # stretches with speech that the transcript leaves out, in order
     speech_s: float  # seconds of speech in the recording, those that are missing included
     evidence: TranscriptEvidence | None = None  # by a phone recogniser; where there is some, it decides
@@ -81,7 +83,8 @@ class TranscriptFit:
 def measure_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
     """Return how well the aligned phones of a transcript fit a recording.
 
-    audio, units : as of ``score_agreement``
+    audio : an ``AnalysedAudio`` shares its features with what else is computed of it
+    units : of the audio, as ``Recogniser.align`` returns them
     Forced alignment finds a place for every word, and fills the recording with them: where the transcript leaves words
     out, it stretches phones of their neighbours (``LONG_PHONE_S``), or calls loud sound silence (``MIN_VOICE_S``).
     Raises MissingDependencyError: pocketsphinx is not installed.
@@ -146,18 +149,6 @@ def _join(places: list[Place]) -> tuple[Place, ...]:
         else:
             joined.append((start_s, end_s))
     return tuple(joined)
-
-
-def score_agreement(audio: Audio, units: Timeline[Unit]) -> float:
-    """Return how well a recording agrees with phones in time, by the general models.
-
-    audio : an ``AnalysedAudio`` shares its features with what else is computed of it
-    units : of the audio, as ``Recogniser.align`` returns them
-    Returns the mean over phones of the mean over their frames of the log density of the phone less that of the best
-    phone (at least ``WORST_SCORE``): 0 where no other phone is more probable, or nothing is spoken.
-    Raises MissingDependencyError: pocketsphinx is not installed.
-    """
-    return _score_frames(analysed(audio), units)[2]
 
 
 def _score_frames(audio: AnalysedAudio, units: Timeline[Unit]) -> tuple[NDArray[np.intp], NDArray[np.float32], float]:

@@ -68,29 +68,20 @@ class Recogniser:
         if self.kind not in RECOGNISER_KINDS:
             raise InputError(f"unknown recogniser {self.kind!r}; required one of: {', '.join(RECOGNISER_KINDS)}")
 
-    def recognise(self, audio: Audio, features: Features) -> Timeline[Unit]:
-        """Return the most probable phones of a recording in time: Viterbi with a back-off bigram.
-
-        audio    : an ``AnalysedAudio`` shares its features with what else is computed of it
-        features : of the audio, as ``mfcc`` returns them
-        Digital silence, of which all normalised features are 0, is recognised as silence.
-        With words, see ``recognition``.
-        Raises MissingDependencyError: general models or words are wanted and pocketsphinx is not installed.
-        Source: Hofer 2008, Eq. 5.
-        """
-        return self.recognition(audio, features).units
-
     def recognition(
         self, audio: Audio, features: Features, each: ParallelMap = map, *, english: bool = True
     ) -> Recognition:
-        """Return the recognised phones of a recording in time, with the words that decided them.
+        """Return the most probable phones of a recording in time, with the words that decided them.
 
-        english         : whether English words are searched; in other languages, phones alone
+        audio    : an ``AnalysedAudio`` shares its features with what else is computed of it
+        features : of the audio, as ``mfcc`` returns them; where all are 0, as in digital silence, there is silence
+        english  : whether English words are searched; in other languages, phones alone
         Words are recognised in every stretch of sound and aligned by our models: by a phone recogniser where it is sure
         (``speech.recognition.network``), else by pocketsphinx. Then ``auto`` compares their likelihood with that of the
         best path of phones without words: words that fit decide their phones; of the other words, the phones only
         become more probable (``speech.recognition.word_search``).
-        Raises MissingDependencyError: as ``recognise``.
+        Raises MissingDependencyError: general models or words are wanted and pocketsphinx is not installed.
+        Source: Hofer 2008, Eq. 5 (Viterbi with a back-off bigram).
         """
         audio = analysed(audio, features)
         if not features.values.any() or not audio.passages:
@@ -161,8 +152,7 @@ class Recogniser:
         anchors : times of the words, within which they are aligned (``recognition.anchors``); None: anywhere
         The reading and the pronunciation of each word, and the pauses, are those with the most probable path. A phone
         without a model borrows that of the most similar phone with one (``units.SIMILAR_PHONES``).
-        Raises AlignmentError: the transcript does not fit into the recording.
-        Raises MissingDependencyError: as ``recognise``.
+        Raises AlignmentError: the transcript does not fit into the recording. MissingDependencyError: ``recognition``.
         """
         audio = analysed(audio, features)
         hmm, log_likelihoods = self._log_likelihoods(audio, aligning=True)
@@ -187,7 +177,7 @@ class Recogniser:
         """Return the density of each frame's state on the most probable path [shape=(T,)].
 
         They are numbered as in ``combined``, with the kind ``own`` as in the own models; of digital silence as silence.
-        Raises MissingDependencyError: as ``recognise``.
+        Raises MissingDependencyError: as ``recognition``.
         """
         if not features.values.any():
             return np.full(len(features.values), self.own.table.density(SILENCE, 0), np.intp)
