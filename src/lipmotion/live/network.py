@@ -10,7 +10,6 @@ from __future__ import annotations
 import copy
 from collections import deque
 from functools import cache
-from importlib import resources
 from math import gcd
 from typing import Any, NamedTuple
 
@@ -23,6 +22,7 @@ from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.network_steps import shape_convolutional
 from lipmotion.speech.features.mfcc import BANDS, FFT_SIZE, HOP, WINDOW, mel_filters
 from lipmotion.stats.networks import ConvolutionalNetwork
+from lipmotion.storage.archive import read_shipped_arrays
 from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS, SPEECH_RATE_HZ
 
 TAPS, BLOCK = 16, 160
@@ -257,9 +257,7 @@ class LiveNetwork(NamedTuple):
 @cache
 def live_network() -> LiveNetwork:
     """Return the network of the package."""
-    path = resources.files("lipmotion") / "models" / WEIGHTS
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-        arrays = dict(stored)
+    arrays = read_shipped_arrays(WEIGHTS)
     network = SHAPE.from_arrays({name: arrays[name] for name in SHAPE.specs}, len(LAGS) * OUTPUTS)
     values = {name: arrays[name].astype(float) for name in LiveNetwork._fields[1:]}
     return LiveNetwork(network, **{**values, "typical": arrays["typical"].astype(np.float32)})

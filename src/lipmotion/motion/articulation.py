@@ -245,13 +245,11 @@ ARTICULATION = {
 
 def _list_contexts(units: Timeline[Unit]) -> Iterator[tuple[Context, Span[Unit]]]:
     """Yield each known phone between its neighbours; pauses count as silence."""
-    for left, span, right in with_neighbours(units):
+    for before, span, after in with_neighbours(units):
         if span.label.phone:
-            yield (_merge_pauses(left), _merge_pauses(span.label.phone), _merge_pauses(right)), span
-
-
-def _merge_pauses(phone: str) -> str:
-    return SILENCE if is_silent(phone) else phone
+            phones = (before, span.label.phone, after)
+            left, phone, right = (SILENCE if is_silent(each) else each for each in phones)
+            yield (left, phone, right), span
 
 
 def measure_articulators(motion: NDArray[np.floating[Any]], names: Sequence[str]) -> dict[str, Array]:

@@ -114,15 +114,13 @@ class LearnedMotion:
         Voices that training does not know part their lips to speak and have typical talkers' range; they, and known
         ones in noise, follow what the general network hears (``motion.articulation``).
         statistics    : returns the predicted means and precisions of a range of frames [each shape=(N, 3, Q)]
-        frames        : length of the whole recording, T
-        units         : phones in time
+        frames, units : length of the whole recording, T, and its phones in time
         constraints   : pins of channels that are modelled as they are
         close         : whether the lips are made to meet in every p, b and m
         closing_units : units that close the lips where no phone is known
         reliability   : of the phones in time, 0 to 1 [shape=(T,)]
         voice         : how well training knows the voice, 0 to 1: others move as far as people do on average
-        articulators  : what the general network hears in the sound [shape=(T, 8)], for voices not known to training and
-                        in noise
+        articulators  : what the general network hears [shape=(T, 8)], for voices not known to training, and in noise
         Raises InputError: a pin names no channel, lies outside the recording, is not finite, or contradicts another.
         Raises ModelFormatError: the motion leaves the limits, so that the model must be damaged.
         """

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -30,6 +29,7 @@ from lipmotion.stats.networks import (
     make_network,
     make_recurrent_network,
 )
+from lipmotion.storage.archive import read_shipped_arrays
 from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, check_arrays
 from lipmotion.types import Progress, Speech
 
@@ -211,6 +211,4 @@ def hear_articulators(speech: Speech) -> NDArray[np.float64] | None:
 @cache
 def load_shipped() -> ConvolutionalNetwork:
     """Return the network of the package."""
-    path = resources.files("lipmotion") / "models" / WEIGHTS
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-        return GENERAL_SHAPE.from_arrays(dict(stored), len(ARTICULATORS))
+    return GENERAL_SHAPE.from_arrays(read_shipped_arrays(WEIGHTS), len(ARTICULATORS))

@@ -16,7 +16,7 @@ from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
 from lipmotion.motion.frame_labels import list_speech_intervals
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
-from lipmotion.types import FRAME_RATE_HZ, Channel, Motion, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Channel, Timeline, Unit
 from lipmotion.units import VISEME_OF, VISEMES
 
 NEAR_SPEECH_S, FAR_FROM_SPEECH_S = 0.1, 0.48
@@ -153,14 +153,3 @@ def compose_maps(first: SpeakerMap | None, second: SpeakerMap) -> SpeakerMap:
     offset = second.offset + second.gain * first.offset
     rest = second.rest + second.gain * first.rest
     return SpeakerMap(second.channels, gain, offset, rest, first.habits, first.lips)
-
-
-def select_channels(motion: Motion, channels: Sequence[Channel], where: str) -> Motion:
-    """Return motion in the channels of a model. Raises InputError, which names the recording: a channel is missing."""
-    missing = [channel for channel in channels if channel not in motion.channels]
-    if missing:
-        first, share = missing[0], f"{len(missing)} of {len(channels)} channels of the model"
-        what = f"{where}: its motion lacks {share}, as {first.name!r} in the unit {first.unit!r};"
-        raise InputError(f"{what} give recordings with all of them (lipmotion info), or another model")
-    columns = [motion.channels.index(channel) for channel in channels]
-    return Motion(np.asarray(motion.values)[:, columns], motion.rate_hz, tuple(channels))

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cache
-from importlib import resources
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lipmotion.speech.features.mfcc import HOP, WINDOW, make_triangles
+from lipmotion.storage.archive import read_shipped_arrays
 from lipmotion.types import SPEECH_RATE_HZ
 
 Array = NDArray[np.float32]
@@ -152,7 +152,7 @@ class Encoder(NamedTuple):
 @cache
 def load_encoder() -> Encoder:
     """Return the network of the package."""
-    return find_encoder(_read_arrays())
+    return find_encoder(read_shipped_arrays(WEIGHTS))
 
 
 @cache
@@ -161,15 +161,8 @@ def read_background() -> tuple[Array, Array]:
 
     The whitening is a matrix, of the covariance of recordings of one speaker in many conditions [shape=(128, 128)].
     """
-    arrays = _read_arrays()
+    arrays = read_shipped_arrays(WEIGHTS)
     return arrays["speaker_centre"], arrays["speaker_whitening"].astype(np.float32)
-
-
-@cache
-def _read_arrays() -> dict[str, NDArray[Any]]:
-    path = resources.files("lipmotion") / "models" / WEIGHTS
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-        return dict(stored)
 
 
 def find_encoder(arrays: Mapping[str, NDArray[Any]]) -> Encoder:

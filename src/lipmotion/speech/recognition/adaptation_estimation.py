@@ -52,8 +52,7 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
     All recordings are recognised with the own and the general models. The features of both then get the affine
     transform that makes the recognised states most probable, with the identity as prior mean. The frequencies are
     stretched first, by one factor for all recordings.
-    Raises InputError: less speech than ``MIN_SPEECH_S``.
-    Raises MissingDependencyError: pocketsphinx is not installed.
+    Raises InputError: less speech than ``MIN_SPEECH_S``. Raises MissingDependencyError: pocketsphinx is not installed.
     Source: Gales 1998 (constrained MLLR); Lei, Hamaker & He 2006 (a prior for it; ours is the models' own statistics).
     """
     audios = [analysed(audio) for audio in recordings]

@@ -228,11 +228,9 @@ def speak_sentences(
 
     lexicon : its pronunciations tell which vowels are unstressed; the built-in one by default
     Raises MissingDependencyError: the synthesiser is not installed (the message names the package).
-    Raises InputError: no such synthesiser or voice, a text without a word, or one that the synthesiser cannot say.
+    Raises InputError: no such voice, a text without a word, or one that the synthesiser cannot say.
     """
-    synthesiser = SYNTHESISERS.get(voice.synthesiser)
-    if synthesiser is None:
-        raise InputError(f"unknown synthesiser {voice.synthesiser!r}; required one of: {', '.join(SYNTHESISERS)}")
+    synthesiser = SYNTHESISERS[voice.synthesiser]
     names = [known.name for known in synthesiser.voices()]
     if not names:
         raise MissingDependencyError(f"{synthesiser.name} has no English voice here: {explain_install(synthesiser)}")
