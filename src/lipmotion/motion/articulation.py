@@ -152,12 +152,10 @@ def compare_vowels() -> Array:
     """
     table = read_articulation_table()
     counts = {row["phone"]: float(row["count"]) for row in read_shipped_table(*TABLE)}
+    kinds = ([each for each in table if not is_silent(each) and (each in VOWELS) == vowel] for vowel in (False, True))
     consonants, vowels = (
         np.average([table[phone] for phone in phones], axis=0, weights=[counts[phone] for phone in phones])
-        for phones in (
-            [phone for phone in table if not is_silent(phone) and phone not in VOWELS],
-            [phone for phone in table if phone in VOWELS],
-        )
+        for phones in kinds
     )
     more_open: Array = (vowels - consonants).mean(axis=0)
     return more_open / more_open[ARTICULATORS.index(OPENING)]

@@ -173,16 +173,11 @@ class PosteriorNetwork(Predictor):
         """Deserialise a network; as ``Predictor.from_arrays``."""
         stored = check_arrays(arrays, TARGETS, Q=dimensions)
         centre, scale = stored["posterior_targets"]
-        return cls(
-            SHAPE.from_arrays(arrays, dimensions),
-            stored["posterior_mean"],
-            stored["posterior_basis"],
-            centre,
-            check_scale(scale, "posterior_targets"),
-            stored["posterior_variances"],
-            str(stored["posterior_source"][0]),
-            None if arrays.keys().isdisjoint(RECURRENT.specs) else RECURRENT.from_arrays(arrays, dimensions),
-        )
+        scale, network = check_scale(scale, "posterior_targets"), SHAPE.from_arrays(arrays, dimensions)
+        mean, basis, variances = (stored[f"posterior_{name}"] for name in ("mean", "basis", "variances"))
+        is_alone = arrays.keys().isdisjoint(RECURRENT.specs)
+        recurrent = None if is_alone else RECURRENT.from_arrays(arrays, dimensions)
+        return cls(network, mean, basis, centre, scale, variances, str(stored["posterior_source"][0]), recurrent)
 
 
 def list_posteriors(examples: Sequence[Example]) -> list[TokenPosteriors] | None:

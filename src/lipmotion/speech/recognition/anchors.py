@@ -190,10 +190,8 @@ def align_within(
     wrong = np.flatnonzero(_average_neighbours(last_fits) < WORST_FIT)
     if len(wrong):
         known = anchors.start_s[(anchors.groups <= int(wrong[0])) & ~np.isnan(anchors.start_s)]
-        LOG.warning(
-            "at %d of the %d times of the transcript the words do not fit the sound, first at %.2f s; check them",
-            *(len(wrong), len(last_fits), float(known[-1]) if len(known) else 0.0),
-        )
+        what = "at %d of the %d times of the transcript the words do not fit the sound, first at %.2f s; check them"
+        LOG.warning(what, len(wrong), len(last_fits), float(known[-1]) if len(known) else 0.0)
     return placed, windows
 
 

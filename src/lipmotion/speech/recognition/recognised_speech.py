@@ -81,13 +81,8 @@ def align_recognised_words(
     phones = [(phone, item.word) for item in spoken for phone in (
         variants[words[item.word]][item.variant] if item.word >= 0 else item.units)]  # fmt: skip
     bounds = np.searchsorted(states.positions[path], np.arange(len(sequence) + 1)).astype(np.intp)
-    return AlignedWords(
-        tuple(words),
-        tuple(phone for phone, _ in phones),
-        np.array([word for _, word in phones], np.intp),
-        bounds,
-        states.densities[path],
-    )
+    names, of_word = tuple(phone for phone, _ in phones), np.array([word for _, word in phones], np.intp)
+    return AlignedWords(tuple(words), names, of_word, bounds, states.densities[path])
 
 
 def weigh_densities(hmm: UnitHmm, present: NDArray[np.float32], bonus: float, reach: int) -> NDArray[np.float32]:
@@ -275,14 +270,9 @@ def join_recognition(parts: Sequence[tuple[Passage, Recognition]], duration_s: f
     posteriors = np.array([np.nan if part.posterior is None else part.posterior for _, part in parts])
     decided = ~np.isnan(posteriors)
     posterior = float(np.average(posteriors[decided], weights=speech_s[decided] + 1e-9)) if decided.any() else None
-    return Recognition(
-        join_units(units, Unit(SILENCE), duration_s),
-        Timeline(tuple(words)),
-        sum(part.word_s for _, part in parts),
-        sum(part.phone_s for _, part in parts),
-        parts[int(np.argmax(speech_s))][1].similarity,
-        posterior,
-    )
+    joined, similarity = join_units(units, Unit(SILENCE), duration_s), parts[int(np.argmax(speech_s))][1].similarity
+    word_s, phone_s = sum(part.word_s for _, part in parts), sum(part.phone_s for _, part in parts)
+    return Recognition(joined, Timeline(tuple(words)), word_s, phone_s, similarity, posterior)
 
 
 def select_reliable(units: Timeline[Unit], confidence: float) -> Timeline[Unit]:

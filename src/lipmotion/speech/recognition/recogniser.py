@@ -94,12 +94,8 @@ class Recogniser:
             return join_recognition(list(zip(audio.passages, recognitions, strict=True)), features.duration_s)
         is_judged = self.adaptation is None and self.kind != "general"  # else nothing depends on it
         similarity = speaker_similarity(self.own, audio) if is_judged else None
-        known = (
-            self.kind == "auto"
-            and similarity is not None
-            and similarity.score > OWN_SCORE
-            and self.own.bigram.perplexity < SMALL_PERPLEXITY
-        )
+        is_own = similarity is not None and similarity.score > OWN_SCORE
+        known = self.kind == "auto" and is_own and self.own.bigram.perplexity < SMALL_PERPLEXITY
         if uses_network(self.kind) and not known:
             stretches = find_stretches(audio, each)
             if mean_posterior(stretches) >= WORD_POSTERIORS[0] or not english:

@@ -138,16 +138,9 @@ def build_word_tree(pronunciations: list[list[bytes]], scores: NDArray[np.float6
     for place, word in zip(last.tolist(), words.tolist(), strict=True):
         ends.setdefault(place, []).append(word)
     ends |= {place: [NO_WORD] for place in free.tolist()}
-    return WordTree(
-        sound,
-        score,
-        (np.cumsum(arcs) - arcs).astype(np.int32),
-        arcs.astype(np.int32),
-        targets[order].astype(np.int32),
-        ends,
-        np.isin(np.arange(count + len(SOUNDS)), list(ends)),
-        count,
-    )
+    first_arc, is_end = (np.cumsum(arcs) - arcs).astype(np.int32), np.isin(np.arange(count + len(SOUNDS)), list(ends))
+    target = targets[order].astype(np.int32)
+    return WordTree(sound, score, first_arc, arcs.astype(np.int32), target, ends, is_end, count)
 
 
 BEAM, MAX_PATHS = 10.0, 1000
