@@ -10,7 +10,6 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -85,9 +84,8 @@ def read_archive(path: Path) -> dict[str, NDArray[Any]]:
     return {name.removesuffix(ARRAY): take_array(content) for name, content in members.items()}
 
 
-@cache
 def read_shipped_arrays(name: str) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a file of the package's models; they are kept."""
+    """Return the arrays of a file of the package's models."""
     path = resources.files("lipmotion") / "models" / name
     with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
         return dict(stored)

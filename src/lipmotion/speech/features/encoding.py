@@ -149,10 +149,13 @@ class Encoder(NamedTuple):
     shift: Array  # [shape=(D,)]
 
 
+_read_arrays = cache(read_shipped_arrays)  # the encoder and the background are in one file
+
+
 @cache
 def load_encoder() -> Encoder:
     """Return the network of the package."""
-    return find_encoder(read_shipped_arrays(WEIGHTS))
+    return find_encoder(_read_arrays(WEIGHTS))
 
 
 @cache
@@ -161,7 +164,7 @@ def read_background() -> tuple[Array, Array]:
 
     The whitening is a matrix, of the covariance of recordings of one speaker in many conditions [shape=(128, 128)].
     """
-    arrays = read_shipped_arrays(WEIGHTS)
+    arrays = _read_arrays(WEIGHTS)
     return arrays["speaker_centre"], arrays["speaker_whitening"].astype(np.float32)
 
 

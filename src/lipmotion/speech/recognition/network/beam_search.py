@@ -73,7 +73,8 @@ def load_english() -> EnglishWords:
         log_math = LogMath()
         model = NGramModel(Config(), log_math, str(find_english_data() / "en-us.lm.bin"))
     except (ImportError, RuntimeError) as error:
-        raise MissingDependencyError(f"words need pocketsphinx's language model ({error}): pip install it") from error
+        message = f"words are recognised with the language model of pocketsphinx ({error}): pip install pocketsphinx"
+        raise MissingDependencyError(message) from error
     base = float(np.log(log_math.exp(1)))
     pronounced = _pronunciations()
     names = list(pronounced)
