@@ -131,7 +131,7 @@ def phones(corpora: Path, model: Model, _: Path | None) -> None:
         count = sum(len(wanted) for _, wanted in recordings)
         total_s = sum(audio.duration_s for audio, _ in recordings)
         times = [
-            seconds(lambda: [phone_recogniser.recognise(a, analysed(a).mfcc()) for a, _ in recordings])  # noqa: B023
+            seconds(lambda: [phone_recogniser.recognition(a, analysed(a).mfcc()) for a, _ in recordings])  # noqa: B023
             for _ in range(5)
         ]
         show(

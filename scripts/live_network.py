@@ -91,6 +91,7 @@ VISEME_SCALE = 3.0  # what is said is learned with deviations about as large as 
 MICROPHONE_DB, MICROPHONE_KNOTS = 4.0, 6
 LARGEST_GAIN, CURVE_CLIPS, BABBLE = 1.6, 40, 40
 PIECE_STEPS, HELD_OUT = 250, 20
+REACH = sum(SHAPE.initial(1, 0).dilations)  # steps that the network hears before and after one
 """Steps of a piece for training; and one in so many recordings measures the errors instead."""
 WEIGHTS_OF = dict.fromkeys(ARTICULATORS, 1.0) | {"opening": 4.0, "width": 3.0, "outer": 2.0}
 Array = NDArray[np.float32]
@@ -289,8 +290,8 @@ def hear(levels: Array, typical: Array, seed: tuple[int, ...]) -> Array:
 
 def shift(inputs: Array, targets: Array, typical: Array) -> TrainingSequence:
     """Return inputs, after the silence that the network begins with, with the targets of all lags, each as late."""
-    reach, steps = sum(SHAPE.dilations), len(inputs)
-    heard = np.concatenate([np.tile(silent_step(typical), (reach, 1)), inputs])
+    steps = len(inputs)
+    heard = np.concatenate([np.tile(silent_step(typical), (REACH, 1)), inputs])
     wanted = np.clip(np.arange(len(heard))[:, None] - np.array(LAGS), 0, steps - 1)
     rows = targets[wanted, :OUTPUTS].reshape(len(heard), -1) * output_scale()
     hints = targets[np.clip(np.arange(len(heard)) - HINT_LAG, 0, steps - 1), OUTPUTS:]
@@ -299,10 +300,9 @@ def shift(inputs: Array, targets: Array, typical: Array) -> TrainingSequence:
 
 def cut(whole: TrainingSequence, start: int) -> TrainingSequence:
     """Return a piece, of which counts what the network hears all of."""
-    reach = sum(SHAPE.dilations)
-    piece = TrainingSequence(*(part[start : start + PIECE_STEPS + 2 * reach] for part in whole))
+    piece = TrainingSequence(*(part[start : start + PIECE_STEPS + 2 * REACH] for part in whole))
     places = np.arange(len(piece.inputs))
-    return piece._replace(valid=piece.valid & (places < len(places) - reach) & ((start == 0) | (places >= reach)))
+    return piece._replace(valid=piece.valid & (places < len(places) - REACH) & ((start == 0) | (places >= REACH)))
 
 
 def prepare(options: argparse.Namespace) -> Iterator[Lesson]:

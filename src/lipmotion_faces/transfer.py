@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import ceil
 from pathlib import Path
@@ -13,9 +13,11 @@ import numpy as np
 from lipmotion.corpora import Corpus
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.kernels.compiler import limit_threads
+from lipmotion.motion.closure import OPENING
+from lipmotion.motion.frame_labels import mark_distant
 from lipmotion.motion.space import resample_track
-from lipmotion.motion.speaker_estimation import count_speech_s, fit_transfer_map
-from lipmotion.motion.speaker_maps import SpeakerMap, select_channels
+from lipmotion.motion.speaker_estimation import estimate_gains, estimate_rest_poses, measure_person
+from lipmotion.motion.speaker_maps import MAX_GAIN, VISEME_NAMES, SpeakerMap
 from lipmotion.pipeline.analysis.read_request import read_recording
 from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.generation import find_speaker_map, generate_for
@@ -24,13 +26,15 @@ from lipmotion.pipeline.request import Onto, Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.sources import check_source
-from lipmotion.types import Audio, Example, Track
+from lipmotion.types import FRAME_RATE_HZ, Audio, Channel, Example, Motion, Track
 from lipmotion_faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import track
 
 MAX_FOOTAGE_S = 60.0  # seconds of footage that are used: the first of a video, utterances spread evenly over a corpus
 MIN_SPEECH_S = 0.5  # fewest seconds of speech, with the face measured, of which a map is made
+REST_PRIOR_S = 0.5
+"""Seconds of silence that count as much as the assumption that the map of speech is right in silence, too."""
 
 
 @limit_threads()
@@ -81,7 +85,7 @@ def map_onto(
             motion = generate_for(of_speaker, measured.engine, measured.learned, same).motion
             valid = np.ones(len(motion.values), bool)
         source.append(Example(name, analysed, generated, valid))
-        target.append(Example(name, analysed, select_channels(motion, generated.channels, where), valid))
+        target.append(Example(name, analysed, _match_channels(motion, generated.channels, where), valid))
     spoken_s = count_speech_s(target)
     if spoken_s < MIN_SPEECH_S:
         raise InputError(
@@ -142,3 +146,49 @@ def _list_takes(
         audio = read_audio(opened)
         first = Audio(audio.samples[: round(MAX_FOOTAGE_S * audio.rate_hz)], audio.rate_hz)
         yield where, Request(first), track(opened, crops=False, span=VideoSpan(0.0, MAX_FOOTAGE_S))
+
+
+def fit_transfer_map(source: Sequence[Example], target: Sequence[Example]) -> SpeakerMap:
+    """Return the map from the motion of a source person to that of a target person, fitted in the same speech.
+
+    source : generated motion of the source, for the speech of the target
+    target : measured motion of the target; the same channels
+    - Closed lips map onto closed lips. The median pose of all other channels in speech maps onto the target's.
+    - The range in speech (5th to 95th percentile) maps onto the target's; points share one gain for each axis, so that
+      the face keeps the shape of the target. With S seconds of speech the logarithm of a gain counts S / (S + 2), and
+      gains lie between 1 / ``MAX_GAIN`` and ``MAX_GAIN``: a short recording gives place and shape alone.
+    - In silence away from speech the rest pose maps onto the target's. With S seconds of such silence that counts
+      S / (S + 0.5): people rest with closed lips in one pause and with parted lips in the next.
+    The map has no habits (``SpeakerMap.habits`` is 0).
+    Source of the task: Minnis & Breen 2000, §7. Alternatives that were measured: docs/results/selection.md.
+    """
+    channels = source[0].motion.channels
+    names = [channel.name for channel in channels]
+    column = names.index(OPENING) if OPENING in names else None
+    people = [measure_person(examples, column) for examples in (source, target)]
+    gains, rests = estimate_gains(people, channels, float(np.sqrt(MAX_GAIN))), estimate_rest_poses(people)
+    gain = gains[1] / gains[0]
+    offset = people[1].spoken - gain * people[0].spoken
+    closed = people[0].closed
+    if column is not None:
+        offset[column] = people[1].closed - gain[column] * closed
+    rest = people[1].rest_s / (people[1].rest_s + REST_PRIOR_S) * (rests[1] - offset - gain * rests[0])
+    habits = np.zeros((len(VISEME_NAMES), len(channels)))
+    return SpeakerMap(channels, gain, offset, rest, habits, (closed, closed + 1))
+
+
+def count_speech_s(examples: Sequence[Example]) -> float:
+    """Return the seconds of speech in which the motion of some examples was measured."""
+    spoken = (each.valid & ~mark_distant(each.speech.units, len(each.valid), 0.0) for each in examples)
+    return sum(int(frames.sum()) for frames in spoken) / FRAME_RATE_HZ
+
+
+def _match_channels(motion: Motion, channels: Sequence[Channel], where: str) -> Motion:
+    """Return motion in the channels of a model. Raises InputError, which names the recording: a channel is missing."""
+    missing = [channel for channel in channels if channel not in motion.channels]
+    if missing:
+        first, share = missing[0], f"{len(missing)} of {len(channels)} channels of the model"
+        what = f"{where}: its motion lacks {share}, as {first.name!r} in the unit {first.unit!r};"
+        raise InputError(f"{what} give recordings with all of them (lipmotion info), or another model")
+    columns = [motion.channels.index(channel) for channel in channels]
+    return Motion(np.asarray(motion.values)[:, columns], motion.rate_hz, tuple(channels))

@@ -154,7 +154,10 @@ def test_no_time_at_all_and_less_than_the_hold() -> None:
 
 
 def test_the_usual_hold_is_two_frames_at_24() -> None:
-    assert [cue_sheets.choose_hold_frames(fps) for fps in (1, 12, 24, 25, 30, 48, 60)] == [1, 1, 2, 2, 3, 4, 5]
+    said = result(timeline([("b", 0.06), ("iy", 0.06), ("f", 0.06), ("aa", 0.06), ("m", 0.06), ("uw", 0.06)] * 4))
+    for fps, frames in zip((1, 12, 24, 25, 30, 48, 60), (1, 1, 2, 2, 3, 4, 5), strict=True):
+        assert choose_cues(said, fps).rows == choose_cues(said, fps, frames).rows
+        assert fps < 24 or choose_cues(said, fps).rows != choose_cues(said, fps, frames + 1).rows
 
 
 def test_phones_outside_the_motion() -> None:

@@ -8,16 +8,10 @@ from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion import speaker_maps
 from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.motion.frame_labels import is_away_from_speech, list_speech_intervals
-from lipmotion.motion.speaker_estimation import (
-    RANGE_PRIOR_S,
-    REST_PRIOR_S,
-    add_habits,
-    count_speech_s,
-    fit_transfer_map,
-    map_to_mean_person,
-)
+from lipmotion.motion.speaker_estimation import RANGE_PRIOR_S, add_habits, map_to_mean_person
 from lipmotion.motion.speaker_maps import compose_maps
 from lipmotion.types import Channel, Example, Features, Motion, Span, Speech, Timeline, Unit
+from lipmotion_faces.transfer import REST_PRIOR_S, count_speech_s, fit_transfer_map
 from testing.toy import toy_motion, toy_sentences
 
 GAIN, OFFSET, PARTED = np.array([0.5, 1.4, 0.8]), np.array([0.03, -0.2, 0.1]), np.array([0.05, 0.0, 0.05])

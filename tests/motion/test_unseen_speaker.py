@@ -263,7 +263,9 @@ def test_contexts_are_counted_with_pauses_as_silence() -> None:
     units = timeline(("t", "aa"))
     first, *spoken, last = units
     first, last = (replace(span, label=replace(span.label, phone="sp")) for span in (first, last))
-    assert articulation.count_contexts([units, Timeline((first, *spoken, last))])["sil", "t", "aa"] == 2
+    prior = articulation.ArticulationPrior(np.zeros(1), np.zeros((8, 1)), {("sil", "t", "aa"): 9})
+    paused, silent = (prior.familiarity(each, 200) for each in (Timeline((first, *spoken, last)), units))
+    np.testing.assert_array_equal(paused, silent)
 
 
 def test_motion_without_an_opening_has_no_table() -> None:

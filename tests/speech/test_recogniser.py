@@ -25,7 +25,7 @@ from lipmotion.speech.recognition.recognised_speech import (
 )
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.stats.constrained_mllr import log_determinant
-from lipmotion.types import Audio, Timeline, Unit
+from lipmotion.types import Audio, Features, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon
 from lipmotion.units.phones import SHORT_PAUSE_S, count_phone_edits
 from pipeline.made import features_of, read_sound
@@ -50,7 +50,7 @@ def align(hmm: Any, audio: Audio, words: Sequence[str], lexicon: Lexicon, kind: 
 
 def recognise(hmm: Any, audio: Audio, kind: str = "own") -> Timeline[Unit]:
     sound = read_sound(audio)
-    return recogniser.Recogniser(hmm, kind).recognise(sound, sound.mfcc())
+    return recogniser.Recogniser(hmm, kind).recognition(sound, sound.mfcc()).units
 
 
 def phones(units: Timeline[Unit]) -> list[str]:
@@ -245,7 +245,8 @@ def test_labels_are_those_of_the_words_that_are_believed() -> None:
 
 def test_what_was_recognised() -> None:
     labels = [LabelledFrames(*each) for each in ((0, "sil"), (10, "b", 0), (20, "iy", 0), (40, "z"))]
-    found, doubtful = (build_recognition(labels, [RecognisedWord("bee", sure)], 51, 0.5, None) for sure in (0.8, 0.3))
+    clip = Features(np.zeros((51, 39), np.float32), 0.5)
+    found, doubtful = (build_recognition(labels, [RecognisedWord("bee", sure)], clip, None) for sure in (0.8, 0.3))
     (word,) = found.words
     assert (word.start_s, word.end_s, word.label.text) == (pytest.approx(0.1), pytest.approx(0.4), "bee")
     assert [span.label.word for span in found.units] == ["", "bee", "bee", ""]
@@ -254,7 +255,7 @@ def test_what_was_recognised() -> None:
     assert (found.reliability, doubtful.reliability) == pytest.approx((1, 0))
     shares = [replace(found, posterior=posterior).reliability for posterior in (0.6, 0.8, 0.95)]
     assert shares == pytest.approx([0, 0.5, 1])
-    wordless = build_recognition([LabelledFrames(0, "sil")], [], 51, 0.5, None)
+    wordless = build_recognition([LabelledFrames(0, "sil")], [], clip, None)
     assert replace(wordless, posterior=0.575).reliability == pytest.approx(0.5)
 
 
@@ -334,7 +335,7 @@ def test_the_speaker_of_the_training_has_full_weight_and_changes_little(
         features = features_of(audio)
         changed = one.own_features(read_sound(audio)) - features.values
         assert np.sqrt(np.square(changed).mean()) < 0.5
-        first, then = ([s.label.phone for s in recogniser.recognise(audio, features)] for recogniser in (before, after))
+        first, then = ([s.label.phone for s in each.recognition(audio, features).units] for each in (before, after))
         assert count_phone_edits(first, then) <= 2
     long = estimate_adaptation(toy_model.phones, voice * 3)  # features and their deltas move together
     assert long.speech_s == pytest.approx(3 * same_speaker.speech_s, rel=0.1)
@@ -359,7 +360,7 @@ def test_too_little_speech(toy_model: Model, voice: list[types.Audio]) -> None:
     loud = int(np.abs(voice[0].samples).argmax())
     short = np.pad(voice[0].samples[max(loud - 4000, 0) : loud + 4000], 16_000)
     for samples, message in (
-        (0.01 * np.random.default_rng(0).normal(size=32_000), "no speech found"),
+        (0.01 * np.random.default_rng(0).normal(size=32_000), "found 0.0 s of speech"),
         (short, r"found 0.\d s of speech, required at least 1 s"),
     ):
         with pytest.raises(errors.InputError, match=message):

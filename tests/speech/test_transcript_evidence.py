@@ -216,7 +216,7 @@ def test_it_is_the_mean_over_phones_of_the_best_state_of_what_is_said(sentences:
         states = density[frame].reshape(len(general.PHONES), 3)[general.PHONES.index(names.get(phone, phone.upper()))]
         wanted.setdefault(number, []).append(max(states.max(), agreement.WORST_SCORE))
     mean = np.mean([np.mean(scores) for scores in wanted.values()])
-    assert agreement.score_agreement(sentence.audio, sentence.units) == pytest.approx(mean, abs=1e-4)
+    assert agreement.measure_fit(sentence.audio, sentence.units).score == pytest.approx(mean, abs=1e-4)
 
 
 def test_loud_silence_is_missing_speech(sentences: list[ToySentence]) -> None:

@@ -9,6 +9,8 @@ from lipmotion.hmm.loudness import DECIBEL, MIN_FRAMES, average_power, find_spok
 from lipmotion.speech.features import mfcc
 from lipmotion.speech.sound import analysed_audio, pauses, voice_activity
 from lipmotion.types import Audio
+from lipmotion_faces.appearance.person import measure_levels_at
+from lipmotion_faces.corpus.long_videos import find_quietest
 from speech.made_voices import RATE_HZ, hiss, spoken
 from testing.toy import toy_sentences
 
@@ -257,15 +259,15 @@ def test_loudness_may_change_in_an_hour():
 
 def test_the_quietest_place():
     levels = pauses.measure_levels_db(loud_in([(0.0, 1.0), (1.1, 2.0)], 2.0))
-    assert pauses.find_quietest(levels, 0.5, 1.8) == pytest.approx(1.05, abs=0.06)
-    assert pauses.find_quietest(levels, 1.0, 1.0) == pytest.approx(1.0)
+    assert find_quietest(levels, 0.5, 1.8) == pytest.approx(1.05, abs=0.06)
+    assert find_quietest(levels, 1.0, 1.0) == pytest.approx(1.0)
 
 
 def test_levels_at_any_time_also_of_less_than_a_step():
     sound = loud_in(SPANS, 5.0)
     levels, times_s = pauses.measure_levels_db(sound), np.array([-1.0, 0.005, 1.005, 1.01, 99.0])
-    found = pauses.measure_levels_at(sound, times_s)
+    found = measure_levels_at(sound, times_s)
     assert found == pytest.approx([levels[0], levels[0], levels[100], levels[100:102].mean(), levels[-1]])
     for samples in (0, 159):
-        found = pauses.measure_levels_at(Audio(np.ones(samples, np.float32), RATE_HZ), np.arange(3.0))
+        found = measure_levels_at(Audio(np.ones(samples, np.float32), RATE_HZ), np.arange(3.0))
         assert found == pytest.approx([pauses.QUIETEST_DB] * 3)

@@ -251,12 +251,7 @@ def _average_between(time_s: Array, sums: Array, edges_s: Array) -> Array:
 
 
 CHANGE_COST = 0.35  # cost of a change of shape, in the unit of ``compute_frame_costs``
-HOLD_S = 2 / 24
-
-
-def choose_hold_frames(fps: float) -> int:
-    """Return the number of frames nearest to two frames at 24 fps, the shortest hold of a mouth in animation."""
-    return max(1, int(HOLD_S * fps + 0.5))
+HOLD_S = 2 / 24  # the shortest hold of a mouth in animation: two frames at 24 fps
 
 
 def choose_cues(
@@ -269,7 +264,7 @@ def choose_cues(
     """Return the cues of generated motion.
 
     fps         : frames per second of the animation, 1 to 100
-    hold_frames : minimum length of a cue in frames, > 0; a shorter recording has one cue
+    hold_frames : minimum length of a cue in frames, > 0; None: nearest to ``HOLD_S``. A shorter recording has one cue
     optional    : which of the shapes G, H and X the character has
     intensity   : openings and spread so many times as large, before shapes are chosen
     The result is exact: of all sequences that keep the hold, the one of least cost (``find_segments``).
@@ -285,7 +280,7 @@ def choose_cues(
         costs = compute_frame_costs(generation, frames, fps, intensity)
         groups = [[choose_drawn_shape(other, drawn) == name for other in SHAPES] for name in drawn]
         cost = np.stack([costs[:, group].min(axis=1) for group in groups], axis=1)
-    segments = find_segments(cost, hold_frames or choose_hold_frames(fps), CHANGE_COST)
+    segments = find_segments(cost, hold_frames or max(1, int(HOLD_S * fps + 0.5)), CHANGE_COST)
     rows = [(frame_to_seconds(frame, fps), drawn[label]) for frame, label in segments]
     rows = rows or [(0.0, choose_drawn_shape(REST, drawn))]  # no frame: the mouth is at rest
     ends = [*(start_s for start_s, _ in rows[1:]), end_s]
@@ -360,10 +355,8 @@ def build_cue_sheet(
         raise InputError(f"{len(rows)} mouth shapes in {end_s:g} s, required at most {MAX_CUES} in {LONGEST_S:g} s")
     late = next((place for place, (row, after) in enumerate(pairwise(rows), 1) if after[0] < row[0]), None)
     if late is not None:
-        raise InputError(
-            f"mouth shape {late + 1} begins at {rows[late][0]:.6g} s, before the one ahead of it at "
-            f"{rows[late - 1][0]:.6g} s, required in order of time; export the cues again"
-        )
+        times = f"at {rows[late][0]:.6g} s, the one ahead of it at {rows[late - 1][0]:.6g} s"
+        raise InputError(f"mouth shape {late + 1} begins {times}, required in order of time; export the cues again")
     all_rows = [(0.0, REST), *rows] if rows[0][0] > 0 else list(rows)
     ends = [*(start_s for start_s, _ in all_rows[1:]), end_s]
     spans = (Span(start_s, stop_s, shape) for (start_s, shape), stop_s in zip(all_rows, ends, strict=True))

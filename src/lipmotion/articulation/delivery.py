@@ -81,15 +81,14 @@ def shift_in_time(generation: Generation, delivery: Delivery) -> Generation:
     Raises InputError: nothing is left.
     """
     motion, rate_hz = generation.motion, generation.motion.rate_hz
-    by_s = (delivery.offset_ms - delivery.anticipation_ms) / 1000
-    if not (by_s or delivery.offset_ms) or not len(motion.values):
+    later_s, by_s = delivery.offset_ms / 1000, (delivery.offset_ms - delivery.anticipation_ms) / 1000
+    if not (by_s or later_s) or not len(motion.values):
         return generation
-    duration_s = (len(motion.values) - 1) / rate_hz + delivery.offset_ms / 1000
+    motion_s = (len(motion.values) - 1) / rate_hz
+    duration_s = motion_s + later_s
     if duration_s < 0:
-        raise InputError(
-            f"the offset is {delivery.offset_ms:g} ms, and the motion lasts "
-            f"{duration_s - delivery.offset_ms / 1000:.2f} s: nothing is left; give a smaller one"
-        )
+        what = f"the offset is {delivery.offset_ms:g} ms, and the motion lasts {motion_s:.2f} s: nothing is left"
+        raise InputError(f"{what}; give a smaller one")
     position: Curve = np.arange(int(np.floor(duration_s * rate_hz + 1e-6)) + 1.0) - by_s * rate_hz
     nearest = np.clip(np.rint(position), 0, len(motion.values) - 1).astype(int)
     if abs(by_s * rate_hz - round(by_s * rate_hz)) < 1e-6:
@@ -100,7 +99,7 @@ def shift_in_time(generation: Generation, delivery: Delivery) -> Generation:
             at = round(frame + by_s * rate_hz)
             if 0 <= at < len(values):
                 values[at] = motion.values[frame]
-    end_s = max(duration_s, _find_end(generation.units) + delivery.offset_ms / 1000)
+    end_s = max(duration_s, later_s, *(span.end_s + later_s for span in generation.units))
     return replace(
         generation,
         motion=Motion(values, rate_hz, motion.channels),
@@ -239,9 +238,5 @@ def find_closed_times(generation: Generation) -> list[float]:
 def delay_units(units: Timeline[Unit], delivery: Delivery, end_s: float) -> Timeline[Unit]:
     """Return the phones in the time of the sound, for label files: later by the offset, without the anticipation."""
     later_s = delivery.offset_ms / 1000
-    return shift_units(units, later_s, max(_find_end(units), end_s) + later_s) if later_s else units
-
-
-def _find_end(units: Timeline[Unit]) -> float:
-    """Return the end of the last phone, which may be after the last frame; 0 without phones."""
-    return max((span.end_s for span in units), default=0.0)
+    last_s = max(end_s, *(span.end_s for span in units), 0.0)
+    return shift_units(units, later_s, last_s + later_s) if later_s else units

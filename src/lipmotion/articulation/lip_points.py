@@ -53,12 +53,6 @@ class MouthTemplate:
         """The distance of the lip corners, eye distances."""
         return float(np.linalg.norm(self.places[self.row(RIGHT_CORNER)] - self.places[self.row(LEFT_CORNER)]))
 
-    @property
-    def inner_width(self) -> float:
-        """The distance of the inner lip corners (78, 308), where the lips part, eye distances."""
-        right, left = (self.places[self.row(point)] for point in INNER_CORNERS)
-        return float(np.linalg.norm(left - right))
-
     def seam(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the height at which the closed lips meet, at some places from right to left [shape=(len(x),)]."""
         rows = np.flatnonzero(self.inner)

@@ -27,6 +27,8 @@ from lipmotion.types import FRAME_RATE_HZ, Motion, Prosody, Timeline, Unit
 from lipmotion.units import group_words, is_silent
 
 Curve = NDArray[np.float64]
+Spans = list[tuple[float, float]]  # starts and ends, s
+Aim = tuple[float, float]  # to the left and upwards, rad
 
 BLINK_S, MEAN_BLINK_S, MIN_BLINK_S = 0.24, 4.1, 1.1  # duration of a blink; mean and least time between two
 FIRST_BLINK_S, SHUT_S = (1.0, 2.6), 0.08
@@ -129,14 +131,14 @@ def compute_liveliness(  # noqa: PLR0913
         accent = accent * _find_talking(spoken, np.arange(len(accent)) / FRAME_RATE_HZ)
     turn = np.zeros((len(time_s), 3))
     if head:
-        turn = _turn_head(time_s, accent, _find_talking(spoken, time_s), spoken, _generator(seed, 1))
+        turn = _turn_head(time_s, accent, _find_talking(spoken, time_s), spoken, np.random.default_rng([seed, 1]))
     words = [(span.start_s, span.end_s) for span in group_words(units) if span.label]
-    lids = lid_closure(time_s, blink_times(end_s, spoken, words, _generator(seed, 2))) if blinks else still
-    aim = _aim_eyes(time_s, end_s, spoken, _generator(seed, 3)) if gaze else np.zeros((len(time_s), 2))
-    raised = _raise_brows(time_s, accent, spoken, _generator(seed, 4)) if brows else still
+    lids = lid_closure(time_s, blink_times(end_s, spoken, words, np.random.default_rng([seed, 2]))) if blinks else still
+    aim = _aim_eyes(time_s, end_s, spoken, np.random.default_rng([seed, 3])) if gaze else np.zeros((len(time_s), 2))
+    raised = _raise_brows(time_s, accent, spoken, np.random.default_rng([seed, 4])) if brows else still
     mood, eyes = list_action_units(motion, time_s), aim - GAZE_COUNTER_SHARE * turn[:, :2]
     if mood and brows:  # it comes and goes in the upper face, and grows with accents
-        slow = np.tanh(sway(time_s, _generator(seed, 5), 0.06, 0.3))
+        slow = np.tanh(sway(time_s, np.random.default_rng([seed, 5]), 0.06, 0.3))
         accented = _at(_smooth(accent, 0.2), time_s + BROW_LEAD_S) - 0.4
         lively = 1 + MOOD_WANDER * slow + MOOD_ACCENT * accented
         mood |= {unit: np.clip(mood[unit] * lively, 0, 1) for unit in UPPER_FACE_UNITS.values() if unit in mood}
@@ -152,9 +154,9 @@ def compute_liveliness(  # noqa: PLR0913
     return Liveliness(lids, raised, eyes, turn, units_shown)
 
 
-def find_phrases(units: Timeline[Unit], pause_s: float = PHRASE_PAUSE_S) -> list[tuple[float, float]]:
+def find_phrases(units: Timeline[Unit], pause_s: float = PHRASE_PAUSE_S) -> Spans:
     """Return start and end, in seconds, of every stretch of speech without a pause of ``pause_s``."""
-    phrases: list[tuple[float, float]] = []
+    phrases = Spans()
     for span in units:
         if not is_silent(span.label.phone):
             if phrases and span.start_s - phrases[-1][1] < pause_s:
@@ -164,9 +166,7 @@ def find_phrases(units: Timeline[Unit], pause_s: float = PHRASE_PAUSE_S) -> list
     return phrases
 
 
-def blink_times(
-    end_s: float, spoken: list[tuple[float, float]], words: list[tuple[float, float]], rng: np.random.Generator
-) -> list[float]:
+def blink_times(end_s: float, spoken: Spans, words: Spans, rng: np.random.Generator) -> list[float]:
     """Return when blinks begin, in seconds: at random, rather at the end of a phrase, never in the middle of a word."""
     ends = np.array([end for _, end in spoken] or [-np.inf])
     starts_s, ends_s = np.array(words).reshape(-1, 2).T
@@ -202,10 +202,6 @@ def lid_closure(time_s: Curve, blink_s: list[float]) -> Curve:
     return closed
 
 
-def _generator(seed: int, part: int) -> np.random.Generator:
-    return np.random.default_rng([seed, part])
-
-
 def _smooth(curve: Curve, deviation_s: float) -> Curve:
     """Return a curve at 100 Hz smoothed by a Gaussian; the ends are repeated."""
     reach = max(1, int(4 * deviation_s * FRAME_RATE_HZ))
@@ -235,7 +231,7 @@ def _at(curve: Curve, time_s: Curve) -> Curve:
     return np.interp(time_s, np.arange(len(curve)) / FRAME_RATE_HZ, curve)
 
 
-def _find_talking(spoken: list[tuple[float, float]], time_s: Curve) -> Curve:
+def _find_talking(spoken: Spans, time_s: Curve) -> Curve:
     """Return 1 in phrases and 0 away from them, with soft edges [shape=(N,)]."""
     level = np.zeros(len(time_s))
     for begin, end in spoken:
@@ -255,9 +251,7 @@ def sway(time_s: Curve, rng: np.random.Generator, slowest_hz: float, fastest_hz:
     return np.asarray(strengths @ waves / np.sqrt(np.sum(strengths**2) / 2))
 
 
-def _turn_head(
-    time_s: Curve, accent: Curve, talking: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator
-) -> Curve:
+def _turn_head(time_s: Curve, accent: Curve, talking: Curve, spoken: Spans, rng: np.random.Generator) -> Curve:
     lively = STILL_SHARE + (1 - STILL_SHARE) * talking
     yaw, pitch, roll = (size * sway(time_s, rng, *SWAY_HZ) for size in SWAY)
     nod = _at(_smooth(accent, 0.11), time_s + 0.04)
@@ -273,7 +267,7 @@ def _turn_head(
     return np.stack([lively * yaw, lively * pitch - NOD_RAD * nod - PHRASE_FALL_RAD * tilt, lively * roll], axis=1)
 
 
-def _raise_brows(time_s: Curve, accent: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator) -> Curve:
+def _raise_brows(time_s: Curve, accent: Curve, spoken: Spans, rng: np.random.Generator) -> Curve:
     raised = BROW_RAISE * _at(_smooth(accent, 0.1), time_s + BROW_LEAD_S)
     raised += 0.003 * (1 + np.tanh(sway(time_s, rng, 0.05, 0.3)))
     for begin, _ in spoken:  # some phrases begin with raised brows
@@ -285,9 +279,7 @@ def _raise_brows(time_s: Curve, accent: Curve, spoken: list[tuple[float, float]]
     return raised
 
 
-def draw_fixation(
-    rng: np.random.Generator, last: tuple[float, float], at_border: bool
-) -> tuple[tuple[float, float], float]:
+def draw_fixation(rng: np.random.Generator, last: Aim, at_border: bool) -> tuple[Aim, float]:
     """Return where the eyes look next, to the left and upwards, radians, and for how long, seconds.
 
     last      : where they look now: who looks away looks back
@@ -300,7 +292,7 @@ def draw_fixation(
     return (float(rng.normal(0, 0.018)), float(rng.normal(0, 0.012))), float(rng.uniform(0.5, 2.0))
 
 
-def _aim_eyes(time_s: Curve, end_s: float, spoken: list[tuple[float, float]], rng: np.random.Generator) -> Curve:
+def _aim_eyes(time_s: Curve, end_s: float, spoken: Spans, rng: np.random.Generator) -> Curve:
     """Return where the eyes look, to the left and upwards in radians [shape=(F, 2)]: steps between fixations."""
     moments, targets = [0.0], [(0.0, 0.0)]
     begins = np.array([begin for begin, _ in spoken] or [np.inf])

@@ -61,10 +61,9 @@ def read_targets() -> dict[str, dict[str, GestureTarget]]:
 
 
 def gesture_curves(units: Timeline[Unit], time_s: Curve, names: Collection[str] = GESTURES) -> dict[str, Curve]:
-    """Return articulatory channels at some times [each shape=(T,)], by name; values from 0 to 1.
+    """Return articulatory channels at rising times in seconds [each shape=(T,)], by name; values from 0 to 1.
 
     units  : the phones in time; an unknown phone asks nothing special
-    time_s : in seconds, rising
     names  : of ``GESTURES``, or ``OVAL``
     Without phones, ``teeth`` is that of speech, and all others are 0.
     """

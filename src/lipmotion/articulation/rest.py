@@ -13,7 +13,7 @@ from lipmotion.articulation.contact import CLOSED_OPENING, smooth_step
 from lipmotion.errors import InputError
 from lipmotion.types import EYE_DISTANCE, Generation, Motion, Span, Timeline, Unit, VoiceEvent
 from lipmotion.types.audio import BREATH, LAUGHTER
-from lipmotion.units import SILENCE, is_silent, mark_closing_phones
+from lipmotion.units import is_silent, mark_closing_phones
 
 Curve = NDArray[np.float64]
 LARGEST_REST = 0.06
@@ -41,22 +41,6 @@ def find_rest_frames(motion: Motion, units: Timeline[Unit], opening: Curve | Non
     rest = np.zeros(len(time_s), dtype=bool)
     rest[np.argsort(opening, kind="stable")[: max(1, len(time_s) // 10)]] = True
     return rest
-
-
-def add_rest(motion: Motion, units: Timeline[Unit], frames: slice) -> tuple[Motion, Timeline[Unit], slice]:
-    """Return frames of a motion with their phones, beside enough silence to have the same rest pose, and where."""
-    values, rate_hz, rest = motion.values[frames], motion.rate_hz, find_rest_frames(motion, units)
-    still = np.median(motion.values[rest], axis=0)
-    count = int(np.count_nonzero(rest[frames])) + len(values) // 5 + 1
-    start_s, long_s, silent_s = (number / rate_hz for number in (frames.start, len(values), count))
-    phones = units.between(start_s, start_s + long_s)
-    silence, label = np.tile(still, (count, 1)), Unit(SILENCE)
-    if frames.start == 0:
-        spans = (*phones, Span(long_s, long_s + silent_s, label))
-        return replace(motion, values=np.concatenate([values, silence])), Timeline(spans), slice(0, len(values))
-    spans = (Span(0.0, silent_s, label), *phones.shifted(silent_s))
-    together = np.concatenate([silence, values])
-    return replace(motion, values=together), Timeline(spans), slice(count, len(together))
 
 
 def measure_at_rest(name: str, curve: Curve, rest: NDArray[np.bool_]) -> float:

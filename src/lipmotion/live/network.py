@@ -10,7 +10,6 @@ from __future__ import annotations
 import copy
 from collections import deque
 from functools import cache
-from importlib import resources
 from math import gcd
 from typing import Any, NamedTuple
 
@@ -20,9 +19,10 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.motion.articulation import ARTICULATORS
-from lipmotion.motion.network_steps import ConvolutionalShape
+from lipmotion.motion.network_steps import shape_convolutional
 from lipmotion.speech.features.mfcc import BANDS, FFT_SIZE, HOP, WINDOW, mel_filters
 from lipmotion.stats.networks import ConvolutionalNetwork
+from lipmotion.storage.archive import read_shipped_arrays
 from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS, SPEECH_RATE_HZ
 
 TAPS, BLOCK = 16, 160
@@ -105,7 +105,7 @@ LAGS = (-1, 2, 6, 14, 30)
 HEARD_S = (STEP_FRAMES - 1) / FRAME_RATE_HZ + WINDOW / 2 / SPEECH_RATE_HZ
 """So much after its time the sound of a step has come."""
 OUTPUTS = len(ARTICULATORS) + len(VISEMES_15)  # values of an answer: articulators, and how probable each viseme is
-SHAPE = ConvolutionalShape("live", "live-network", STEP_FRAMES * (SPECTRUM_BANDS + 1), 256, (1, 2, 4, 8, 16, 1, 2, 4))
+SHAPE = shape_convolutional("live", "live-network", STEP_FRAMES * (SPECTRUM_BANDS + 1), 256, (1, 2, 4, 8, 16, 1, 2, 4))
 """It hears the last 1.5 s."""
 START_LEVEL, QUIETEST_LEVEL = 1.0, -2.0
 """Natural logarithm of the power of loud speech that is assumed at first, and the least: quieter sound stays quiet."""
@@ -250,9 +250,7 @@ class LiveNetwork(NamedTuple):
 @cache
 def live_network() -> LiveNetwork:
     """Return the network of the package."""
-    path = resources.files("lipmotion") / "models" / "live.npz"
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-        arrays = dict(stored)
+    arrays = read_shipped_arrays("live.npz")
     network = SHAPE.from_arrays({name: arrays[name] for name in SHAPE.specs}, len(LAGS) * OUTPUTS)
     values = {name: arrays[name].astype(float) for name in LiveNetwork._fields[1:]}
     return LiveNetwork(network, **{**values, "typical": arrays["typical"].astype(np.float32)})

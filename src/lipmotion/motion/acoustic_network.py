@@ -15,12 +15,12 @@ from lipmotion.motion.articulation import count_unseen
 from lipmotion.motion.frame_labels import rate_clearness
 from lipmotion.motion.network_steps import (
     STEP,
-    ConvolutionalShape,
     check_scale,
     cut_random_piece,
     interpolate_steps,
     measure_error_variances,
     measure_poses,
+    shape_convolutional,
     stack_spectrum,
 )
 from lipmotion.motion.posterior_network import PosteriorNetwork, list_posteriors
@@ -32,7 +32,7 @@ from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
 from lipmotion.types import SPECTRUM_BANDS, Speech, sub_monitor
 
 Array = NDArray[np.float64]
-SHAPE = ConvolutionalShape("network", "network", STEP * SPECTRUM_BANDS, 192, (1, 2, 4, 8, 1, 2, 4, 8))
+SHAPE = shape_convolutional("network", "network", STEP * SPECTRUM_BANDS, 192, (1, 2, 4, 8, 1, 2, 4, 8))
 """Its input is 1.2 s before and after a frame."""
 BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.3, 0
 MIN_STEPS = 600  # smallest number of optimiser steps: with few recordings, each is used more often
@@ -83,10 +83,8 @@ class AcousticNetwork(Predictor):
         """
         examples = training.examples
         if not all(example.condition_spectra for example in examples):
-            raise CorpusError(
-                f"examples without acoustic conditions; a network is trained on {MIN_MOTION_S:g} s of measured "
-                "motion or more, with the option conditions from 1"
-            )
+            required = f"{MIN_MOTION_S:g} s of measured motion or more, and the option conditions from 1"
+            raise CorpusError(f"examples without acoustic conditions; a network needs {required}")
         mean, scale = measure_poses(training)
         network = _train(replace(training, monitor=sub_monitor(training.monitor, 0, 0.8)), mean, scale)
         trained = cls(network, mean, scale, np.ones((3, len(mean))))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -152,12 +152,10 @@ def compare_vowels() -> Array:
     """
     table = read_articulation_table()
     counts = {row["phone"]: float(row["count"]) for row in read_shipped_table(*TABLE)}
+    kinds = ([each for each in table if not is_silent(each) and (each in VOWELS) == vowel] for vowel in (False, True))
     consonants, vowels = (
         np.average([table[phone] for phone in phones], axis=0, weights=[counts[phone] for phone in phones])
-        for phones in (
-            [phone for phone in table if not is_silent(phone) and phone not in VOWELS],
-            [phone for phone in table if phone in VOWELS],
-        )
+        for phones in kinds
     )
     more_open: Array = (vowels - consonants).mean(axis=0)
     return more_open / more_open[ARTICULATORS.index(OPENING)]
@@ -209,14 +207,8 @@ def fit_articulation_prior(
             matrix[:, column] = 0
             row = ARTICULATORS.index(name)
             matrix[row, column] = deviations[known.index(row)]
-    contexts = count_contexts(example.speech.units for example in examples)
-    return ArticulationPrior(np.median(poses, axis=0), matrix, contexts)
-
-
-def count_contexts(timelines: Iterable[Timeline[Unit]]) -> dict[Context, int]:
-    """Return how often each phone occurs between its neighbours; pauses count as silence."""
-    counts = Counter(context for units in timelines for context, _ in _list_contexts(units))
-    return dict(sorted(counts.items()))
+    contexts = Counter(context for example in examples for context, _ in _list_contexts(example.speech.units))
+    return ArticulationPrior(np.median(poses, axis=0), matrix, dict(sorted(contexts.items())))
 
 
 def articulation_to_arrays(prior: ArticulationPrior | None) -> dict[str, NDArray[Any]]:
@@ -251,13 +243,11 @@ ARTICULATION = {
 
 def _list_contexts(units: Timeline[Unit]) -> Iterator[tuple[Context, Span[Unit]]]:
     """Yield each known phone between its neighbours; pauses count as silence."""
-    for left, span, right in with_neighbours(units):
+    for before, span, after in with_neighbours(units):
         if span.label.phone:
-            yield (_merge_pauses(left), _merge_pauses(span.label.phone), _merge_pauses(right)), span
-
-
-def _merge_pauses(phone: str) -> str:
-    return SILENCE if is_silent(phone) else phone
+            phones = (before, span.label.phone, after)
+            left, phone, right = (SILENCE if is_silent(each) else each for each in phones)
+            yield (left, phone, right), span
 
 
 def measure_articulators(motion: NDArray[np.floating[Any]], names: Sequence[str]) -> dict[str, Array]:

@@ -83,12 +83,11 @@ def estimate_closed_opening(smallest: Sequence[float], *groups: NDArray[np.float
 
 
 def choose_closed_frames(closure: Closure, opening: Array, ranges: Sequence[slice], pinned: Sequence[int]) -> list[int]:
-    """Return the frames in which the lips must be made to close: the least open frame of each p, b and m.
+    """Return the frames in which the lips must be made to close: the least open one of each p, b and m that is open.
 
     opening : generated opening [shape=(T,)]
     ranges  : the frames of each p, b and m, from ``find_closable_ranges``
     pinned  : frames whose opening the user pinned; a range that contains one is left as the user wants it
-    Ranges in which the lips close without help are left out.
     """
     closed = []
     for frames in ranges:

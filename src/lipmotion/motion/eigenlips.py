@@ -129,7 +129,5 @@ def _check(images: Images, size: tuple[int, int] | None = None) -> None:
     required = f"(T, {size[0]}, {size[1]}, 3)" if size else "(N, H, W, 3)"
     is_valid = images.ndim == 4 and images.shape[3] == len(COLOURS) and (size is None or images.shape[1:3] == size)
     if not is_valid or images.dtype != np.uint8 or not images.size:
-        raise InputError(
-            f"mouth pictures of shape {images.shape} and type {images.dtype}, required {required}, uint8; "
-            "prepare the recordings again with mouth images"
-        )
+        what = f"mouth pictures of shape {images.shape} and type {images.dtype}, required {required}, uint8"
+        raise InputError(f"{what}; prepare the recordings again with mouth images")

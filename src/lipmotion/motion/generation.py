@@ -72,22 +72,14 @@ Pins = dict[tuple[int, int], float]  # pinned values by frame and dimension of t
 
 @dataclass(frozen=True, eq=False)
 class LearnedMotion:
-    """The parts of a model that turn predicted means and precisions into motion; the same for all engines.
+    """The parts of a model that turn predicted means and precisions into motion; the same for all engines."""
 
-    space   : the Q dimensions in which motion is modelled
-    closure : of the lips in p, b and m (None: the motion has no channel ``opening``)
-    limits  : of plausible motion in this space
-    scaling : variance scaling about the rest pose (None: movements are not scaled)
-    prior   : the table of articulation, for contexts that training saw little of (None: the means are used as they are)
-    modulation : restores fast movement after generation (None: the motion stays as it is)
-    """
-
-    space: MotionSpace
-    closure: Closure | None
-    limits: MotionLimits
-    scaling: VarianceScaling | None = None
-    prior: articulation.ArticulationPrior | None = None
-    modulation: ModulationFilter | None = None
+    space: MotionSpace  # the Q dimensions in which motion is modelled
+    closure: Closure | None  # of the lips in p, b and m (None: the motion has no channel ``opening``)
+    limits: MotionLimits  # of plausible motion in this space
+    scaling: VarianceScaling | None = None  # about the rest pose (None: movements are not scaled)
+    prior: articulation.ArticulationPrior | None = None  # for contexts that training saw little of (None: as generated)
+    modulation: ModulationFilter | None = None  # restores fast movement after generation (None: it stays as it is)
 
     def for_voice(self, voice: float) -> LearnedMotion:
         """Return the same with a modulation filter that is weaker, the less training knows the voice.
@@ -122,15 +114,13 @@ class LearnedMotion:
         Voices that training does not know part their lips to speak and have typical talkers' range; they, and known
         ones in noise, follow what the general network hears (``motion.articulation``).
         statistics    : returns the predicted means and precisions of a range of frames [each shape=(N, 3, Q)]
-        frames        : length of the whole recording, T
-        units         : phones in time
+        frames, units : length of the whole recording, T, and its phones in time
         constraints   : pins of channels that are modelled as they are
         close         : whether the lips are made to meet in every p, b and m
         closing_units : units that close the lips where no phone is known
         reliability   : of the phones in time, 0 to 1 [shape=(T,)]
         voice         : how well training knows the voice, 0 to 1: others move as far as people do on average
-        articulators  : what the general network hears in the sound [shape=(T, 8)], for voices not known to training and
-                        in noise
+        articulators  : what the general network hears [shape=(T, 8)], for voices not known to training, and in noise
         Raises InputError: a pin names no channel, lies outside the recording, is not finite, or contradicts another.
         Raises ModelFormatError: the motion leaves the limits, so that the model must be damaged.
         """

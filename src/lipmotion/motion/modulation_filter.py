@@ -79,17 +79,12 @@ def learn_filter(
     pairs = list(compared)
     if not pairs:
         return fit_modulation_filter(values, values)
-    recorded, generated = zip(*pairs, strict=True)
-    return fit_modulation_filter(recorded, generated, select_resting_motion(examples, values)).scale_to(strength)
-
-
-def select_resting_motion(examples: Sequence[Example], values: Sequence[Array]) -> list[Array]:
-    """Return recorded motion in silence, ``RESTING_MARGIN_S`` from speech, in the motion space [shape=(N_i, Q)]."""
-    resting = []
+    resting = list[Array]()
     for example, x in zip(examples, values, strict=True):
         far = example.valid & mark_distant(example.speech.units, len(x), RESTING_MARGIN_S)
         resting += [x[start:stop] for start, stop in find_runs(far)]
-    return resting
+    recorded, generated = zip(*pairs, strict=True)
+    return fit_modulation_filter(recorded, generated, resting).scale_to(strength)
 
 
 def fit_modulation_filter(

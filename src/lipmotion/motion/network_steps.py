@@ -8,12 +8,10 @@ recordings, in quiet and in noise: mistakes differ from reader to reader, and th
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
-from typing import Any, Generic, TypeVar, final
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +29,7 @@ from lipmotion.stats.networks import (
     make_network,
     make_recurrent_network,
 )
+from lipmotion.storage.archive import read_shipped_arrays
 from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, check_arrays
 from lipmotion.types import Progress, Speech
 
@@ -93,34 +92,28 @@ def cut_random_piece(sequence: TrainingSequence, rng: np.random.Generator) -> Tr
     return TrainingSequence(sequence.inputs[piece], sequence.targets[piece], sequence.valid[piece])
 
 
+Draw = Callable[[np.random.Generator, int], TrainingSequence]  # returns a version of a numbered example
+Layers = Iterable[Sequence[NDArray[np.float32]]]  # the arrays of each layer
+
+
 @dataclass(frozen=True)
-class NetworkShape(ABC, Generic[NetworkT]):
+class NetworkShape(Generic[NetworkT]):
     """Shape of a network, and how it is trained and stored."""
 
     prefix: str  # of the names of its arrays in a model file
     name: str  # in messages and of its checkpoint
     inputs: int  # values of a time step
+    sizes: Mapping[str, str]  # shapes of arrays by name: the first weights, the others, ..., ``output`` of O values
+    network: Callable[[Layers, LinearMap], NetworkT]  # returns that of some layers and of the linear map of its output
+    initial: Callable[[int, int], NetworkT]  # returns one with random weights: of so many outputs, from a seed
 
     @property
     def specs(self) -> dict[str, ArraySpec]:
-        """Shapes and ranges of the arrays; ``O`` is the number of outputs."""
+        """Shapes and ranges of the arrays."""
         return {
             f"{self.prefix}_{name}": ArraySpec(np.float32, shape, -LARGEST_MEAN, LARGEST_MEAN)
             for name, shape in self.sizes.items()
         }
-
-    @property
-    @abstractmethod
-    def sizes(self) -> dict[str, str]:
-        """Shapes of the arrays by their names without the prefix: the first weights, the others, ..., ``output``."""
-
-    @abstractmethod
-    def network(self, layers: Iterable[Sequence[NDArray[np.float32]]], output: LinearMap) -> NetworkT:
-        """Return the network of some layers, each as its arrays, and of the linear map of its output."""
-
-    @abstractmethod
-    def initial(self, outputs: int, seed: int) -> NetworkT:
-        """Return an untrained network with random weights."""
 
     def arrays(self, network: NetworkT) -> dict[str, NDArray[np.float32]]:
         """Return the arrays of a network of this shape: the first layer has other inputs, the rest is stacked."""
@@ -135,13 +128,7 @@ class NetworkShape(ABC, Generic[NetworkT]):
         first, weights, *others, output = (stored[name] for name in self.specs)
         return self.network(zip([first, *weights], *others, strict=True), LinearMap(output[:-1], output[-1]))
 
-    def train(
-        self,
-        training: PredictorTraining,
-        outputs: int,
-        draw: Callable[[np.random.Generator, int], TrainingSequence],
-        plan: TrainingPlan,
-    ) -> NetworkT:
+    def train(self, training: PredictorTraining, outputs: int, draw: Draw, plan: TrainingPlan) -> NetworkT:
         """Return a network, trained on sequences that ``draw`` makes of numbered examples, or from its checkpoint."""
         stored = training.checkpoint.load(self.name)
         if stored is not None:
@@ -159,59 +146,45 @@ class NetworkShape(ABC, Generic[NetworkT]):
         return network
 
 
-@final
-@dataclass(frozen=True)
-class ConvolutionalShape(NetworkShape[ConvolutionalNetwork]):
-    """Shape of a convolutional network: units of every hidden layer, time steps between the taps of each layer."""
+def shape_convolutional(
+    prefix: str, name: str, inputs: int, hidden: int, dilations: tuple[int, ...]
+) -> NetworkShape[ConvolutionalNetwork]:
+    """Return the shape of a network with ``hidden`` units a layer; ``dilations``: time steps between a layer's taps."""
+    layers = len(dilations)
+    sizes = {
+        "first": f"{TAPS * inputs} {hidden}",
+        "layers": f"{layers - 1} {TAPS * hidden} {hidden}",
+        "biases": f"{layers} {hidden}",
+        "output": f"{hidden + 1} O",
+    }
 
-    hidden_units: int
-    dilations: tuple[int, ...]
+    def build(maps: Layers, output: LinearMap) -> ConvolutionalNetwork:
+        return ConvolutionalNetwork(tuple(LinearMap(*each) for each in maps), dilations, output)
 
-    @property
-    def sizes(self) -> dict[str, str]:  # noqa: D102
-        hidden, layers = self.hidden_units, len(self.dilations)
-        return {
-            "first": f"{TAPS * self.inputs} {hidden}",
-            "layers": f"{layers - 1} {TAPS * hidden} {hidden}",
-            "biases": f"{layers} {hidden}",
-            "output": f"{hidden + 1} O",
-        }
+    def begin(outputs: int, seed: int) -> ConvolutionalNetwork:
+        return make_network(inputs, hidden, outputs, dilations, seed)
 
-    def network(  # noqa: D102
-        self, layers: Iterable[Sequence[NDArray[np.float32]]], output: LinearMap
-    ) -> ConvolutionalNetwork:
-        return ConvolutionalNetwork(tuple(LinearMap(*each) for each in layers), self.dilations, output)
-
-    def initial(self, outputs: int, seed: int) -> ConvolutionalNetwork:  # noqa: D102
-        return make_network(self.inputs, self.hidden_units, outputs, self.dilations, seed)
+    return NetworkShape(prefix, name, inputs, sizes, build, begin)
 
 
-@final
-@dataclass(frozen=True)
-class RecurrentShape(NetworkShape[RecurrentNetwork]):
-    """Shape of a recurrent network: cells of every layer, two layers or more, in either direction of time."""
+def shape_recurrent(prefix: str, name: str, inputs: int, cells: int, layers: int) -> NetworkShape[RecurrentNetwork]:
+    """Return the shape of a network with two layers or more, of so many cells in either direction of time."""
+    gates = GATES * cells
+    sizes = {
+        "first": f"2 {inputs} {gates}",
+        "layers": f"{layers - 1} 2 {2 * cells} {gates}",
+        "memory": f"{layers} 2 {cells} {gates}",
+        "biases": f"{layers} {2 * gates}",
+        "output": f"{2 * cells + 1} O",
+    }
 
-    cells: int
-    layers: int
+    def build(arrays: Layers, output: LinearMap) -> RecurrentNetwork:
+        return RecurrentNetwork(tuple(RecurrentLayer(*each) for each in arrays), output)
 
-    @property
-    def sizes(self) -> dict[str, str]:  # noqa: D102
-        gates = GATES * self.cells
-        return {
-            "first": f"2 {self.inputs} {gates}",
-            "layers": f"{self.layers - 1} 2 {2 * self.cells} {gates}",
-            "memory": f"{self.layers} 2 {self.cells} {gates}",
-            "biases": f"{self.layers} {2 * gates}",
-            "output": f"{2 * self.cells + 1} O",
-        }
+    def begin(outputs: int, seed: int) -> RecurrentNetwork:
+        return make_recurrent_network(inputs, cells, outputs, layers, seed)
 
-    def network(  # noqa: D102
-        self, layers: Iterable[Sequence[NDArray[np.float32]]], output: LinearMap
-    ) -> RecurrentNetwork:
-        return RecurrentNetwork(tuple(RecurrentLayer(*each) for each in layers), output)
-
-    def initial(self, outputs: int, seed: int) -> RecurrentNetwork:  # noqa: D102
-        return make_recurrent_network(self.inputs, self.cells, outputs, self.layers, seed)
+    return NetworkShape(prefix, name, inputs, sizes, build, begin)
 
 
 def check_scale(scale: NDArray[FloatT], name: str) -> NDArray[FloatT]:
@@ -222,7 +195,7 @@ def check_scale(scale: NDArray[FloatT], name: str) -> NDArray[FloatT]:
 
 
 WEIGHTS = "general-motion.npz"
-GENERAL_SHAPE = ConvolutionalShape("general", "general network", 64, 128, (1, 2, 4, 8))
+GENERAL_SHAPE = shape_convolutional("general", "general network", 64, 128, (1, 2, 4, 8))
 """From the 64 values of ``Speech.encoding``, 0.6 s before and after a frame."""
 ENCODING_SCALE = np.float32(4)  # what the encoding is multiplied by, so that its values are about 1
 
@@ -238,6 +211,4 @@ def hear_articulators(speech: Speech) -> NDArray[np.float64] | None:
 @cache
 def load_shipped() -> ConvolutionalNetwork:
     """Return the network of the package."""
-    path = resources.files("lipmotion") / "models" / WEIGHTS
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-        return GENERAL_SHAPE.from_arrays(dict(stored), len(ARTICULATORS))
+    return GENERAL_SHAPE.from_arrays(read_shipped_arrays(WEIGHTS), len(ARTICULATORS))

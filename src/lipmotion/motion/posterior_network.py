@@ -21,13 +21,13 @@ from lipmotion.motion.articulation import count_unseen
 from lipmotion.motion.network_steps import (
     MIN_DEVIATION,
     STEP,
-    ConvolutionalShape,
-    RecurrentShape,
     check_scale,
     cut_random_piece,
     interpolate_steps,
     measure_error_variances,
     measure_poses,
+    shape_convolutional,
+    shape_recurrent,
     stack_spectrum,
 )
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
@@ -37,6 +37,7 @@ from lipmotion.storage.schema import LARGEST_MEAN, POSITIVE, Arrays, ArraySpec, 
 from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS, Example, Speech, TokenPosteriors
 
 Array = NDArray[np.float64]
+Shifted = Sequence[Sequence[TrainingSequence]]  # each example from each of ``SHIFTS`` on
 ROWS = 2  # rows of posteriors, of 20 ms each, in a time step of the network
 ROW_FRAMES = STEP // ROWS
 COMPONENTS = 120
@@ -47,14 +48,14 @@ INPUT_SCALE = 2.0
 """Standard deviation of the first principal component as input; the others keep their proportions to it."""
 SPECTRUM = STEP * SPECTRUM_BANDS  # the first inputs of a time step: the spectrum
 SPECTRUM_OFF = 0.3  # share of the training in which the spectrum is switched off (0)
-SHAPE = ConvolutionalShape("posterior", "posterior-network", SPECTRUM + ROWS * COMPONENTS, 128, (1, 2, 4, 8, 1, 2, 4))
+SHAPE = shape_convolutional("posterior", "posterior-network", SPECTRUM + ROWS * COMPONENTS, 128, (1, 2, 4, 8, 1, 2, 4))
 """Its input is 0.88 s before and after a frame."""
 SHIFTS = 2
 """Time steps begin at so many rows of posteriors: training draws one of them, the motion is the mean over all."""
 BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.4, 0
 STEPS, RECURRENT_STEPS = 50.0, 50.0
 """Optimiser steps of either network by the square root of the seconds of motion: 390 for 1 minute, 1,800 for 22."""
-RECURRENT = RecurrentShape("recurrent", "recurrent-network", SHAPE.inputs, 96, 2)
+RECURRENT = shape_recurrent("recurrent", "recurrent-network", SHAPE.inputs, 96, 2)
 RECURRENT_BATCH, RECURRENT_DROPOUT = 8, 0.5
 RECURRENT_RATE, LARGEST_RECURRENT_RATE = 0.36, 3e-2
 """Learning rate, by one over the square root of the seconds of motion, and the largest one: large steps keep a network
@@ -152,10 +153,9 @@ class PosteriorNetwork(Predictor):
         if posteriors is None:
             raise InputError("the speech has no posteriors; an engine that uses them says so by ``inputs``")
         if posteriors.source != self.source:
-            raise InputError(
-                f"the model was trained with the phone recogniser {self.source}, this one is {posteriors.source}; "
-                f"install that one (pip install {'=='.join(self.source.split()[:2])}), or use the recogniser fast"
-            )
+            what = f"the model was trained with the phone recogniser {self.source}, this one is {posteriors.source};"
+            package = "==".join(self.source.split()[:2])
+            raise InputError(f"{what} install that one (pip install {package}), or use the recogniser fast")
         return (limit_logarithms(posteriors) - self.mean) @ self.basis
 
     def arrays(self) -> dict[str, NDArray[Any]]:
@@ -173,16 +173,11 @@ class PosteriorNetwork(Predictor):
         """Deserialise a network; as ``Predictor.from_arrays``."""
         stored = check_arrays(arrays, TARGETS, Q=dimensions)
         centre, scale = stored["posterior_targets"]
-        return cls(
-            SHAPE.from_arrays(arrays, dimensions),
-            stored["posterior_mean"],
-            stored["posterior_basis"],
-            centre,
-            check_scale(scale, "posterior_targets"),
-            stored["posterior_variances"],
-            str(stored["posterior_source"][0]),
-            None if arrays.keys().isdisjoint(RECURRENT.specs) else RECURRENT.from_arrays(arrays, dimensions),
-        )
+        scale, network = check_scale(scale, "posterior_targets"), SHAPE.from_arrays(arrays, dimensions)
+        mean, basis, variances = (stored[f"posterior_{name}"] for name in ("mean", "basis", "variances"))
+        is_alone = arrays.keys().isdisjoint(RECURRENT.specs)
+        recurrent = None if is_alone else RECURRENT.from_arrays(arrays, dimensions)
+        return cls(network, mean, basis, centre, scale, variances, str(stored["posterior_source"][0]), recurrent)
 
 
 def list_posteriors(examples: Sequence[Example]) -> list[TokenPosteriors] | None:
@@ -191,9 +186,7 @@ def list_posteriors(examples: Sequence[Example]) -> list[TokenPosteriors] | None
     return known if known and len(known) == len(examples) else None
 
 
-def _train_convolutional(
-    training: PredictorTraining, sequences: Sequence[Sequence[TrainingSequence]], motion_s: float
-) -> ConvolutionalNetwork:
+def _train_convolutional(training: PredictorTraining, sequences: Shifted, motion_s: float) -> ConvolutionalNetwork:
     def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
         piece = _draw_piece(sequences, rng, number)
         if rng.random() >= SPECTRUM_OFF:
@@ -207,18 +200,14 @@ def _train_convolutional(
     return SHAPE.train(training, sequences[0][0].targets.shape[1], draw, plan)
 
 
-def _train_recurrent(
-    training: PredictorTraining, sequences: Sequence[Sequence[TrainingSequence]], motion_s: float
-) -> RecurrentNetwork:
+def _train_recurrent(training: PredictorTraining, sequences: Shifted, motion_s: float) -> RecurrentNetwork:
     rate = min(RECURRENT_RATE / math.sqrt(motion_s), LARGEST_RECURRENT_RATE)
     steps = max(round(RECURRENT_STEPS * math.sqrt(motion_s)), 1)
     plan = TrainingPlan(steps, min(RECURRENT_BATCH, len(sequences)), rate, RECURRENT_DROPOUT, SEED)
     return RECURRENT.train(training, sequences[0][0].targets.shape[1], partial(_draw_piece, sequences), plan)
 
 
-def _draw_piece(
-    sequences: Sequence[Sequence[TrainingSequence]], rng: np.random.Generator, number: int
-) -> TrainingSequence:
+def _draw_piece(sequences: Shifted, rng: np.random.Generator, number: int) -> TrainingSequence:
     """Return one of the shifts of an example, or a piece of it."""
     shifted = sequences[number]
     return cut_random_piece(shifted[int(rng.integers(len(shifted)))], rng)

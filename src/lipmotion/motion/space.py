@@ -158,11 +158,9 @@ class MotionLimits(NamedTuple):
         worst = np.maximum(low - values.min(axis=0), values.max(axis=0) - high) / (LARGEST_EXCESS * span)
         if not worst.max() <= 1:
             column = int(worst.argmax())
-            raise ModelFormatError(
-                f"the motion would go from {values[:, column].min():g} to {values[:, column].max():g} in dimension "
-                f"{column}, its model reaches from {low[column]:g} to {high[column]:g}: the model is "
-                "damaged; train or download it again"
-            )
+            made = f"{values[:, column].min():g} to {values[:, column].max():g} in dimension {column}"
+            required = f"required {low[column]:g} to {high[column]:g}: the model is damaged; train or download it again"
+            raise ModelFormatError(f"the motion would go from {made}, {required}")
 
 
 def measure_limits(poses: NDArray[np.floating]) -> MotionLimits:
@@ -193,10 +191,8 @@ def check_rest(rest: Array, limits: MotionLimits) -> None:
     distance = np.maximum(limits.low - rest, rest - limits.high) / _floor_span(limits.low, limits.high)
     column = int(distance.argmax())
     if distance[column] > LARGEST_REST_DISTANCE:
-        raise ValueError(
-            f"rest pose of {rest[column]:g} in dimension {column}, whose poses are {limits.low[column]:g} to "
-            f"{limits.high[column]:g}"
-        )
+        poses = f"{limits.low[column]:g} to {limits.high[column]:g}"
+        raise ValueError(f"rest pose of {rest[column]:g} in dimension {column}, whose poses are {poses}")
 
 
 def _floor_span(low: Array, high: Array) -> Array:

@@ -30,8 +30,6 @@ MIN_RANGE_SHARE = 0.05
 """A channel that somebody moves by less than this share of the widest range has a gain of 1 for everyone."""
 HABIT_PRIOR_FRAMES = 50.0  # frames of a viseme that count as much as the assumption that a person has no habit in it
 FULL_HABIT_SHARE = 0.25  # share of the mean range by which lips must be open for habits to show wholly
-REST_PRIOR_S = 0.5
-"""Seconds of silence that count as much as the assumption that the map of speech is right in silence, too."""
 Array = NDArray[np.float64]
 
 
@@ -161,38 +159,3 @@ def estimate_gains(people: Sequence[PersonStatistics], channels: Sequence[Channe
     shrunk = np.exp(np.log(ratio) * trust[:, None])
     shrunk /= np.exp(np.log(shrunk).mean(axis=0))  # the geometric mean of all gains is 1
     return np.clip(shrunk, 1 / limit, limit)
-
-
-def fit_transfer_map(source: Sequence[Example], target: Sequence[Example]) -> SpeakerMap:
-    """Return the map from the motion of a source person to that of a target person, fitted in the same speech.
-
-    source : generated motion of the source, for the speech of the target
-    target : measured motion of the target; the same channels
-    - Closed lips map onto closed lips. The median pose of all other channels in speech maps onto the target's.
-    - The range in speech (5th to 95th percentile) maps onto the target's; points share one gain for each axis, so that
-      the face keeps the shape of the target. With S seconds of speech the logarithm of a gain counts S / (S + 2), and
-      gains lie between 1 / ``MAX_GAIN`` and ``MAX_GAIN``: a short recording gives place and shape alone.
-    - In silence away from speech the rest pose maps onto the target's. With S seconds of such silence that counts
-      S / (S + 0.5): people rest with closed lips in one pause and with parted lips in the next.
-    The map has no habits (``SpeakerMap.habits`` is 0).
-    Source of the task: Minnis & Breen 2000, §7. Alternatives that were measured: docs/results/selection.md.
-    """
-    channels = source[0].motion.channels
-    names = [channel.name for channel in channels]
-    column = names.index(OPENING) if OPENING in names else None
-    people = [measure_person(examples, column) for examples in (source, target)]
-    gains, rests = estimate_gains(people, channels, float(np.sqrt(MAX_GAIN))), estimate_rest_poses(people)
-    gain = gains[1] / gains[0]
-    offset = people[1].spoken - gain * people[0].spoken
-    closed = people[0].closed
-    if column is not None:
-        offset[column] = people[1].closed - gain[column] * closed
-    rest = people[1].rest_s / (people[1].rest_s + REST_PRIOR_S) * (rests[1] - offset - gain * rests[0])
-    habits = np.zeros((len(VISEME_NAMES), len(channels)))
-    return SpeakerMap(channels, gain, offset, rest, habits, (closed, closed + 1))
-
-
-def count_speech_s(examples: Sequence[Example]) -> float:
-    """Return the seconds of speech in which the motion of some examples was measured."""
-    spoken = (each.valid & ~mark_distant(each.speech.units, len(each.valid), 0.0) for each in examples)
-    return sum(int(frames.sum()) for frames in spoken) / FRAME_RATE_HZ

@@ -16,7 +16,7 @@ from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
 from lipmotion.motion.frame_labels import list_speech_intervals
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
-from lipmotion.types import FRAME_RATE_HZ, Channel, Motion, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Channel, Timeline, Unit
 from lipmotion.units import VISEME_OF, VISEMES
 
 NEAR_SPEECH_S, FAR_FROM_SPEECH_S = 0.1, 0.48
@@ -153,16 +153,3 @@ def compose_maps(first: SpeakerMap | None, second: SpeakerMap) -> SpeakerMap:
     offset = second.offset + second.gain * first.offset
     rest = second.rest + second.gain * first.rest
     return SpeakerMap(second.channels, gain, offset, rest, first.habits, first.lips)
-
-
-def select_channels(motion: Motion, channels: Sequence[Channel], where: str) -> Motion:
-    """Return motion in the channels of a model. Raises InputError, which names the recording: a channel is missing."""
-    missing = [channel for channel in channels if channel not in motion.channels]
-    if missing:
-        raise InputError(
-            f"{where}: its motion has no channel {missing[0].name!r} in the unit {missing[0].unit!r}, which the model "
-            f"generates ({len(missing)} of {len(channels)} are missing); give recordings with the channels of the "
-            "model (lipmotion info), or another model"
-        )
-    columns = [motion.channels.index(channel) for channel in channels]
-    return Motion(np.asarray(motion.values)[:, columns], motion.rate_hz, tuple(channels))

@@ -10,6 +10,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +82,13 @@ def read_archive(path: Path) -> dict[str, NDArray[Any]]:
     if unknown is not None:
         raise ValueError(f"undeclared {unknown!r}, which is no array")
     return {name.removesuffix(ARRAY): take_array(content) for name, content in members.items()}
+
+
+def read_shipped_arrays(name: str) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a file of the package's models."""
+    path = resources.files("lipmotion") / "models" / name
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+        return dict(stored)
 
 
 def check_archive(file: zipfile.ZipFile) -> None:

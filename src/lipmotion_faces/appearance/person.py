@@ -25,9 +25,10 @@ from lipmotion.motion.eigenlips import (
     fit_eigenlips,
 )
 from lipmotion.motion.frame_labels import find_runs
+from lipmotion.speech.sound.pauses import QUIETEST_DB, STEP_S, measure_levels_db
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared, select_arrays
-from lipmotion.types import Channel, Motion
+from lipmotion.types import Audio, Channel, Motion
 from lipmotion_faces.appearance import candidates, lower_face, motion_map
 from lipmotion_faces.appearance.camera_noise import (
     CameraNoise,
@@ -397,3 +398,15 @@ def _decode(data: Pictures, count: int, height: int, width: int) -> Pictures:
     if pictures.shape != (count, height, width, 3):
         raise ValueError(f"pictures of shape {pictures.shape}, required ({count}, {height}, {width}, 3)")
     return pictures
+
+
+def measure_levels_at(audio: Audio, times_s: Array) -> Array:
+    """Return the smoothed level of a sound at some times, dB of full scale [same shape].
+
+    times_s : rising, s [shape=(T,)]; before the first and after the last level that one is returned
+    A sound of less than 10 ms has the level ``QUIETEST_DB``.
+    """
+    levels = measure_levels_db(audio)
+    if not len(levels):
+        return np.full(len(times_s), QUIETEST_DB)
+    return np.interp(times_s, (np.arange(len(levels)) + 0.5) * STEP_S, levels)

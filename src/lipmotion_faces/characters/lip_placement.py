@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.lip_points import LEFT_CORNER, LOWER_MIDDLE, RIGHT_CORNER, UPPER_MIDDLE, build_mouth
+from lipmotion.articulation.lip_points import (
+    INNER_CORNERS,
+    LEFT_CORNER,
+    LOWER_MIDDLE,
+    RIGHT_CORNER,
+    UPPER_MIDDLE,
+    build_mouth,
+)
 from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.model.face_shapes import LipPlacement
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
@@ -63,7 +70,8 @@ def place_lips_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
         )
     template = build_mouth()
     right, left = middle[middle[:, 0].argmin()], middle[middle[:, 0].argmax()]
-    scale = float(left[0] - right[0]) / template.inner_width
+    corners = [template.places[template.row(point)] for point in INNER_CORNERS]
+    scale = float(left[0] - right[0]) / float(np.linalg.norm(corners[1] - corners[0]))
     order = np.argsort(middle[:, 0], kind="stable")
     targets = _aim(scale, (right + left) / 2, middle[order])
     rows = np.flatnonzero(skin)

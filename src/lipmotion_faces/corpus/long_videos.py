@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import find_labels
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.pauses import find_quietest, list_spans, measure_levels_db
+from lipmotion.speech.sound.pauses import STEP_S, list_spans, measure_levels_db
 from lipmotion.types import Audio, Monitor, Progress, TimedTranscript
 from lipmotion.units.written_forms import list_readings
 from lipmotion_faces.corpus.folder import LRS, VIDEO_KINDS
@@ -306,3 +306,12 @@ def _fit_to_pictures(span: SpokenPart, scan: VideoScan, end_s: float) -> SpokenP
     is_last = span.end_s >= end_s - 1e-6
     start_s, before_s = float(scan.times_s[max(first, 0)]), float(scan.times_s[max(last, 0)])
     return replace(span, start_s=start_s, end_s=end_s if is_last else before_s)
+
+
+def find_quietest(levels: NDArray[np.float64], start_s: float, end_s: float) -> float:
+    """Return the time of the lowest level from ``start_s`` to ``end_s``; their middle if no frame lies between."""
+    first, last = round(start_s / STEP_S), round(end_s / STEP_S)
+    part = levels[max(first, 0) : max(last, 0)]
+    if not part.size:
+        return (start_s + end_s) / 2
+    return (max(first, 0) + int(np.argmin(part)) + 0.5) * STEP_S

@@ -17,12 +17,12 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.workers import open_workers, process_count
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.pauses import QUIETEST_DB, measure_levels_at
+from lipmotion.speech.sound.pauses import QUIETEST_DB
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.sources import check_source, hash_file
 from lipmotion.types import Audio, Item, Monitor, Progress, silent_monitor
 from lipmotion_faces.appearance import lower_face
-from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
+from lipmotion_faces.appearance.person import FootagePictures, learn_appearance, measure_levels_at
 from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.corpus.folder import discover
 from lipmotion_faces.corpus.source_recordings import SourceRecording, filter_videos

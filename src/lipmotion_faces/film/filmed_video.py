@@ -17,11 +17,10 @@ from lipmotion.kernels.compiler import limit_threads
 from lipmotion.motion.eigenlips import Eigenlips
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Mark, Outputs
-from lipmotion.speech.sound.pauses import measure_levels_at
 from lipmotion.storage.sources import check_source, has_video
 from lipmotion.types import GREY, Audio, Monitor, Motion, Timeline, Unit, silent_monitor
 from lipmotion.types.progress import REPORT_INTERVAL, with_progress
-from lipmotion_faces.appearance.person import FaceCodes
+from lipmotion_faces.appearance.person import FaceCodes, measure_levels_at
 from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.film.background import open_background, open_stored_background
 from lipmotion_faces.filmed.face import FilmedFace

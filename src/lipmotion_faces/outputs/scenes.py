@@ -15,7 +15,7 @@ from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.liveliness import CALM
 from lipmotion.articulation.mouth import find_mouth, frame_times
-from lipmotion.articulation.rest import add_rest
+from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.formats.base import Thinning
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves, eye_and_brow_weights
@@ -24,8 +24,9 @@ from lipmotion.pipeline.outputs.curve_sets import apply_weight_edits
 from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth, with_drawn_channels
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_recorded_prosody
 from lipmotion.storage.files import sound_reference
-from lipmotion.types import Channel, Generation, Motion, Prosody, StateTrace
+from lipmotion.types import Channel, Generation, Motion, Prosody, Span, StateTrace, Timeline, Unit
 from lipmotion.types.motion import WEIGHT
+from lipmotion.units import SILENCE
 from lipmotion_faces.base import Staging, stage_liveliness
 from lipmotion_faces.characters.binding import PosedCharacter
 from lipmotion_faces.characters.fbx import convert_to_fbx, find_blender
@@ -199,3 +200,19 @@ def build_character_scene(
     hertz = rate if frames is not None else rate_hz or rate
     shown = sample_pictures(rows, mouth.contact[there], rate, frame_times(len(rows), rate, hertz))
     return Scene(character.mesh, Motion(shown[wanted], hertz, channels), original=character.file)
+
+
+def add_rest(motion: Motion, units: Timeline[Unit], frames: slice) -> tuple[Motion, Timeline[Unit], slice]:
+    """Return frames of a motion with their phones, beside enough silence to have the same rest pose, and where."""
+    values, rate_hz, rest = motion.values[frames], motion.rate_hz, find_rest_frames(motion, units)
+    still = np.median(motion.values[rest], axis=0)
+    count = int(np.count_nonzero(rest[frames])) + len(values) // 5 + 1
+    start_s, long_s, silent_s = (number / rate_hz for number in (frames.start, len(values), count))
+    phones = units.between(start_s, start_s + long_s)
+    silence, label = np.tile(still, (count, 1)), Unit(SILENCE)
+    if frames.start == 0:
+        spans = (*phones, Span(long_s, long_s + silent_s, label))
+        return replace(motion, values=np.concatenate([values, silence])), Timeline(spans), slice(0, len(values))
+    spans = (Span(0.0, silent_s, label), *phones.shifted(silent_s))
+    together = np.concatenate([silence, values])
+    return replace(motion, values=together), Timeline(spans), slice(count, len(together))

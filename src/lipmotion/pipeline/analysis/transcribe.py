@@ -264,7 +264,7 @@ def align_or_recognise(
 ) -> Timeline[Unit]:
     """Return the phones in time of a recording as ``transcribe`` does, without warnings."""
     if words is None:
-        return phones.recognise(audio, features)
+        return phones.recognition(audio, features).units
     anchors = None
     if isinstance(words, TimedTranscript):
         anchors, words = find_anchors(words) if words.has_times else None, words.words

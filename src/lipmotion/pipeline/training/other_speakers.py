@@ -17,7 +17,7 @@ from lipmotion.formats.label_files import CHAPTER, find_labels
 from lipmotion.pipeline.analysis.transcribe import align_or_recognise
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.prompts import prompts
-from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, score_agreement
+from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, measure_fit
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.acoustic_conditions import mix_noise
 from lipmotion.speech.sound.analysed_audio import analysed
@@ -132,7 +132,7 @@ def align_recordings(
                 units = align_or_recognise(phones, audio, analysed(audio).mfcc(), words, lexicon)
             else:
                 units = labels.phones.between(0, audio.duration_s)
-            score = score_agreement(audio, units)
+            score = measure_fit(audio, units).score
             if score < DOUBTFUL_SCORE:
                 found = f"its phones agree with the sound at {score:.1f}, required {DOUBTFUL_SCORE} or more"
                 raise InputError(f"its transcript seems not to be what is said ({found}); check it")

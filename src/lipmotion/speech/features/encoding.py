@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cache
-from importlib import resources
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lipmotion.speech.features.mfcc import HOP, WINDOW, make_triangles
+from lipmotion.storage.archive import read_shipped_arrays
 from lipmotion.types import SPEECH_RATE_HZ
 
 Array = NDArray[np.float32]
@@ -141,23 +141,21 @@ Linear = tuple[Array, Array]  # a matrix and a bias
 
 
 class Encoder(NamedTuple):
-    """Weights of the network; gains of layer normalisation are in the matrices that follow them.
+    """Weights of the network; gains of layer normalisation are in the matrices that follow them."""
 
-    convolutions : of three taps each, the second one with stride 2: kernels [shape=(3·inputs, N)] and biases
-    layers       : of queries, keys and values; of what is attended to; and of the two that follow
-    basis, shift : from the normalised output of the last layer to the features [shape=(N, D)], [shape=(D,)]
-    """
+    convolutions: tuple[Linear, ...]  # kernels of three taps [shape=(3·inputs, N)]; the second one has stride 2
+    layers: tuple[tuple[Linear, ...], ...]  # queries, keys and values; what is attended to; and the two that follow
+    basis: Array  # from the normalised output of the last layer to the features [shape=(N, D)]
+    shift: Array  # [shape=(D,)]
 
-    convolutions: tuple[Linear, ...]
-    layers: tuple[tuple[Linear, ...], ...]
-    basis: Array
-    shift: Array
+
+_read_arrays = cache(read_shipped_arrays)  # the encoder and the background are in one file
 
 
 @cache
 def load_encoder() -> Encoder:
     """Return the network of the package."""
-    return find_encoder(_read_arrays())
+    return find_encoder(_read_arrays(WEIGHTS))
 
 
 @cache
@@ -166,15 +164,8 @@ def read_background() -> tuple[Array, Array]:
 
     The whitening is a matrix, of the covariance of recordings of one speaker in many conditions [shape=(128, 128)].
     """
-    arrays = _read_arrays()
+    arrays = _read_arrays(WEIGHTS)
     return arrays["speaker_centre"], arrays["speaker_whitening"].astype(np.float32)
-
-
-@cache
-def _read_arrays() -> dict[str, NDArray[Any]]:
-    path = resources.files("lipmotion") / "models" / WEIGHTS
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-        return dict(stored)
 
 
 def find_encoder(arrays: Mapping[str, NDArray[Any]]) -> Encoder:

@@ -242,9 +242,7 @@ LOWEST_HZ, HIGHEST_HZ = 130.0, 6800.0  # of the filters of pocketsphinx's phone 
 def general_features(audio: Audio) -> NDArray[np.float32]:
     """Return the features of the general models: c0–c12 less their mean, Δ over ±2 frames, Δ of Δ [shape=(T, 39)].
 
-    Frames are as in ``mfcc``.
-
-    Raises InputError: as ``mfcc``.
+    Frames are as in ``mfcc``. Raises InputError: as ``mfcc``.
     Source: the model's own feat.params and CMU Sphinx's ``1s_c_d_dd``. Deviations: windows of 25 instead of
     25.6 ms, centred on their time; no noise removal.
     """

@@ -20,18 +20,12 @@ _GENERAL = (len(STREAMS), STREAMS[0].stop, STREAMS[0].stop + 1)
 
 @dataclass(frozen=True, eq=False)
 class Adaptation:
-    """Transforms that make the features of one speaker more probable under phone models trained on others.
+    """Transforms that make the features of one speaker more probable under phone models trained on others."""
 
-    warp       : factor by which the frequencies are stretched for the own models
-    own_weight : what the log densities of the own models are multiplied by beside the general ones, 0 to 1
-    own        : affine transform of the features for the own models, after the warp [shape=(39, 40)]
-    general    : affine transforms of each stream of the features for the general models [shape=(3, 13, 14)]
-    """
-
-    warp: float
-    own_weight: float
-    own: NDArray[np.float64]
-    general: NDArray[np.float64]
+    warp: float  # factor by which the frequencies are stretched for the own models
+    own_weight: float  # what the log densities of the own models are multiplied by beside the general ones, 0 to 1
+    own: NDArray[np.float64]  # affine transform of the features for the own models, after the warp [shape=(39, 40)]
+    general: NDArray[np.float64]  # the same of each stream of those for the general models [shape=(3, 13, 14)]
 
     def own_features(self, audio: AnalysedAudio) -> NDArray[np.float32]:
         """Return the adapted features for the own models [shape=(T, 39)]."""

@@ -52,8 +52,7 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
     All recordings are recognised with the own and the general models. The features of both then get the affine
     transform that makes the recognised states most probable, with the identity as prior mean. The frequencies are
     stretched first, by one factor for all recordings.
-    Raises InputError: less speech than ``MIN_SPEECH_S``.
-    Raises MissingDependencyError: pocketsphinx is not installed.
+    Raises InputError: less speech than ``MIN_SPEECH_S``. Raises MissingDependencyError: pocketsphinx is not installed.
     Source: Gales 1998 (constrained MLLR); Lei, Hamaker & He 2006 (a prior for it; ours is the models' own statistics).
     """
     audios = [analysed(audio) for audio in recordings]
@@ -71,12 +70,8 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
         units = (name.partition(".")[0] for name in combined.hmm.table.names)
         silent = np.array([is_silent(unit) or unit in NOISES for unit in units])
         speech_s = float((~silent[densities]).sum() / FRAME_RATE_HZ)
-        if not speech_s:
-            raise InputError("no speech found in the recordings; give some of the voice to adapt to")
         if speech_s < MIN_SPEECH_S:
-            raise InputError(
-                f"found {speech_s:.1f} s of speech, required at least {MIN_SPEECH_S:.0f} s; give more of this voice"
-            )
+            raise InputError(f"found {speech_s:.1f} s of speech, required at least {MIN_SPEECH_S:.0f} s; give more")
         short = speech_s < SHORT_S
         group = np.arange(FEATURES + 1) // (FEATURES // 3 if short else FEATURES)
         free = (group[:-1, None] == group) | (np.arange(FEATURES + 1) == FEATURES)

@@ -12,7 +12,7 @@ from lipmotion.speech.recognition.general import STATES, find_density, load_gene
 from lipmotion.speech.recognition.network.posteriors import POSTERIOR_STEP
 from lipmotion.speech.recognition.transcript_evidence import TranscriptEvidence, WordEvidence, label_evidence
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
-from lipmotion.types import FRAME_RATE_HZ, Audio, Span, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Audio, Span, Timeline, Unit, frames_of
 from lipmotion.units import is_silent
 
 DOUBTFUL_SCORE = -4.2
@@ -33,21 +33,16 @@ Place = tuple[float, float]  # start and end in seconds
 
 @dataclass(frozen=True)
 class TranscriptFit:
-    """How well a transcript fits a recording.
-
-    score    : the agreement score (``score_agreement``)
-    missing  : stretches with speech that the transcript leaves out: their starts and ends in seconds, in order
-    speech_s : seconds of speech in the recording, those that are missing included
-    evidence : what a phone recogniser says of the transcript, which then decides (None: there is none)
-    idle, wrong : of phones that are given with their times: stretches in which nothing is said, or other phones
-    """
+    """How well a transcript fits a recording."""
 
     score: float
-    missing: tuple[Place, ...]
-    speech_s: float
-    evidence: TranscriptEvidence | None = None
-    idle: tuple[Place, ...] = ()
-    wrong: tuple[Place, ...] = ()
+    """How well phones agree with the sound: mean over phones of the mean over their frames of the log density of the
+    phone less that of the best one (at least ``WORST_SCORE``); 0 where none is more probable, or nothing is said."""
+    missing: tuple[Place, ...]  # stretches with speech that the transcript leaves out, in order
+    speech_s: float  # seconds of speech in the recording, those that are missing included
+    evidence: TranscriptEvidence | None = None  # by a phone recogniser; where there is some, it decides
+    idle: tuple[Place, ...] = ()  # of phones that are given with their times: stretches in which nothing is said
+    wrong: tuple[Place, ...] = ()  # of such phones: stretches in which others are said
 
     @property
     def is_doubtful(self) -> bool:
@@ -81,14 +76,15 @@ class TranscriptFit:
         """Return in which frames the transcript fits: 1; 0 where it does not [shape=(count,)]."""
         fits = np.full(count, 0.0 if self.is_doubtful else 1.0)
         for start_s, end_s in (*self.missing, *self.idle, *self.wrong):
-            fits[_first_frame(start_s) : _first_frame(end_s)] = 0
+            fits[slice(*frames_of(Span(start_s, end_s, ""), count))] = 0
         return fits
 
 
 def measure_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
     """Return how well the aligned phones of a transcript fit a recording.
 
-    audio, units : as of ``score_agreement``
+    audio : an ``AnalysedAudio`` shares its features with what else is computed of it
+    units : of the audio, as ``Recogniser.align`` returns them
     Forced alignment finds a place for every word, and fills the recording with them: where the transcript leaves words
     out, it stretches phones of their neighbours (``LONG_PHONE_S``), or calls loud sound silence (``MIN_VOICE_S``).
     Raises MissingDependencyError: pocketsphinx is not installed.
@@ -98,7 +94,8 @@ def measure_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
     loud = find_loud_frames(analysis.log_energy)
     missing, speech_s = [], 0.0
     for span in units:
-        loud_s = (_first_frame(span.start_s) + np.flatnonzero(loud[_frames_of(span)])) / FRAME_RATE_HZ
+        first, stop = frames_of(span, len(loud))
+        loud_s = (first + np.flatnonzero(loud[first:stop])) / FRAME_RATE_HZ
         if is_silent(span.label.phone):
             if len(loud_s) >= MIN_VOICE_S * FRAME_RATE_HZ:
                 missing.append((float(loud_s[0]), float(loud_s[-1]) + 1 / FRAME_RATE_HZ))
@@ -106,7 +103,7 @@ def measure_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
         else:
             speech_s += span.duration_s
             if span.duration_s >= LONG_PHONE_S and len(loud_s) >= MIN_LOUD_S * FRAME_RATE_HZ:
-                inside = slice(*np.searchsorted(frames, [_first_frame(span.start_s), _first_frame(span.end_s)]))
+                inside = slice(*np.searchsorted(frames, (first, stop)))
                 if float(scores[inside].mean()) < LONG_PHONE_SCORE:
                     missing.append((span.start_s, span.end_s))
     return TranscriptFit(mean, _join(missing), speech_s)
@@ -134,7 +131,9 @@ def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArr
         missing = tuple(unlabelled)
     else:
         quiet = find_quiet_frames(audio.log_energy)
-        silent = _join([(span.start_s, span.end_s) for span in spoken if quiet[_frames_of(span)].all()])
+        silent = _join(
+            [(span.start_s, span.end_s) for span in spoken if quiet[slice(*frames_of(span, len(quiet)))].all()]
+        )
         idle = tuple((start_s, end_s) for start_s, end_s in silent if end_s - start_s >= MIN_IDLE_S)
         missing, wrong = measure_fit(audio, units).missing, ()
     speech_s = sum(span.duration_s for span in spoken) + sum(end_s - start_s for start_s, end_s in missing)
@@ -152,22 +151,10 @@ def _join(places: list[Place]) -> tuple[Place, ...]:
     return tuple(joined)
 
 
-def score_agreement(audio: Audio, units: Timeline[Unit]) -> float:
-    """Return how well a recording agrees with phones in time, by the general models.
-
-    audio : an ``AnalysedAudio`` shares its features with what else is computed of it
-    units : of the audio, as ``Recogniser.align`` returns them
-    Returns the mean over phones of the mean over their frames of the log density of the phone less that of the best
-    phone (at least ``WORST_SCORE``): 0 where no other phone is more probable, or nothing is spoken.
-    Raises MissingDependencyError: pocketsphinx is not installed.
-    """
-    return _score_frames(analysed(audio), units)[2]
-
-
 def _score_frames(audio: AnalysedAudio, units: Timeline[Unit]) -> tuple[NDArray[np.intp], NDArray[np.float32], float]:
     """Return every fourth frame of speech, how well its phone agrees with the sound there, and the agreement score."""
     spoken = [span for span in units if not is_silent(span.label.phone)]
-    each = [np.arange(of_span.start, of_span.stop) for of_span in map(_frames_of, spoken)]
+    each = [np.arange(*frames_of(span, audio.frames)) for span in spoken]
     phones = np.repeat(np.arange(len(spoken)), [len(of_span) for of_span in each])
     first = np.array([find_density(span.label.phone, 0, STATES) for span in spoken], np.intp)[phones]
     frames = np.concatenate([np.zeros(0, np.intp), *each])
@@ -179,11 +166,3 @@ def _score_frames(audio: AnalysedAudio, units: Timeline[Unit]) -> tuple[NDArray[
     scores, counts = of_phone.max(axis=1), np.bincount(phones)
     sums = np.bincount(phones, np.maximum(scores, WORST_SCORE))
     return frames, scores, float((sums[counts > 0] / counts[counts > 0]).mean())  # every phone counts the same
-
-
-def _first_frame(time_s: float) -> int:
-    return int(np.ceil(time_s * FRAME_RATE_HZ - 1e-6))
-
-
-def _frames_of(span: Span[Unit]) -> slice:
-    return slice(_first_frame(span.start_s), _first_frame(span.end_s))

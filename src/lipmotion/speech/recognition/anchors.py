@@ -24,22 +24,18 @@ BAD_FIT, WORST_FIT = -3.5, -6.0
 """Words that fit worse than the first, in nats a frame, may be elsewhere; worse than the second, they are not there."""
 FREE_FRAMES = 60_000  # recordings of up to ten minutes are aligned without times where these belong to something else
 NEIGHBOURS = 3  # words on each side of one without room whose windows are widened too, with all that share its time
+Placed = list[PlacedWord]
 MAX_WIDENINGS = 40  # doublings of windows without room; then every word may lie anywhere
 
 
 @dataclass(frozen=True, eq=False)
 class Anchors:
-    """Times of words [each of shape=(W,)].
+    """Times of words [each of shape=(W,)]."""
 
-    start_s, end_s : NaN where they are not known
-    tolerance_s    : by how much the word may be earlier or later
-    groups         : number of the word's time, which other words of its line may share
-    """
-
-    start_s: NDArray[np.float64]
-    end_s: NDArray[np.float64]
-    tolerance_s: NDArray[np.float64]
-    groups: NDArray[np.intp]
+    start_s: NDArray[np.float64]  # NaN where it is not known
+    end_s: NDArray[np.float64]  # NaN where it is not known
+    tolerance_s: NDArray[np.float64]  # by how much the word may be earlier or later
+    groups: NDArray[np.intp]  # number of the word's time, which other words of its line may share
 
 
 def find_anchors(transcript: TimedTranscript) -> Anchors:
@@ -69,10 +65,8 @@ def leave_out_late_lines(transcript: TimedTranscript, duration_s: float) -> Time
     latest_s = duration_s + LINE_TOLERANCE_S
     lines = [line for line in transcript.lines if line.start_s is None or line.start_s <= latest_s]
     if not lines:
-        raise InputError(
-            f"the transcript begins at {transcript.lines[0].start_s:.2f} s, the recording ends at {duration_s:.2f} s; "
-            "give the transcript of this recording"
-        )
+        what = f"the transcript begins at {transcript.lines[0].start_s:.2f} s, the recording ends at {duration_s:.2f} s"
+        raise InputError(f"{what}; give the transcript of this recording")
     if left_out := len(transcript.lines) - len(lines):
         what = "the transcript goes on after the recording ends at %.2f s; its last %d lines are left out"
         LOG.warning(what, duration_s, left_out)
@@ -152,12 +146,8 @@ def average_fits(placed: Sequence[PlacedWord], groups: NDArray[np.intp], frames:
 
 
 def align_within(
-    anchors: Anchors,
-    min_frames: NDArray[np.intp],
-    edge: int,
-    frames: int,
-    search: Callable[[Windows], list[PlacedWord]],
-) -> tuple[list[PlacedWord], Windows]:
+    anchors: Anchors, min_frames: NDArray[np.intp], edge: int, frames: int, search: Callable[[Windows], Placed]
+) -> tuple[Placed, Windows]:
     """Return words aligned within their windows, and these.
 
     min_frames, edge : as of ``find_windows``
@@ -168,7 +158,7 @@ def align_within(
     the times are not used. What fits badly in the end is logged as a warning.
     """
 
-    def place_words(tolerance_s: NDArray[np.float64]) -> tuple[list[PlacedWord], Windows, NDArray[np.float64]]:
+    def place_words(tolerance_s: NDArray[np.float64]) -> tuple[Placed, Windows, NDArray[np.float64]]:
         windows, tolerance_s = find_windows(anchors, tolerance_s, min_frames, edge, frames)
         return search(windows), windows, tolerance_s
 
@@ -188,34 +178,21 @@ def align_within(
             placed, windows, tolerance_s = wide
         elif better.any():
             placed, windows, tolerance_s = place_words(np.where(better[anchors.groups], wider_s, tolerance_s))
-    free = _align_freely(placed, anchors, frames, search)
-    if free is not None:
-        return free
+    together = np.zeros(len(anchors.groups), np.intp)
+    fit = average_fits(placed, together, frames)[0]
+    if fit < BAD_FIT and frames <= FREE_FRAMES:
+        everywhere = Windows(together, np.full(len(together), frames, np.intp))
+        free = search(everywhere)
+        if average_fits(free, together, frames)[0] >= fit + MIN_IMPROVEMENT:
+            LOG.warning("the times of the transcript do not fit the sound; they are not used")
+            return free, everywhere
     last_fits = average_fits(placed, anchors.groups, frames)
     wrong = np.flatnonzero(_average_neighbours(last_fits) < WORST_FIT)
     if len(wrong):
         known = anchors.start_s[(anchors.groups <= int(wrong[0])) & ~np.isnan(anchors.start_s)]
-        LOG.warning(
-            "at %d of the %d times of the transcript the words do not fit the sound, first at %.2f s; check them",
-            *(len(wrong), len(last_fits), float(known[-1]) if len(known) else 0.0),
-        )
+        what = "at %d of the %d times of the transcript the words do not fit the sound, first at %.2f s; check them"
+        LOG.warning(what, len(wrong), len(last_fits), float(known[-1]) if len(known) else 0.0)
     return placed, windows
-
-
-def _align_freely(
-    placed: list[PlacedWord], anchors: Anchors, frames: int, search: Callable[[Windows], list[PlacedWord]]
-) -> tuple[list[PlacedWord], Windows] | None:
-    """Return words aligned without times, where they fit badly within them and better without; None elsewhere."""
-    everywhere = np.zeros(len(anchors.groups), np.intp)
-    fit = float(average_fits(placed, everywhere, frames)[0])
-    if fit >= BAD_FIT or frames > FREE_FRAMES:
-        return None
-    windows = Windows(everywhere, np.full(len(everywhere), frames, np.intp))
-    free = search(windows)
-    if float(average_fits(free, everywhere, frames)[0]) < fit + MIN_IMPROVEMENT:
-        return None
-    LOG.warning("the times of the transcript do not fit the sound; they are not used")
-    return free, windows
 
 
 def _average_neighbours(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -37,16 +37,11 @@ MIN_VARIANCE = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class GeneralModel:
-    """Phone-tied mixtures: every phone has 128 Gaussians a stream, every state its own mixture weights.
+    """Phone-tied mixtures: every phone has 128 Gaussians a stream, every state its own mixture weights."""
 
-    forms     : coefficients of x and x² in every Gaussian's log density, per stream [each shape=(26, P·128)]
-    constants : of these log densities, per stream [each shape=(P·128,)]
-    weights   : mixture weights of the states, per stream [each shape=(P, 128, 3)]
-    """
-
-    forms: tuple[NDArray[np.float32], ...]
-    constants: tuple[NDArray[np.float32], ...]
-    weights: tuple[NDArray[np.float32], ...]
+    forms: tuple[NDArray[np.float32], ...]  # coefficients of x and x² in log densities [each shape=(26, P·128)]
+    constants: tuple[NDArray[np.float32], ...]  # of these log densities [each shape=(P·128,)]
+    weights: tuple[NDArray[np.float32], ...]  # mixture weights of the states [each shape=(P, 128, 3)]
 
     def log_density(self, features: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the log density of every frame under every state, less that of the best state [shape=(T, P·3)].
@@ -107,9 +102,8 @@ def load_general() -> GeneralModel:
         means, variances = (_gaussians((folder / name).read_bytes()) for name in ("means", "variances"))
         weights = _weights((folder / "sendump").read_bytes())
     except (OSError, ValueError) as error:
-        raise MissingDependencyError(
-            f"pocketsphinx's phone models are not those of its version 5 ({error}): pip install 'pocketsphinx>=5.0.4'"
-        ) from error
+        message = f"pocketsphinx's models are not those of its version 5 ({error}): pip install 'pocketsphinx>=5.0.4'"
+        raise MissingDependencyError(message) from error
     forms, constants = [], []
     for stream in STREAMS:
         mean, precision = means[:, stream], 1 / np.maximum(variances[:, stream], MIN_VARIANCE)
@@ -187,14 +181,10 @@ and take 500 bytes a frame. Those of a longer recording are computed twice."""
 
 
 class CombinedPhones(NamedTuple):
-    """Models of every phone of the inventory and of the noises.
+    """Models of every phone of the inventory and of the noises."""
 
-    hmm     : the own models; a phone without one borrows that of the most similar phone (``units.SIMILAR_PHONES``)
-    columns : the general density that goes with each of its densities [shape=(G,)]
-    """
-
-    hmm: UnitHmm
-    columns: NDArray[np.intp]
+    hmm: UnitHmm  # the own models; a phone without one borrows that of the most similar one (``units.SIMILAR_PHONES``)
+    columns: NDArray[np.intp]  # the general density that goes with each of its densities [shape=(G,)]
 
 
 def combine_phones(own: UnitHmm) -> CombinedPhones:

@@ -16,9 +16,8 @@ from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import penalise, wrap_log_likelihoods
 from lipmotion.speech.recognition.general import NOISES
 from lipmotion.speech.sound.analysed_audio import SILENT_ENERGY, Passage
-from lipmotion.speech.sound.speaker_similarity import SpeakerSimilarity
 from lipmotion.speech.sound.voice_activity import Stretch
-from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Features, Span, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, find_similar_phone, is_silent
 from lipmotion.units.phones import FULL_FORMS, SHORT_PAUSE_S
 
@@ -28,20 +27,13 @@ COMPARED_FORMS = FULL_FORMS | {PAUSE: SILENCE} | dict.fromkeys(NOISES, SILENCE)
 
 @dataclass(frozen=True, eq=False)
 class AlignedWords:
-    """Words aligned with a stretch of N frames.
-
-    words     : the words
-    phones    : phones, pauses and silences, in order
-    of_word   : the word of each phone, by number; -1: none [shape=(len(phones),)]
-    bounds    : the first frame of each phone, from that of the stretch, and N [shape=(len(phones) + 1,)]
-    densities : the density of every frame [shape=(N,)]
-    """
+    """Words aligned with a stretch of N frames."""
 
     words: tuple[str, ...]
-    phones: tuple[str, ...]
-    of_word: NDArray[np.intp]
-    bounds: NDArray[np.intp]
-    densities: NDArray[np.intp]
+    phones: tuple[str, ...]  # phones, pauses and silences, in order
+    of_word: NDArray[np.intp]  # the word of each phone, by number; -1: none [shape=(len(phones),)]
+    bounds: NDArray[np.intp]  # each phone's first frame, from that of the stretch, and N [shape=(len(phones) + 1,)]
+    densities: NDArray[np.intp]  # the density of every frame [shape=(N,)]
 
     @property
     def of_frame(self) -> NDArray[np.intp]:
@@ -89,13 +81,8 @@ def align_recognised_words(
     phones = [(phone, item.word) for item in spoken for phone in (
         variants[words[item.word]][item.variant] if item.word >= 0 else item.units)]  # fmt: skip
     bounds = np.searchsorted(states.positions[path], np.arange(len(sequence) + 1)).astype(np.intp)
-    return AlignedWords(
-        tuple(words),
-        tuple(phone for phone, _ in phones),
-        np.array([word for _, word in phones], np.intp),
-        bounds,
-        states.densities[path],
-    )
+    names, of_word = tuple(phone for phone, _ in phones), np.array([word for _, word in phones], np.intp)
+    return AlignedWords(tuple(words), names, of_word, bounds, states.densities[path])
 
 
 def weigh_densities(hmm: UnitHmm, present: NDArray[np.float32], bonus: float, reach: int) -> NDArray[np.float32]:
@@ -149,14 +136,11 @@ class RecognisedWord:
 
 
 class LabelledFrames(NamedTuple):
-    """A phone that begins in a frame.
-
-    word : the number of its word among those that were recognised; -1 where none is known
-    """
+    """A phone that begins in a frame."""
 
     first: int
     phone: str
-    word: int = -1
+    word: int = -1  # the number of its word among those that were recognised; -1 where none is known
 
 
 LabelledStretch = tuple[Stretch, list[LabelledFrames]]  # frames, and the phones in them
@@ -164,22 +148,14 @@ LabelledStretch = tuple[Stretch, list[LabelledFrames]]  # frames, and the phones
 
 @dataclass(frozen=True, eq=False)
 class Recognition:
-    """The result of a recognition.
+    """The result of a recognition."""
 
-    units      : phones in time, with their words where words decided
-    words      : these words in time
-    word_s     : seconds of speech of which recognised words decided the phones
-    phone_s    : seconds of speech that was recognised as phones
-    similarity : the speaker similarity score; None where it was not needed
-    posterior  : the mean posterior of the phones that a phone recogniser finds, 0 to 1; None: it did not decide
-    """
-
-    units: Timeline[Unit]
-    words: Timeline[RecognisedWord]
-    word_s: float
-    phone_s: float
-    similarity: float | None
-    posterior: float | None = None
+    units: Timeline[Unit]  # phones in time, with their words where words decided
+    words: Timeline[RecognisedWord]  # these words in time
+    word_s: float  # seconds of speech of which recognised words decided the phones
+    phone_s: float  # seconds of speech that was recognised as phones
+    similarity: float | None  # the speaker similarity score; None where it was not needed
+    posterior: float | None = None  # mean of the phones that a phone recogniser finds, 0 to 1; None: it did not decide
 
     @property
     def confidence(self) -> float | None:
@@ -232,18 +208,14 @@ def time_phones(labels: Sequence[tuple[str, str]], bounds: NDArray[np.intp], dur
 
 
 def build_recognition(
-    labels: Sequence[LabelledFrames],
-    recognised: Sequence[RecognisedWord],
-    frames: int,
-    duration_s: float,
-    similarity: SpeakerSimilarity | None,
+    labels: Sequence[LabelledFrames], recognised: Sequence[RecognisedWord], features: Features, similarity: float | None
 ) -> Recognition:
     """Return a recognition of labels of a recording; ``recognised`` are the words that they number."""
     named = [(label.phone, recognised[label.word].text if label.word >= 0 else "") for label in labels]
     firsts = [label.first for label in labels]
-    units = time_phones(named, np.array([*firsts, frames]), duration_s)
+    units = time_phones(named, np.array([*firsts, len(features.values)]), features.duration_s)
     words = []
-    ends = [*firsts[1:], round(duration_s * FRAME_RATE_HZ)]
+    ends = [*firsts[1:], round(features.duration_s * FRAME_RATE_HZ)]
     for number, group in groupby(zip(labels, ends, strict=True), key=lambda pair: pair[0].word):
         if number >= 0:
             phones = list(group)
@@ -251,7 +223,7 @@ def build_recognition(
     spoken = [span for span in units if not is_silent(span.label.phone)]
     word_s = sum(span.duration_s for span in spoken if span.label.word)
     phone_s = sum(span.duration_s for span in spoken) - word_s
-    return Recognition(units, Timeline(tuple(words)), word_s, phone_s, similarity.score if similarity else None)
+    return Recognition(units, Timeline(tuple(words)), word_s, phone_s, similarity)
 
 
 def place_units(units: Timeline[LabelT], first: int, own: slice) -> Timeline[LabelT]:
@@ -298,14 +270,9 @@ def join_recognition(parts: Sequence[tuple[Passage, Recognition]], duration_s: f
     posteriors = np.array([np.nan if part.posterior is None else part.posterior for _, part in parts])
     decided = ~np.isnan(posteriors)
     posterior = float(np.average(posteriors[decided], weights=speech_s[decided] + 1e-9)) if decided.any() else None
-    return Recognition(
-        join_units(units, Unit(SILENCE), duration_s),
-        Timeline(tuple(words)),
-        sum(part.word_s for _, part in parts),
-        sum(part.phone_s for _, part in parts),
-        parts[int(np.argmax(speech_s))][1].similarity,
-        posterior,
-    )
+    joined, similarity = join_units(units, Unit(SILENCE), duration_s), parts[int(np.argmax(speech_s))][1].similarity
+    word_s, phone_s = sum(part.word_s for _, part in parts), sum(part.phone_s for _, part in parts)
+    return Recognition(joined, Timeline(tuple(words)), word_s, phone_s, similarity, posterior)
 
 
 def select_reliable(units: Timeline[Unit], confidence: float) -> Timeline[Unit]:

@@ -19,12 +19,7 @@ from lipmotion.kernels.paths import Windows
 from lipmotion.speech.recognition.adaptation import Adaptation
 from lipmotion.speech.recognition.anchors import Anchors, align_within
 from lipmotion.speech.recognition.general import CombinedPhones, combine_likelihoods, combine_phones
-from lipmotion.speech.recognition.network.posteriors import (
-    PosteriorStretch,
-    find_installed_recogniser,
-    find_stretches,
-    mean_posterior,
-)
+from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser, find_stretches, mean_posterior
 from lipmotion.speech.recognition.recognised_speech import (
     WORD_POSTERIORS,
     LabelledFrames,
@@ -35,13 +30,7 @@ from lipmotion.speech.recognition.recognised_speech import (
     splice,
     time_phones,
 )
-from lipmotion.speech.recognition.word_search import (
-    begin_decoding,
-    decode_network,
-    list_wordless,
-    match_words,
-    recognise_free,
-)
+from lipmotion.speech.recognition.word_search import decode_network, find_words, list_phones, list_wordless, match_words
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.speaker_similarity import OWN_SCORE, STRANGER_SCORE, SpeakerSimilarity, speaker_similarity
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Timeline, Unit
@@ -68,47 +57,35 @@ from 0.806 to 0.841 (transcripts)."""
 class Recogniser:
     """Forced alignment and recognition with a model's own phone models and those of many voices.
 
-    own        : the phone models of a corpus
-    kind       : one of ``RECOGNISER_KINDS``
-    adaptation : to one speaker, or None; with one, the speaker similarity is not computed
-    Raises InputError: another kind.
+    Raises InputError: another kind than ``RECOGNISER_KINDS``.
     """
 
-    own: UnitHmm
-    kind: str = "auto"
-    adaptation: Adaptation | None = None
+    own: UnitHmm  # the phone models of a corpus
+    kind: str = "auto"  # one of ``RECOGNISER_KINDS``
+    adaptation: Adaptation | None = None  # to one speaker; with one, the speaker similarity is not computed
 
     def __post_init__(self) -> None:
         if self.kind not in RECOGNISER_KINDS:
             raise InputError(f"unknown recogniser {self.kind!r}; required one of: {', '.join(RECOGNISER_KINDS)}")
 
-    def recognise(self, audio: Audio, features: Features) -> Timeline[Unit]:
-        """Return the most probable phones of a recording in time: Viterbi with a back-off bigram.
-
-        audio    : an ``AnalysedAudio`` shares its features with what else is computed of it
-        features : of the audio, as ``mfcc`` returns them
-        Digital silence, of which all normalised features are 0, is recognised as silence.
-        With words, see ``recognition``.
-        Raises MissingDependencyError: general models or words are wanted and pocketsphinx is not installed.
-        Source: Hofer 2008, Eq. 5.
-        """
-        return self.recognition(audio, features).units
-
     def recognition(
         self, audio: Audio, features: Features, each: ParallelMap = map, *, english: bool = True
     ) -> Recognition:
-        """Return the recognised phones of a recording in time, with the words that decided them.
+        """Return the most probable phones of a recording in time, with the words that decided them.
 
-        english         : whether English words are searched; in other languages, phones alone
+        audio    : an ``AnalysedAudio`` shares its features with what else is computed of it
+        features : of the audio, as ``mfcc`` returns them; where all are 0, as in digital silence, there is silence
+        english  : whether English words are searched; in other languages, phones alone
         Words are recognised in every stretch of sound and aligned by our models: by a phone recogniser where it is sure
         (``speech.recognition.network``), else by pocketsphinx. Then ``auto`` compares their likelihood with that of the
         best path of phones without words: words that fit decide their phones; of the other words, the phones only
         become more probable (``speech.recognition.word_search``).
-        Raises MissingDependencyError: as ``recognise``.
+        Raises MissingDependencyError: general models or words are wanted and pocketsphinx is not installed.
+        Source: Hofer 2008, Eq. 5 (Viterbi with a back-off bigram).
         """
         audio = analysed(audio, features)
         if not features.values.any() or not audio.passages:
-            return build_recognition([LabelledFrames(0, SILENCE)], (), len(features.values), features.duration_s, None)
+            return build_recognition([LabelledFrames(0, SILENCE)], (), features, None)
         if not audio.is_passage:
             if uses_network(self.kind):
                 find_stretches(audio, each)  # of all passages at once: several processes work on them
@@ -117,17 +94,13 @@ class Recogniser:
             return join_recognition(list(zip(audio.passages, recognitions, strict=True)), features.duration_s)
         is_judged = self.adaptation is None and self.kind != "general"  # else nothing depends on it
         similarity = speaker_similarity(self.own, audio) if is_judged else None
-        known = (
-            self.kind == "auto"
-            and similarity is not None
-            and similarity.score > OWN_SCORE
-            and self.own.bigram.perplexity < SMALL_PERPLEXITY
-        )
+        is_own = similarity is not None and similarity.score > OWN_SCORE
+        known = self.kind == "auto" and is_own and self.own.bigram.perplexity < SMALL_PERPLEXITY
         if uses_network(self.kind) and not known:
             stretches = find_stretches(audio, each)
             if mean_posterior(stretches) >= WORD_POSTERIORS[0] or not english:
-                return self._network_recognition(audio, similarity, stretches, english=english)
-        spoken = begin_decoding(audio, each) if self.kind == "auto" and not known else None
+                return self._network_recognition(audio, similarity, english=english)
+        spoken = find_words(audio, each) if self.kind == "auto" and not known else None
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
         path = self._loop.network.best_path(log_likelihoods)
         labels, recognised = self._free_labels(audio, features, path), list[RecognisedWord]()
@@ -136,31 +109,25 @@ class Recogniser:
             loud, free = find_loud_frames(audio.log_energy), self._loop.network.emission[path]
             parts, recognised = match_words(hmm, self._loop, log_likelihoods, aligning, free, loud, spoken)
             labels = splice(labels, parts, len(path))
-        return build_recognition(labels, recognised, len(path), features.duration_s, similarity)
+        return build_recognition(labels, recognised, features, similarity and similarity.score)
 
     def _network_recognition(
-        self,
-        audio: AnalysedAudio,
-        similarity: SpeakerSimilarity | None,
-        stretches: Sequence[PosteriorStretch],
-        *,
-        english: bool,
+        self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None, *, english: bool
     ) -> Recognition:
         """Return what a phone recogniser finds in a recording: words, or phones that our models find as well."""
-        features = audio.mfcc()
-        loud = find_loud_frames(audio.log_energy)
+        features, stretches, loud = audio.mfcc(), find_stretches(audio), find_loud_frames(audio.log_energy)
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity, aligning=english)
         if english:
             parts, recognised = decode_network(hmm, log_likelihoods, loud, stretches)
         else:
             parts, recognised = list_wordless(hmm, self._loop, log_likelihoods, stretches), []
         labels = splice([LabelledFrames(0, SILENCE)], parts, len(loud))
-        recognition = build_recognition(labels, recognised, len(loud), features.duration_s, similarity)
+        recognition = build_recognition(labels, recognised, features, similarity and similarity.score)
         return replace(recognition, posterior=mean_posterior(stretches))
 
     def _free_labels(self, audio: AnalysedAudio, features: Features, path: NDArray[np.intp]) -> list[LabelledFrames]:
         """Return the phones of a recording as they are recognised without words, of their best path."""
-        labels = recognise_free(self._loop, path)
+        labels = list_phones(self._loop, path)
         if self.kind not in ("auto", "fast") or not self._has_few_gaussians:
             return labels
         named, bounds = [(label.phone, "") for label in labels], [label.first for label in labels]
@@ -181,8 +148,7 @@ class Recogniser:
         anchors : times of the words, within which they are aligned (``recognition.anchors``); None: anywhere
         The reading and the pronunciation of each word, and the pauses, are those with the most probable path. A phone
         without a model borrows that of the most similar phone with one (``units.SIMILAR_PHONES``).
-        Raises AlignmentError: the transcript does not fit into the recording.
-        Raises MissingDependencyError: as ``recognise``.
+        Raises AlignmentError: the transcript does not fit into the recording. MissingDependencyError: ``recognition``.
         """
         audio = analysed(audio, features)
         hmm, log_likelihoods = self._log_likelihoods(audio, aligning=True)
@@ -207,7 +173,7 @@ class Recogniser:
         """Return the density of each frame's state on the most probable path [shape=(T,)].
 
         They are numbered as in ``combined``, with the kind ``own`` as in the own models; of digital silence as silence.
-        Raises MissingDependencyError: as ``recognise``.
+        Raises MissingDependencyError: as ``recognition``.
         """
         if not features.values.any():
             return np.full(len(features.values), self.own.table.density(SILENCE, 0), np.intp)

@@ -233,16 +233,11 @@ def _trace(
 
 
 class LabelEvidence(NamedTuple):
-    """Where phones with given times are not what is said [each: starts and ends in seconds].
+    """Where phones with given times are not what is said [each: starts and ends in seconds]."""
 
-    missing : something is said where they have silence
-    idle    : nothing is said where they have phones
-    wrong   : other phones are said
-    """
-
-    missing: tuple[tuple[float, float], ...]
-    idle: tuple[tuple[float, float], ...]
-    wrong: tuple[tuple[float, float], ...]
+    missing: tuple[tuple[float, float], ...]  # something is said where they have silence
+    idle: tuple[tuple[float, float], ...]  # nothing is said where they have phones
+    wrong: tuple[tuple[float, float], ...]  # other phones are said
 
 
 def label_evidence(log_posteriors: Array, frame_s: float, units: Timeline[Unit]) -> LabelEvidence:

@@ -16,12 +16,7 @@ from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import LogLikelihoods, UnitLoop, decode_path, wrap_log_likelihoods
 from lipmotion.speech.recognition.general import NOISES
 from lipmotion.speech.recognition.network.beam_search import decode_words, load_english, score_stretch
-from lipmotion.speech.recognition.network.posteriors import (
-    POSTERIOR_STEP,
-    WORD_BOUNDARY,
-    PhonePosteriors,
-    PosteriorStretch,
-)
+from lipmotion.speech.recognition.network.posteriors import POSTERIOR_STEP, PhonePosteriors, PosteriorStretch
 from lipmotion.speech.recognition.recognised_speech import (
     FORMS,
     LabelledFrames,
@@ -105,9 +100,8 @@ def _decoder() -> Any:
             **OPTIONS,
         )
     except (ImportError, RuntimeError) as error:
-        raise MissingDependencyError(
-            f"words are recognised by pocketsphinx and its language model ({error}): pip install pocketsphinx"
-        ) from error
+        message = f"words are recognised by pocketsphinx and its language model ({error}): pip install pocketsphinx"
+        raise MissingDependencyError(message) from error
 
 
 WORD_FIT, STRETCH_FIT = -2.0, -1.5
@@ -115,14 +109,15 @@ WORD_FIT, STRETCH_FIT = -2.0, -1.5
 WORD_BONUS, WORD_REACH_FRAMES = 2.0, 2
 """Where words are not believed, their phones are still more probable than others, by so many nats a frame, and so many
 frames earlier or later than in their alignment, linearly less."""
-FIT_WEIGHT, POSTERIOR_WEIGHT, CONSTANT = 0.62, 3.4, -1.9  # coefficients of the confidence
+FIT_WEIGHT, POSTERIOR_WEIGHT, CONSTANT = 0.62, 3.4, -1.9
+"""Coefficients of the logistic regression that says how sure a word is (docs/decisions/recognition.md)."""
 MIN_FIT, MAX_FIT = -4.0, 1.0  # fits count within these limits
 SHORT_FRAMES = 3000
 """The words of so little sound are recognised in this process: to start another one would take as long."""
 DICTIONARY = Lexicon()  # words that were recognised are in the dictionary
 
 
-def begin_decoding(audio: AnalysedAudio, each: ParallelMap = map) -> Iterable[tuple[Stretch, Sequence[FoundWord]]]:
+def find_words(audio: AnalysedAudio, each: ParallelMap = map) -> Iterable[tuple[Stretch, Sequence[FoundWord]]]:
     """Return all stretches of sound of a recording, with the words in them as soon as they are known.
 
     Where ``each`` starts processes, they begin now. Raises MissingDependencyError: as ``spot_words``.
@@ -147,7 +142,7 @@ def match_words(
     aligning   : log likelihoods for the alignment of words
     path       : the density of every frame on the best path of phones without words [shape=(T,)]
     loud       : frames that are too loud for silence [shape=(T,)]
-    spoken     : of ``begin_decoding``, whose errors it raises
+    spoken     : of ``find_words``, whose errors it raises
     """
     parts, recognised = list[LabelledStretch](), list[RecognisedWord]()
     for stretch, words in spoken:
@@ -166,23 +161,19 @@ def match_words(
                 present = np.eye(len(FORMS), dtype=np.float32)[forms[aligned.of_frame]]
                 bonus = weigh_densities(hmm, present, WORD_BONUS, WORD_REACH_FRAMES)
                 drawn = loop.network.best_path(wrap_log_likelihoods(free.stretch(*stretch) + bonus))
-                decided = [(stretch, splice(recognise_free(loop, drawn, stretch.first), decided, stretch.end))]
+                decided = [(stretch, splice(list_phones(loop, drawn, stretch.first), decided, stretch.end))]
             parts += decided
-        scores = map(score_words, fits.tolist(), (word.posterior for word in words))
-        recognised += map(RecognisedWord, texts, scores)
+        for word, fit in zip(words, np.clip(fits, MIN_FIT, MAX_FIT).tolist(), strict=True):
+            confidence = _logistic(FIT_WEIGHT * fit + POSTERIOR_WEIGHT * word.posterior + CONSTANT)
+            recognised.append(RecognisedWord(word.text, confidence))
     return parts, recognised
 
 
-def score_words(fit: float, posterior: float) -> float:
-    """Return the probability that a word is right, 0 to 1: by logistic regression (docs/decisions/recognition.md).
-
-    fit       : of the word (``AlignedWords.fits``), in nats
-    """
-    score = FIT_WEIGHT * min(max(fit, MIN_FIT), MAX_FIT) + POSTERIOR_WEIGHT * posterior + CONSTANT
+def _logistic(score: float) -> float:
     return float(1 / (1 + np.exp(-score)))
 
 
-def recognise_free(loop: UnitLoop, path: NDArray[np.intp], first: int = 0) -> list[LabelledFrames]:
+def list_phones(loop: UnitLoop, path: NDArray[np.intp], first: int = 0) -> list[LabelledFrames]:
     """Return the phones of a path through a loop [shape=(T,)] whose first frame is ``first``; noises are silence."""
     phones, starts = decode_path(loop, path)
     return [
@@ -226,7 +217,7 @@ def decode_network(
 
 def list_spoken(posteriors: PhonePosteriors) -> list[tuple[RecognisedWord, tuple[Pronunciation, ...]]]:
     """Return the words of a stretch of English with their pronunciations; phones of no word have an empty text."""
-    if not _finds_phones(posteriors):
+    if not posteriors.has_phones:
         return []
     items = []
     for word in decode_words(load_english(), score_stretch(posteriors)):
@@ -238,7 +229,7 @@ def list_spoken(posteriors: PhonePosteriors) -> list[tuple[RecognisedWord, tuple
         if word.text:
             agreement = max(1 - count_phone_edits(each, heard) / max(len(each), len(heard)) for each in variants)
             score = AGREEMENT_WEIGHT * agreement + NETWORK_WEIGHT * posteriors.mean_posterior(word.first, word.end)
-            confidence = float(1 / (1 + np.exp(-(score + NETWORK_CONSTANT))))
+            confidence = _logistic(score + NETWORK_CONSTANT)
         items.append((RecognisedWord(word.text, confidence), variants))
     return items
 
@@ -254,7 +245,7 @@ def list_wordless(
     """
     parts = list[LabelledStretch]()
     for stretch, posteriors in stretches:
-        if _finds_phones(posteriors):
+        if posteriors.has_phones:
             frames = stretch.end - stretch.first
             row = np.minimum(np.arange(frames) // POSTERIOR_STEP, len(posteriors.values) - 1)
             posterior = np.zeros((frames, len(FORMS)), np.float32)
@@ -263,9 +254,5 @@ def list_wordless(
                     posterior[:, FORMS.index(find_form(phone))] += np.exp(posteriors.of_phones[row, column])
             values = free.stretch(*stretch) + weigh_densities(hmm, posterior, POSTERIOR_BONUS, REACH_FRAMES)
             path = loop.network.best_path(wrap_log_likelihoods(values))
-            parts.append((stretch, recognise_free(loop, path, stretch.first)))
+            parts.append((stretch, list_phones(loop, path, stretch.first)))
     return parts
-
-
-def _finds_phones(posteriors: PhonePosteriors) -> bool:
-    return any(each.token != WORD_BOUNDARY for each in posteriors.best_tokens)

@@ -26,8 +26,7 @@ def mix_noise(audio: Audio, kind: str, snr_db: float, talkers: Sequence[Audio] =
               (``mark_spoken``); noise that the recording already has counts as speech there
     talkers : recordings of the babble's talkers, other people than the one in ``audio``; white noise does not use them
     The samples are not clipped: beyond full scale they are exact for features, not for sound files of integers.
-    Raises InputError: another kind, a ratio that is not finite, a talker that is the recording itself, or as
-    ``mark_spoken`` and ``make_babble``.
+    Raises InputError: another kind, a ratio not finite, a talker that is the recording itself; as ``make_babble``.
     """
     if kind not in NOISE_KINDS or not np.isfinite(snr_db):
         raise InputError(f"{kind!r} noise at {snr_db} dB; required {' or '.join(NOISE_KINDS)}, and a finite ratio")

@@ -224,16 +224,11 @@ class AnalysedAudio(Audio):
 
 
 class Passage(NamedTuple):
-    """A passage of a recording.
+    """A passage of a recording."""
 
-    first : the frame of the recording in which its sound begins, with the silence before it; it may be negative
-    own   : frames of the recording that are nearer to it than to other passages
-    audio : its sound, at the level of all passages, with silence before and after it
-    """
-
-    first: int
-    own: slice
-    audio: AnalysedAudio
+    first: int  # the frame of the recording in which its sound begins, with the silence before it; it may be negative
+    own: slice  # frames of the recording that are nearer to it than to other passages
+    audio: AnalysedAudio  # its sound, at the level of all passages, with silence before and after it
 
 
 class _Piece(NamedTuple):

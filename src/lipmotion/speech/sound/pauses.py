@@ -40,18 +40,6 @@ def average_powers(samples: NDArray[np.float32], size: int) -> Array:
     return powers
 
 
-def measure_levels_at(audio: Audio, times_s: Array) -> Array:
-    """Return the smoothed level of a sound at some times, dB of full scale [same shape].
-
-    times_s : rising, s [shape=(T,)]; before the first and after the last level that one is returned
-    A sound of less than 10 ms has the level ``QUIETEST_DB``.
-    """
-    levels = measure_levels_db(audio)
-    if not len(levels):
-        return np.full(len(times_s), QUIETEST_DB)
-    return np.interp(times_s, (np.arange(len(levels)) + 0.5) * STEP_S, levels)
-
-
 def list_spans(levels: Array) -> list[tuple[float, float]]:
     """Return start and end of every stretch between two pauses, s.
 
@@ -70,12 +58,3 @@ def list_spans(levels: Array) -> list[tuple[float, float]]:
     loud = levels > np.interp(np.arange(len(levels)), middles, values)
     runs = find_sound_runs(loud, round(MIN_PAUSE_S / STEP_S))
     return [(first * STEP_S, end * STEP_S) for first, end in runs if (end - first) * STEP_S >= MIN_SPEECH_S]
-
-
-def find_quietest(levels: Array, start_s: float, end_s: float) -> float:
-    """Return the time of the lowest level from ``start_s`` to ``end_s``; their middle if no frame lies between."""
-    first, last = round(start_s / STEP_S), round(end_s / STEP_S)
-    part = levels[max(first, 0) : max(last, 0)]
-    if not part.size:
-        return (start_s + end_s) / 2
-    return (max(first, 0) + int(np.argmin(part)) + 0.5) * STEP_S

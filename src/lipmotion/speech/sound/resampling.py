@@ -41,16 +41,11 @@ REACH_S = 0.008  # the next piece begins so much earlier or later, at most
 
 
 class JoinedPieces(NamedTuple):
-    """Pieces of sound that were joined.
+    """Pieces of sound that were joined."""
 
-    samples : the sound [shape=(N,)]
-    starts  : the number of the sample at which each piece begins, in the middle of its overlap with the one before
-    shifts  : by how many samples later than wanted it begins in its recording
-    """
-
-    samples: Samples
-    starts: list[int]
-    shifts: list[int]
+    samples: Samples  # the sound [shape=(N,)]
+    starts: list[int]  # sample at which each piece begins, in the middle of its overlap with the one before
+    shifts: list[int]  # by how many samples later than wanted it begins in its recording
 
 
 def overlap_pieces(sounds: Sequence[Samples], pieces_s: Sequence[tuple[float, float]], rate_hz: int) -> JoinedPieces:

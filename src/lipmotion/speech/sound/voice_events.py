@@ -163,7 +163,8 @@ def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timel
         for first_s in np.arange(start_s, end_s, PAUSE_PIECE_S).tolist()
     ]
     for start_s, end_s in silences:
-        pause, reach = _frames(start_s, end_s), round(QUIET_REACH_S * FRAME_RATE_HZ)
+        pause = range(round(start_s * FRAME_RATE_HZ), round(end_s * FRAME_RATE_HZ))
+        reach = round(QUIET_REACH_S * FRAME_RATE_HZ)
         around = slice(max(pause.start - reach, 0), min(pause.stop + reach, len(level_db)))
         for begin, end, rise_db in _noises(_bands(audio, around), voiced[around]):
             first, stop = begin + around.start, end + around.start
@@ -208,10 +209,6 @@ def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, i
 def _bands(audio: AnalysedAudio, frames: slice) -> NDArray[np.float32]:
     """Return ``log_bands`` of a range of frames, computed of these alone [shape=(N, 40)]."""
     return log_bands(audio.samples[frames.start * HOP : max(frames.stop - 1, frames.start) * HOP])
-
-
-def _frames(start_s: float, end_s: float) -> slice:
-    return slice(round(start_s * FRAME_RATE_HZ), round(end_s * FRAME_RATE_HZ))
 
 
 def _smooth(curve: Curve) -> Curve:

@@ -194,17 +194,14 @@ def _pronounce(words: Sequence[str], language: str) -> dict[str, tuple[Pronuncia
     spoken = LANGUAGES[language]
     for word in words:
         if letters := find_foreign(word, language):
-            raise InputError(
-                f"no rules say how {shorten(repr(word))} is said in {spoken.name} ({shorten(letters)}): write it "
-                f"as it is spoken ({' or '.join(spoken.scripts).lower()} letters), add it to a lexicon file, or give "
-                "another language"
-            )
+            what = f"no rules say how {shorten(repr(word))} is said in {spoken.name} ({shorten(letters)}): write it in"
+            scripts = " or ".join(spoken.scripts).lower()
+            raise InputError(f"{what} {scripts} letters, add it to a lexicon file, or give another language")
     voice = spoken.voice or language
     if voice not in [each.name for each in _others()]:
-        raise MissingDependencyError(
-            f"no pronunciation of {shorten(repr(words[0]))} in {spoken.name}: install espeak-ng "
-            f"({install_command(EXTRA)}), or give a lexicon file with its {len(words)} words"
-        )
+        what = f"no pronunciation of {shorten(repr(words[0]))} in {spoken.name}: install espeak-ng"
+        way_out = f"({install_command(EXTRA)}), or give a lexicon file with its {len(words)} words"
+        raise MissingDependencyError(f"{what} {way_out}")
     answers = _ask_library({"voice": voice, "words": list(words)}, len(words))
     pronounced: dict[str, tuple[Pronunciation, ...]] = {}
     for word, ipa in zip(words, answers, strict=True):

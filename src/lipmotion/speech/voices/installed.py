@@ -130,16 +130,11 @@ DEFAULT_VOICES = (("espeak-ng", "en-us+f2"), ("flite", "slt"))
 
 
 class VoicedSentence(NamedTuple):
-    """A sentence that a voice has said.
+    """A sentence that a voice has said."""
 
-    audio : the sound at 16 kHz
-    units : phones in time, from 0 s to the end of the sound
-    sound : the file with the sound at the synthesiser's own rate; it is there until the next sentence is asked for
-    """
-
-    audio: Audio
-    units: Timeline[Unit]
-    sound: Path
+    audio: Audio  # the sound at 16 kHz
+    units: Timeline[Unit]  # phones in time, from 0 s to the end of the sound
+    sound: Path  # of the synthesiser's own rate; the file is there until the next sentence is asked for
 
     def own_sound(self) -> Audio:
         """Return the sound at the synthesiser's own rate. Raises InputError: its file is gone, or no sound file."""
@@ -233,16 +228,12 @@ def speak_sentences(
 
     lexicon : its pronunciations tell which vowels are unstressed; the built-in one by default
     Raises MissingDependencyError: the synthesiser is not installed (the message names the package).
-    Raises InputError: no such synthesiser or voice, a text without a word, or one that the synthesiser cannot say.
+    Raises InputError: no such voice, a text without a word, or one that the synthesiser cannot say.
     """
-    synthesiser = SYNTHESISERS.get(voice.synthesiser)
-    if synthesiser is None:
-        raise InputError(f"unknown synthesiser {voice.synthesiser!r}; required one of: {', '.join(SYNTHESISERS)}")
+    synthesiser = SYNTHESISERS[voice.synthesiser]
     names = [known.name for known in synthesiser.voices()]
     if not names:
-        raise MissingDependencyError(
-            f"{synthesiser.name} is not installed, or has no English voice: {explain_install(synthesiser)}"
-        )
+        raise MissingDependencyError(f"{synthesiser.name} has no English voice here: {explain_install(synthesiser)}")
     if voice.name not in names and not _is_other(voice.name, synthesiser):
         raise InputError(f"{synthesiser.name} has no voice {voice.name!r} here; it has: {', '.join(names)}")
     words = [split_words(text) for text in texts]

@@ -52,18 +52,12 @@ def complete_map(labels: Iterable[str], table: PhoneMap, *, ipa: bool) -> tuple[
 
 @dataclass(frozen=True)
 class SyntheticVoice:
-    """A voice of an installed synthesiser.
+    """A voice of an installed synthesiser."""
 
-    name        : by which the synthesiser knows it
-    synthesiser : ``flite``, ``festival`` or ``espeak-ng``
-    speaker     : whose voice it is: two voices made from recordings of one person have the same speaker
-    language    : what it speaks, as in ``en-us``, ``de``, ``pt-br``
-    """
-
-    name: str
-    synthesiser: str
-    speaker: str
-    language: str = "en-us"
+    name: str  # by which the synthesiser knows it
+    synthesiser: str  # ``flite``, ``festival`` or ``espeak-ng``
+    speaker: str  # whose voice it is: two voices made from recordings of one person have the same speaker
+    language: str = "en-us"  # what it speaks, as in ``en-us``, ``de``, ``pt-br``
 
     @property
     def full_name(self) -> str:
@@ -73,41 +67,27 @@ class SyntheticVoice:
 
 @dataclass(frozen=True, eq=False)
 class SynthesisedSentence:
-    """One sentence from a synthesiser.
+    """One sentence from a synthesiser."""
 
-    audio   : at 16 kHz
-    phones  : in time, by the synthesiser's own names
-    sound   : the file with the sound at the synthesiser's own rate; it is there until the next sentence is asked for
-    words   : as they are written, in time, where the synthesiser tells (None: it does not)
-    phone_map : its names to phones of the inventory, where they are not those of the synthesiser's English (None)
-    """
-
-    audio: Audio
-    phones: Timeline[str]
-    sound: Path
-    words: Timeline[str] | None = None
-    phone_map: PhoneMap | None = None
+    audio: Audio  # at 16 kHz
+    phones: Timeline[str]  # in time, by the synthesiser's own names
+    sound: Path  # of the synthesiser's own rate; the file is there until the next sentence is asked for
+    words: Timeline[str] | None = None  # as they are written, in time, where the synthesiser tells (None: it does not)
+    phone_map: PhoneMap | None = None  # its names to phones, where they are not those of the English voices
 
 
 @dataclass(frozen=True)
 class Synthesiser:
-    """A speech synthesis program.
-
-    package    : the Debian package with it; empty: it is a Python package
-    voices     : returns its installed American English voices; none where it is not installed
-    synthesise : yields the sentences of some texts in a voice (name, texts, a folder for temporary files), in order
-    phone_map  : its phones to those of the inventory (``phone_maps``)
-    others     : returns its voices of other languages and kinds of English
-    extra      : of lipmotion, that installs that
-    """
+    """A speech synthesis program."""
 
     name: str
-    package: str
-    voices: Callable[[], tuple[SyntheticVoice, ...]]
+    package: str  # the Debian package with it; empty: it is a Python package
+    voices: Callable[[], tuple[SyntheticVoice, ...]]  # those of American English; none where it is not installed
     synthesise: Callable[[str, Sequence[str], Path], Iterator[SynthesisedSentence]]
-    phone_map: PhoneMap
-    others: Callable[[], tuple[SyntheticVoice, ...]] = tuple
-    extra: str = ""
+    """Yields the sentences of some texts in a voice (name, texts, a folder for temporary files), in order."""
+    phone_map: PhoneMap  # its phones to those of the inventory
+    others: Callable[[], tuple[SyntheticVoice, ...]] = tuple  # its voices of other languages and kinds of English
+    extra: str = ""  # of lipmotion, that installs that
 
 
 START_S, EACH_S = 30.0, 5.0

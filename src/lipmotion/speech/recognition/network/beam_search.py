@@ -11,10 +11,11 @@ word below a node). The best path counts, not the sum of all.
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,54 +38,27 @@ NO_WORD = -1
 Nodes = NDArray[np.int32]
 
 
-class LanguageModel:
-    """The trigrams of pocketsphinx's language model of English.
-
-    words : what the numbers of words stand for
-    """
-
-    def __init__(self, words: tuple[str, ...], model: Any, log_base: float):
-        self.words = words
-        self._model, self._log_base = model, log_base
-        self._known: dict[tuple[int, ...], float] = {}
-
-    def score(self, word: int, before: tuple[int, ...]) -> float:
-        """Return the weighted logarithm of the probability of a word after up to two others, the last one first."""
-        key = (word, *before)
-        if key not in self._known:
-            names = [self.words[number] for number in key]
-            self._known[key] = LANGUAGE_WEIGHT * self._model.prob(names) * self._log_base
-        return self._known[key]
-
-
 @dataclass(frozen=True, eq=False)
 class WordTree:
-    """The tree of V nodes and A arcs in which words that begin alike share their first phones.
+    """The tree of V nodes and A arcs in which words that begin alike share their first phones."""
 
-    sound      : the phone of each node, in ``SOUNDS`` [shape=(V,)]; that of the root, the first node, does not count
-    score      : of the most probable word below each node, 0 for the root [shape=(V,)]
-    first_arc, arcs : the arcs that leave each node [each shape=(V,)]
-    target     : the node that each arc leads to [shape=(A,)]
-    ends       : numbers of the words that end in a node, where there are some
-    is_end     : whether there are some [shape=(V,)]
-    free       : the first of those nodes, one of each phone, that follow one another in any order, outside of words
-    """
-
-    sound: Nodes
-    score: NDArray[np.float64]
-    first_arc: Nodes
-    arcs: Nodes
-    target: Nodes
-    ends: dict[int, list[int]]
-    is_end: NDArray[np.bool_]
-    free: int
+    sound: Nodes  # the phone of each node, in ``SOUNDS`` [shape=(V,)]; that of the root, the first node, does not count
+    score: NDArray[np.float64]  # of the most probable word below each node, 0 for the root [shape=(V,)]
+    first_arc: Nodes  # the first arc that leaves each node [shape=(V,)]
+    arcs: Nodes  # how many leave it [shape=(V,)]
+    target: Nodes  # the node that each arc leads to [shape=(A,)]
+    ends: dict[int, list[int]]  # numbers of the words that end in a node, where there are some
+    is_end: NDArray[np.bool_]  # whether there are some [shape=(V,)]
+    free: int  # the first of the nodes, one of each phone, that follow one another in any order, outside of words
 
 
 class EnglishWords(NamedTuple):
     """What a search for English words needs."""
 
     tree: WordTree
-    language: LanguageModel
+    words: tuple[str, ...]  # what the numbers of words stand for
+    score: Callable[[int, tuple[int, ...]], float]
+    """Returns the weighted logarithm of the probability of a word after up to two others, the last one first."""
 
 
 @cache
@@ -99,21 +73,25 @@ def load_english() -> EnglishWords:
         log_math = LogMath()
         model = NGramModel(Config(), log_math, str(find_english_data() / "en-us.lm.bin"))
     except (ImportError, RuntimeError) as error:
-        raise MissingDependencyError(
-            f"words are recognised with the language model of pocketsphinx ({error}): pip install pocketsphinx"
-        ) from error
+        message = f"words are recognised with the language model of pocketsphinx ({error}): pip install pocketsphinx"
+        raise MissingDependencyError(message) from error
     base = float(np.log(log_math.exp(1)))
     pronounced = _pronunciations()
     names = list(pronounced)
     scores = np.array([model.prob([word]) for word in pronounced]) * base
     chosen = np.argsort(-scores, kind="stable")[:MAX_WORDS]
     chosen = chosen[scores[chosen] > MIN_LOG_PROBABILITY]
-    words = np.array([names[number] for number in chosen.tolist()])
-    coded = ([bytes(map(NUMBER.__getitem__, said.split())) for said in pronounced[word]] for word in words.tolist())
+    words = tuple(np.array([names[number] for number in chosen.tolist()]).tolist())
+    coded = ([bytes(map(NUMBER.__getitem__, said.split())) for said in pronounced[word]] for word in words)
     numbers = [[phones for phones in each if len(phones) <= LONGEST_WORD] for each in coded]
     del pronounced, names  # no string of theirs is kept, which would keep the memory of many
     tree = build_word_tree(numbers, scores[chosen] * LANGUAGE_WEIGHT)
-    return EnglishWords(tree, LanguageModel(tuple(words.tolist()), model, base))
+
+    @cache
+    def score(word: int, before: tuple[int, ...]) -> float:
+        return float(LANGUAGE_WEIGHT * model.prob([words[number] for number in (word, *before)]) * base)
+
+    return EnglishWords(tree, words, score)
 
 
 def _pronunciations() -> dict[str, list[str]]:
@@ -161,16 +139,9 @@ def build_word_tree(pronunciations: list[list[bytes]], scores: NDArray[np.float6
     for place, word in zip(last.tolist(), words.tolist(), strict=True):
         ends.setdefault(place, []).append(word)
     ends |= {place: [NO_WORD] for place in free.tolist()}
-    return WordTree(
-        sound,
-        score,
-        (np.cumsum(arcs) - arcs).astype(np.int32),
-        arcs.astype(np.int32),
-        targets[order].astype(np.int32),
-        ends,
-        np.isin(np.arange(count + len(SOUNDS)), list(ends)),
-        count,
-    )
+    first_arc, is_end = (np.cumsum(arcs) - arcs).astype(np.int32), np.isin(np.arange(count + len(SOUNDS)), list(ends))
+    target = targets[order].astype(np.int32)
+    return WordTree(sound, score, first_arc, arcs.astype(np.int32), target, ends, is_end, count)
 
 
 BEAM, MAX_PATHS = 10.0, 1000
@@ -198,15 +169,11 @@ class DecodedWord(NamedTuple):
 
 
 class Scored(NamedTuple):
-    """Logarithms of what a path may do in every row.
+    """Logarithms of what a path may do in every row."""
 
-    sounds : say each of ``SOUNDS`` [shape=(N, S)]
-    blank  : say nothing, within a word; between: between words [each shape=(N,)]
-    """
-
-    sounds: Scores
-    blank: Scores
-    between: Scores
+    sounds: Scores  # say each of ``SOUNDS`` [shape=(N, S)]
+    blank: Scores  # say nothing, within a word [shape=(N,)]
+    between: Scores  # the same between words [shape=(N,)]
 
 
 def score_stretch(posteriors: PhonePosteriors) -> Scored:
@@ -318,7 +285,7 @@ class _BeamSearch:
             base, origin = float(paths.sound[place] - tree.score[node]), int(paths.origin[place])
             for word in tree.ends[node]:
                 free = word == NO_WORD
-                score = base - FREE_WORD_LOSS if free else base + WORD_GAIN + self.english.language.score(word, before)
+                score = base - FREE_WORD_LOSS if free else base + WORD_GAIN + self.english.score(word, before)
                 context = () if free else (word, *before[:1])
                 if score > limit and score > ended.get(context, (NEVER,))[0]:
                     ended[context] = score, word, origin
@@ -347,6 +314,6 @@ def decode_words(english: EnglishWords, rows: Scored) -> list[DecodedWord]:
     while number >= 0:
         before, word, end = search.history[number]
         first = search.history[before][2] if before >= 0 else 0
-        words.append(DecodedWord(english.language.words[word] if word != NO_WORD else "", first, end))
+        words.append(DecodedWord(english.words[word] if word != NO_WORD else "", first, end))
         number = before
     return words[::-1]

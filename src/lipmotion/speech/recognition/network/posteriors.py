@@ -92,13 +92,9 @@ class FoundToken(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PhonePosteriors:
-    """Posteriors of tokens in a stretch of a recording.
+    """Posteriors of K tokens in a stretch of a recording, or in half precision in all of it."""
 
-    values : natural logarithms, every ``POSTERIOR_STEP`` frames [shape=(N, K)]; of a whole recording in half precision
-    tokens : K of them
-    """
-
-    values: NDArray[np.floating[Any]]
+    values: NDArray[np.floating[Any]]  # natural logarithms, every ``POSTERIOR_STEP`` frames [shape=(N, K)]
     tokens: tuple[str, ...]
 
     @cached_property
@@ -114,6 +110,11 @@ class PhonePosteriors:
         bounds = pairwise([0, *(np.flatnonzero(np.diff(best)) + 1).tolist(), len(best)])
         tokens = (FoundToken(self.tokens[best[first]], first, end) for first, end in bounds if end)
         return tuple(each for each in tokens if each.token != BLANK)
+
+    @property
+    def has_phones(self) -> bool:
+        """Whether a phone is on the best path."""
+        return any(each.token != WORD_BOUNDARY for each in self.best_tokens)
 
     def phones_between(self, first: int, end: int) -> list[str]:
         """Return the phones of the best path that begin in some rows: from ``first`` to before ``end``."""
@@ -175,11 +176,8 @@ def mean_posterior(stretches: Sequence[PosteriorStretch]) -> float:
 
 def read_posteriors(audio: AnalysedAudio, each: ParallelMap = map) -> PhonePosteriors:
     """Return the posteriors in the whole of a recording; where there is no sound, nothing is said."""
-
-    def joined() -> PhonePosteriors:
-        return PhonePosteriors(np.asarray(_join_posteriors(audio, each)), load_phone_recogniser().tokens)
-
-    return audio.cached("all posteriors", joined)
+    tokens = load_phone_recogniser().tokens
+    return audio.cached("all posteriors", lambda: PhonePosteriors(np.asarray(_join_posteriors(audio, each)), tokens))
 
 
 def _join_posteriors(audio: AnalysedAudio, each: ParallelMap) -> JoinedRows:
