@@ -6,8 +6,6 @@ for each class; exit code 2 means a wrong command line, exit code 1 a bug.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 SHOWN_CHARACTERS = 80  # largest number of characters of a text from a user that a message repeats
 
 
@@ -16,7 +14,7 @@ def shorten(text: str) -> str:
     return text if len(text) <= SHOWN_CHARACTERS else text[:SHOWN_CHARACTERS] + "..."
 
 
-def shorten_list(names: Sequence[str], count: int = 5) -> str:
+def shorten_list(names: list[str] | tuple[str, ...], count: int = 5) -> str:
     """Return the first names of a list, each shortened, and ``...`` if there are more, for a message."""
     return ", ".join(map(shorten, names[:count])) + ", ..." * (len(names) > count)
 
