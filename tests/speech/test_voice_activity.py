@@ -116,6 +116,15 @@ def test_lines_are_passages_of_their_own_whatever_their_levels(gap_s: float, dec
     assert soft.end <= first_alone.end
 
 
+def test_a_voice_that_turns_away_is_heard_to_its_end() -> None:
+    """Syllables of a quarter of a second that fall by 20 dB, from the middle on softer, before and after a room."""
+    syllables = np.tile(np.linspace(0, -20, 25), 24) - np.repeat([0, 22], 300)
+    decibels = np.pad(syllables, 200, constant_values=-55)
+    loud, soft = voice_activity.find_passages((decibels * voice_activity.DECIBEL).astype(np.float32))
+    assert 470 < loud.end < 530
+    assert soft.end > 780
+
+
 def test_every_line_of_a_stem_of_ten_minutes_is_a_passage() -> None:
     energies = [mfcc.log_energy(spoken(number)) for number in range(12)]
     loudest = max(float(values.max()) for values in energies)

@@ -28,6 +28,8 @@ LONGEST_FRAMES = 1000
 SEPARATE_FRAMES = 50  # a longer pause separates passages
 SHORT_FRAMES, NEAR_FRAMES = 150, 150
 """A passage shorter than the first belongs to a neighbour nearer than the second: one word says little of a voice."""
+SOFT_FRAMES, SOFT_RANGE = 50, 15 * DECIBEL
+"""So many frames beside loud ones, whose level varies by more than the second, are a softer voice: breath varies less."""
 LEVEL_STEP = 15 * DECIBEL  # voices with a dip between them are passages of their own where their levels differ by more
 PASSAGE_MARGIN = 75
 """Frames before and after the sound of a passage that belong to it, where they are not digital silence."""
@@ -88,15 +90,20 @@ def find_passages(log_energy: NDArray[np.float32]) -> list[Stretch]:
     """
     passages: list[Stretch] = []
     floor = float(log_energy.max() + np.log(DYNAMIC_RANGE)) + 1e-3
-    for region in _regions(log_energy):
+    regions, sound = _divide_by_level(log_energy)
+    for region in regions:
         runs: list[Stretch] = []
-        for first, end in find_sound_runs(find_loud_frames(log_energy[region.first : region.end]), SEPARATE_FRAMES):
+        within = slice(region.first, region.end)
+        loud = find_loud_frames(log_energy[within])
+        for first, end in find_sound_runs(loud, SEPARATE_FRAMES):
             run = Stretch(region.first + first, region.first + end)
             short = runs and min(run.end - run.first, runs[-1].end - runs[-1].first) < SHORT_FRAMES
             if short and run.first - runs[-1].end < NEAR_FRAMES:
                 runs[-1] = Stretch(runs[-1].first, run.end)
             else:
                 runs.append(run)
+        soft = _find_soft_runs(loud, sound[within], log_energy[within])
+        runs = sorted([*runs, *(Stretch(region.first + first, region.first + end) for first, end in soft)])
         for number, run in enumerate(runs):
             before = (runs[number - 1].end + run.first + 1) // 2 if number else region.first
             after = (run.end + runs[number + 1].first + 1) // 2 if number + 1 < len(runs) else region.end
@@ -143,8 +150,26 @@ def _margin(log_energy: NDArray[np.float32], floor: float, reaching: int) -> int
     return count
 
 
-def _regions(log_energy: NDArray[np.float32]) -> list[Stretch]:
-    """Return the recording cut in the quietest frames between voices of other levels, and in long silence."""
+def _find_soft_runs(
+    loud: NDArray[np.bool_], sound: NDArray[np.bool_], log_energy: NDArray[np.float32]
+) -> list[tuple[int, int]]:
+    """Return runs of a voice that stays softer than what is loud before it, as of somebody who turns away."""
+    from scipy.ndimage import maximum_filter1d
+
+    smooth, runs = smooth_level(log_energy), []
+    beyond = sound & ~maximum_filter1d(loud, 2 * PASSAGE_MARGIN + 1)
+    for first, end in find_sound_runs(beyond, SEPARATE_FRAMES) if loud.any() else ():
+        if beyond[first:end].sum() >= SOFT_FRAMES and np.ptp(smooth[first:end]) > SOFT_RANGE:
+            loud_end = max(first - PASSAGE_MARGIN, 0)
+            runs.append((loud_end + int(np.argmin(smooth[loud_end : first + 1])), end))
+    return runs
+
+
+def _divide_by_level(log_energy: NDArray[np.float32]) -> tuple[list[Stretch], NDArray[np.bool_]]:
+    """Return the recording cut in the quietest frames between voices of other levels, and in long silence.
+
+    Also which frames sound as a voice would beside what is near.
+    """
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     level = average_power(log_energy)
@@ -153,7 +178,7 @@ def _regions(log_energy: NDArray[np.float32]) -> list[Stretch]:
     falls = maximum_filter1d(local - minimum_filter1d(smooth, STEADY_FRAMES, mode="nearest"), STEADY_FRAMES) > STEADY
     sound = (smooth > local - LOCAL_DROP) & (level > level.max() - SOFTEST_DROP) & falls
     if not sound.any():
-        return []
+        return [], sound
     cuts = {0, len(level)}
     for pause in (SEPARATE_FRAMES, SHORT_FRAMES // 10):  # whole lines first, then voices that follow at once
         before: tuple[float, int, int] | None = None
@@ -169,7 +194,7 @@ def _regions(log_energy: NDArray[np.float32]) -> list[Stretch]:
                 else:
                     loud, length = max(loud, before[0]), length + before[2]
             before = loud, end, length
-    return [Stretch(first, end) for first, end in pairwise(sorted(cuts))]
+    return [Stretch(first, end) for first, end in pairwise(sorted(cuts))], sound
 
 
 def fill_gaps(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) -> NDArray[np.float32]:
