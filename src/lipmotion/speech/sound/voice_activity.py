@@ -29,7 +29,7 @@ SEPARATE_FRAMES = 50  # a longer pause separates passages
 SHORT_FRAMES, NEAR_FRAMES = 150, 150
 """A passage shorter than the first belongs to a neighbour nearer than the second: one word says little of a voice."""
 SOFT_FRAMES, SOFT_RANGE = 50, 15 * DECIBEL
-"""So many frames beside loud ones, whose level varies by more than the second, are a softer voice: breath varies less."""
+"""So many frames beside loud ones, whose level varies by more than this, are a softer voice: breath varies less."""
 LEVEL_STEP = 15 * DECIBEL  # voices with a dip between them are passages of their own where their levels differ by more
 PASSAGE_MARGIN = 75
 """Frames before and after the sound of a passage that belong to it, where they are not digital silence."""
