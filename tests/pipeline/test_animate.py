@@ -118,7 +118,7 @@ def test_constraints_and_units_that_are_none(move):
     for spans, message in (
         ((), "the units are an empty list"),
         ((Span(0, 1, "p"),), "a unit is 'p', required a Unit"),
-        ((Span(0.0, 0.5, Unit("AA")),), "unknown phone 'AA' at 0"),
+        ((Span(0.0, 0.5, Unit("qq")),), "unknown phone 'qq' in the units at 0"),
         *(
             ((Span(*times_s, Unit("p")),), "the units last from .* s, required times of this")
             for times_s in without_time

@@ -13,7 +13,7 @@ from lipmotion.errors import InputError, shorten
 from lipmotion.types import FRAME_RATE_HZ, CurveEdit, DrawnCurve, Gain, Hold, Pin, SlopedPin, Span, Timeline, Unit
 from lipmotion.types.delivery import Delivery, MoodKey, Staging, format_moods, parse_moods, sort_moods
 from lipmotion.types.values import describe_value, parse_number, parse_whole
-from lipmotion.units import PHONES, Pronunciation, describe_unknown_phone, is_silent, split_words
+from lipmotion.units import Pronunciation, is_silent, require_phone, split_words
 
 MIN_PHONE_S = 0.01  # shortest phone that an edit may leave
 
@@ -108,9 +108,7 @@ class PhoneStep(Step):
 
 def _read_unit(phone: str, word: str = "") -> Unit:
     """Return the label of a phone that a user gives. Raises InputError: there is no such phone."""
-    if phone not in PHONES:
-        raise InputError(describe_unknown_phone(phone))
-    return Unit(phone, word=word)
+    return Unit(require_phone(phone), word=word)
 
 
 @dataclass(frozen=True)

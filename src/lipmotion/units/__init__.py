@@ -1,6 +1,6 @@
 """Phones, visemes, unit sets, and words with their pronunciations. Data and look-ups, no audio."""
 
-from lipmotion.units.lexicon import Lexicon, Pronunciation, find_phone, reduce_vowels
+from lipmotion.units.lexicon import Lexicon, Pronunciation, find_phone, reduce_vowels, require_phone
 from lipmotion.units.phone_timelines import (
     RECOGNISED,
     RecognisedPhone,
@@ -34,5 +34,5 @@ __all__ = [
     "VISEMES", "VISEME_OF", "VOWELS", "Lexicon", "Pronunciation", "RecognisedPhone", "UnitSet", "check_phones",
     "check_text", "check_words", "close_gaps", "describe_unknown_phone", "find_phone", "find_similar_lips",
     "find_similar_phone", "find_words", "group_words", "is_silent", "list_phone_classes", "list_recognised_phones",
-    "load_unit_set", "mark_closing_phones", "reduce_vowels", "restore_confidences", "split_words",
+    "load_unit_set", "mark_closing_phones", "reduce_vowels", "require_phone", "restore_confidences", "split_words",
 ]  # fmt: skip

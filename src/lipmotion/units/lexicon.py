@@ -20,7 +20,7 @@ from lipmotion.errors import InputError, MissingDependencyError, shorten
 from lipmotion.storage.sources import read_text_file
 from lipmotion.types.languages import ENGLISH, LANGUAGES, find_script
 from lipmotion.units.ipa_phones import read_tokens
-from lipmotion.units.phones import OTHER_NAMES, PAUSE, PHONES, REDUCED_VOWELS, is_silent
+from lipmotion.units.phones import OTHER_NAMES, PAUSE, PHONES, REDUCED_VOWELS, describe_unknown_phone, is_silent
 from lipmotion.units.spelling import guess_pronunciation, normalise_text, read_table, remove_accents
 from lipmotion.units.written_forms import list_readings
 
@@ -80,6 +80,14 @@ def find_phone(label: str) -> str | None:
     name = re.sub(r"\d?(_[bies])?$", "", label.lower())
     name = REDUCED_VOWELS.get(name, name) if label[len(name) :].startswith("0") else OTHER_NAMES.get(name, name)
     return name if name in PHONES else None
+
+
+def require_phone(label: str, where: str = "") -> str:
+    """Return the phone that a label names, found ``where`` (with a blank before it). Raises InputError: it is none."""
+    phone = find_phone(label)
+    if phone is None:
+        raise InputError(describe_unknown_phone(label, where))
+    return phone
 
 
 @dataclass(frozen=True)

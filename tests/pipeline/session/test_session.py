@@ -400,7 +400,7 @@ def test_every_kind_of_edit_is_a_sentence():
         ("pin opening 1,2 at 1", "is no edit; required one of: pin CHANNEL VALUE at TIME; pin"),
         ("pin opening nan at 1", "is no edit"),
         ("gain 9 from 0 to 1", "the gain is 9, required 0 to 3"),
-        ("word 1 is tear said t eh R", "unknown phone 'R'"),
+        ("word 1 is tear said t eh rr", "unknown phone 'rr'"),
         ("word 1 is tear said t sil", "a word has no silence in it"),
         ("say hello from 2 to 1", "required an end after the start"),
         ("say zoe from 1 to 2 with zoe", "'zoe' has no phones; required WORD PHONES, WORD"),

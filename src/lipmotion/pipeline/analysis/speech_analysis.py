@@ -60,7 +60,7 @@ from lipmotion.types import (
 from lipmotion.types.audio import LAUGHTER
 from lipmotion.types.delivery import MoodTag
 from lipmotion.types.languages import ENGLISH
-from lipmotion.units import SILENCE, UNKNOWN_PHONES, check_phones, check_text, close_gaps, is_silent
+from lipmotion.units import SILENCE, UNKNOWN_PHONES, check_phones, check_text, close_gaps, is_silent, require_phone
 from lipmotion.units.spoken_text import parse_tagged_text
 from lipmotion.units.text_normalisation import require_tokens
 
@@ -432,7 +432,7 @@ def _complete_units(
     given = cast("Timeline[Unit]", request.units)  # of ``read_request``
     _check_units(given, audio.duration_s)
     spans, aligned, guessed = list[Span[Unit]](), list[str](), list[tuple[float, float]]()
-    for span in (span for span in given if span.start_s < audio.duration_s):
+    for span in (_name_phone(span) for span in given if span.start_s < audio.duration_s):
         end_s = min(span.end_s, audio.duration_s)
         if span.label.phone or span.label.unit != UNKNOWN_PHONES:
             spans.append(replace(span, end_s=end_s) if span.end_s > audio.duration_s + LATE_S else span)
@@ -452,6 +452,14 @@ def _complete_units(
     if guessed:
         LOG.warning("the units do not say which phones are said at %s: they are recognised", format_places(guessed))
     return spans, guessed
+
+
+def _name_phone(span: Span[Unit]) -> Span[Unit]:
+    """Return a given unit with the phone by our name. Raises InputError: there is no such phone."""
+    if not span.label.phone:
+        return span
+    phone = require_phone(span.label.phone, f" in the units at {span.start_s:.2f} s")
+    return replace(span, label=replace(span.label, phone=phone))
 
 
 def _fill_open(
