@@ -37,6 +37,7 @@ TIME_COLUMN = re.compile(
     rf"(?:(?:time(?:stamp|code)?|t)(?:s|secs?|seconds?|{'|'.join(PER_SECOND)})?|seconds?|milliseconds)"
 )
 """Names of columns of times, without blanks, brackets and underscores."""
+LATEST_START_S = 60.0  # rows that begin later are cut from a longer take, or have the time of day
 BACKWARDS_S = 0.5
 """A row whose time is earlier than that of the row before by less than this is left out; more is an error."""
 LEFT_OUT_SHARE, LEFT_OUT = 0.1, 3  # so many rows may be left out: a share of all, or a few
@@ -123,9 +124,10 @@ def convert_times(times: Array, key: str) -> Array:
 def resample_rows(
     names: Sequence[str], time_s: Array, values: Array, unit: str = WEIGHT
 ) -> tuple[Motion, NDArray[np.bool_]]:
-    """Return curves at a steady rate from the first time on, and in which frames they were measured.
+    """Return curves at a steady rate, and in which frames they were measured.
 
-    time_s : of the rows, in seconds [shape=(N,)];  values : NaN where there is no face [shape=(N, P)]
+    time_s : of the rows, in seconds [shape=(N,)]; a later start than ``LATEST_START_S`` is that of the motion
+    values : NaN where there is no face [shape=(N, P)]
     unit   : of curves that are neither blendshapes nor angles
     Before the first face and after the last one weights are 0 and other curves still; between faces is a straight line.
     Rows that are not later than all before are left out, frames that were lost and uneven times evened out
@@ -133,7 +135,7 @@ def resample_rows(
     Raises InputError: a row goes far back, too many are left out, no rows, or most of the time has none.
     """
     ordered = _find_ordered(time_s)
-    time_s, values = time_s[ordered], values[ordered]
+    time_s, values = _from_beginning(time_s[ordered], values[ordered])
     measured: NDArray[np.bool_] = np.asarray(np.isfinite(values).any(axis=0))
     if not measured.any():
         raise InputError("0 rows with values, required two or more")
@@ -143,6 +145,10 @@ def resample_rows(
     names = [name for name, there in zip(names, measured, strict=True) if there]
     values = values[:, measured]
     channels = [_channel(name, unit) for name in names]
+    angles = [column for column, channel in enumerate(channels) if channel.unit == RADIAN]
+    if angles and (largest := float(np.nanmax(np.abs(values[:, angles])))) > 2 * np.pi:
+        LOG.warning("angles go up to %g: they are read as degrees", largest)
+        values[:, angles] = np.deg2rad(values[:, angles])
     columns = choose_columns([channel.name for channel in channels], values)
     values, channels = values[:, columns], [channels[column] for column in columns]
     seen: NDArray[np.bool_] = np.asarray(np.isfinite(values).all(axis=1))
@@ -160,6 +166,15 @@ def resample_rows(
         values[np.ix_((np.arange(len(seen)) < first) | (np.arange(len(seen)) > last), weights)] = 0.0
     rows, rate_hz = resample_evenly(time_s, np.concatenate([values, seen[:, None]], axis=1))
     return Motion(rows[:, :-1], rate_hz, tuple(channels)), rows[:, -1] > 0.5
+
+
+def _from_beginning(time_s: Array, values: Array) -> tuple[Array, Array]:
+    """Return times and rows with empty rows before those that begin late, as where pictures without a face have none."""
+    steps = np.diff(time_s)
+    step_s = float(steps[steps < 1.5 * np.median(steps)].mean()) if len(steps) else np.inf
+    count = round(time_s[0] / step_s) if step_s < time_s[0] <= LATEST_START_S else 0
+    before_s = time_s[0] - step_s * np.arange(count, 0, -1)
+    return np.concatenate([before_s, time_s]), np.pad(values, ((count, 0), (0, 0)), constant_values=np.nan)
 
 
 def _name_spans(spans: Sequence[tuple[float, float]]) -> str:

@@ -161,6 +161,7 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
         coded = bool(re.search("[:;]", times[0][1]))
         if coded:
             time_s = _read_timecodes([_parse_timecode(text, line) for line, text in times])
+            time_s = time_s - time_s[0]  # timecode counts from anywhere
         else:
             written = np.array([parse_numbers([text], line)[0] for line, text in times])
             time_s = steady_rate.convert_times(written, keys[timed])
