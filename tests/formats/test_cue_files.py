@@ -297,6 +297,11 @@ def test_cues_of_tables_and_events_of_visemes(write: Any, name: str) -> None:
     assert motion.time_s[-1] == pytest.approx(2.0)
 
 
+def test_the_mouth_rests_where_a_cue_ends_before_the_next(write: Any) -> None:
+    sheet = read_cues(write("start,end,value\n0,0.5,D\n0.9,1.2,A\n1.21,2,D\n", "a.csv"))
+    assert [(cue.start_s, cue.label) for cue in sheet.cues] == [(0, "D"), (0.5, "X"), (0.9, "A"), (1.21, "D")]
+
+
 def test_a_table_of_motion_is_none_of_cues(write: Any) -> None:
     motion, _ = read_motion(write("time_s,opening\n0.00,0.5\n0.01,0.6\n0.02,0.7\n", "a.csv"))
     assert motion.names == ("opening",)

@@ -84,6 +84,8 @@ def test_some_words_have_no_time_some_share_one_and_an_end_just_before_its_start
 def test_captions_that_scroll_say_each_line_once(read: Read) -> None:
     without_times = SCROLLING.replace("<c>", "").replace("</c>", "").replace("<00:00:", "<").replace("<0", "<i 0")
     assert read(without_times).words == ("let", "us", "look", "look", "again")
+    rolling = "00:00:01,000 --> 00:00:01,990\nhi\n\n00:00:01,990 --> 00:00:02,000\nhi\n\n00:00:02,000 --> 00:00:03,000\nhi\nyou\n\n"
+    assert read(rolling).words == ("hi", "you")
     twice = "00:00:01,000 --> 00:00:02,000\nno\n\n00:00:02,000 --> 00:00:03,000\nno\nno\n\n"
     assert read(twice).words == ("no", "no", "no")
 
@@ -131,15 +133,22 @@ def test_other_encodings(read: Read, caplog: pytest.LogCaptureFixture) -> None:
 
 
 def test_plain_text_stays_as_it_is(write: Any, tmp_path: Path) -> None:
-    for text in ("Hello, [you] (all)\n", "The 5:30 - 6:00 train", "5:30 - 6:00", "a -> b", "3 - 4 -> 5"):
+    for text in (
+        "<speak>Hello</speak>",
+        "Hello, [you] (all)\n",
+        "The 5:30 - 6:00 train",
+        "5:30 - 6:00",
+        "a -> b",
+        "3 - 4 -> 5",
+    ):
         assert read_transcript(write(text, "a.txt")) == text
     with pytest.raises(InputError, match=r"b\.txt: no such transcript file"):
         read_transcript(tmp_path / "b.txt")
 
 
-@pytest.mark.parametrize("name", ["take.srt", "take.en.vtt", "take.mp4.srt", "take.json", "take.ctm", "take.ass"])
+@pytest.mark.parametrize("name", ["take.srt", "take.en.vtt", "take.mp4.srt", "take.json", "take.ctm", "take.SRT"])
 def test_they_are_found_beside_recordings(tmp_path: Path, name: str) -> None:
-    other = {"ctm": LABEL_CASES["CTM: words"]["content"], "json": LABEL_CASES["Whisper"]["content"], "ass": ASS}
+    other = {"ctm": LABEL_CASES["CTM: words"]["content"], "json": LABEL_CASES["Whisper"]["content"]}
     (tmp_path / name).write_text(other.get(name.rpartition(".")[2], SRT))
     found = find_labels(tmp_path / "take.mp4")
     assert found.words == ("hello", "there", "how", "are", "you")

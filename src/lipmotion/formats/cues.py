@@ -62,6 +62,8 @@ STARTS, NAMES = ("start", "time", "timestamp", "offset", "t"), ("value", "viseme
 """Names of lists, and of the start and the shape of an item; the first that is there counts."""
 HEADER = re.compile(r"\W*(?:time|start|begin|seconds)\b[^\n]*", re.IGNORECASE)
 LONGEST_LINE = 200
+MIN_GAP_S, MIN_GAP = 0.02, 0.05
+"""Between cues that are further apart, in seconds and as a share of the first one, the mouth is at rest."""
 
 
 def format_tsv(sheet: CueSheet, _sound_file: str) -> str:
@@ -112,9 +114,19 @@ def parse_xml(text: str) -> CueSheet:
 
 
 def _build_sheet(cues: Sequence[tuple[str, str, str, str]], chart: dict[str, str]) -> CueSheet:
-    """Return cues of place, start, end and shape."""
-    rows = [(parse_cue_time(start, place), parse_shape(shape, chart, place)) for place, start, _, shape in cues]
-    return build_cue_sheet(rows, parse_cue_time(cues[-1][2], cues[-1][0]) if cues else 0.0, CUES_FPS)
+    """Return cues of place, start, end and shape; the mouth is at rest between the end of one and the next.
+
+    An end that is the start is not known: that cue lasts to the next one.
+    """
+    rows, end_s, lasts_s = list[tuple[float, str]](), 0.0, 0.0
+    for place, start, end, shape in cues:
+        start_s = parse_cue_time(start, place)
+        if lasts_s > 0 and rows[-1][1] != REST and start_s - end_s > MIN_GAP_S + MIN_GAP * lasts_s:
+            rows.append((end_s, REST))
+        rows.append((start_s, parse_shape(shape, chart, place)))
+        end_s = parse_cue_time(end, place)
+        lasts_s = end_s - start_s
+    return build_cue_sheet(rows, end_s, CUES_FPS)
 
 
 def format_json(sheet: CueSheet, sound_file: str) -> str:

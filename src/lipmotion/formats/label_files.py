@@ -52,7 +52,8 @@ LARGEST_LABELS = 1 << 24  # most bytes of a label file: labels of a day
 MOTION = re.compile(r'"lipmotion\.motion"|time_s,')  # how our own motion files begin: a quick answer for large ones
 MASTER = re.compile(r'^(?:#!MLF!#|\.)[ \t\r]*\n"(.*)"[ \t\r]*$', re.MULTILINE)
 """The line before each recording's labels in HTK's master label files, and that with its name."""
-MARKUP = re.compile(r'\{\\rtf|<[!?a-zA-Z]|\{\s*"|\[\s*[\[{]')  # the start of RTF, HTML, XML and JSON
+MARKUP = re.compile(r'\{\\rtf|<(?:[!?]|(?:html|head|body|div|table|tt|svg)\b)|\{\s*"|\[\s*[\[{]', re.IGNORECASE)
+"""The start of RTF, HTML, XML and JSON; tags of SSML and of game engines may stand in a text."""
 CHAPTER = ".trans.txt"
 """Ends the name of the transcripts of a chapter in LibriSpeech: in each line the name of a recording, and its words."""
 METADATA = "metadata.csv"
@@ -119,7 +120,9 @@ def find_label_files(recording: Path) -> list[Path]:
         names.append(recording.with_suffix(suffix))
         if suffix in RECOGNISED:
             names += [recording.with_suffix(f".en{suffix}"), recording.with_name(recording.name + suffix)]
-    return [path for path in names if path.is_file()]
+    shouted = (path.with_suffix(path.suffix.upper()) for path in names)
+    either = (path if path.is_file() else other for path, other in zip(names, shouted, strict=True))
+    return [path for path in either if path.is_file()]
 
 
 def find_tables(recording: Path) -> list[Path]:

@@ -169,7 +169,7 @@ def resample_rows(
 
 
 def _from_beginning(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """Return times and rows with empty rows before those that begin late, as where pictures without a face have none."""
+    """Return times and rows with empty rows before those that begin late, as where pictures have no face."""
     steps = np.diff(time_s)
     step_s = float(steps[steps < 1.5 * np.median(steps)].mean()) if len(steps) else np.inf
     count = round(time_s[0] / step_s) if step_s < time_s[0] <= LATEST_START_S else 0

@@ -169,7 +169,7 @@ def _drop_repetitions(cues: list[TimedLabel]) -> list[TimedLabel]:
         cue.end_s - cue.start_s < BRIDGE_S and shown[-len(lines) :] == lines
         for cue, lines, shown in zip(cues[1:], plain[1:], plain, strict=False)
     )
-    if bridges < BRIDGES_SHARE * len(cues) or bridges < 2:
+    if bridges < max(BRIDGES_SHARE * len(cues), 1):
         return cues
     shortened_cues = cues[:1]
     for before, cue, shown, lines in zip(cues, cues[1:], plain, plain[1:], strict=False):
