@@ -207,13 +207,7 @@ def find_factorial_path(
 
 @compiled
 def _take_best_entering(last: Array, leaving: Array, score: Array, decision: Array) -> None:
-    """Replace the log scores of first states by those of the best transition from a last state, where that is greater,
-    and their decisions by the unit that is left.
-
-    last     : log scores of the last states [shape=(U, M)]
-    leaving  : log probabilities of the transitions from them to the first states [shape=(U, U)]
-    score, decision : of the first states [shapes=(U, M)]
-    """
+    """Replace scores and decisions of first states [shapes=(U, M)] where leaving a last state [(U, M)] is better."""
     for i in range(len(score)):
         best, unit = score[i], decision[i]
         for u in range(len(last)):

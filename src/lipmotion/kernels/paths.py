@@ -166,11 +166,7 @@ class _Block:
 
 
 def _scores(network: NetworkArrays, first: Scores, log_emission: Scores, is_compiled: bool) -> tuple[Scores, float]:
-    """Return the scores of the best path to every state, relative to each frame's best, and the sum of these best.
-
-    first        : the scores in the first frame [shape=(S,)]
-    log_emission : [shape=(T, G)]
-    """
+    """Return the scores of the best path to every state, relative to each frame's best, and the sum of these best."""
     emission, arc_from, arc_log, arc_start, _, _ = network
     delta = np.empty((len(log_emission), len(emission)), np.float32)
     delta[0] = first

@@ -15,13 +15,6 @@ TAPS = 3  # time steps that each unit sees of the layer below: one before, the s
 BLOCK = 4096  # time steps computed at a time, so that the memory does not grow with the sequence
 
 
-class _Pass(NamedTuple):
-    """What the backward pass needs of one layer: its stacked inputs, and its derivative times the dropout mask."""
-
-    stacked: Array
-    slope: Array
-
-
 @final
 @dataclass(frozen=True, eq=False)
 class ConvolutionalNetwork(SequenceNetwork):
@@ -58,8 +51,8 @@ class ConvolutionalNetwork(SequenceNetwork):
         inputs: Array,
         inside: NDArray[np.bool_],  # noqa: ARG002 - beyond the end there are zeros
         dropout: Dropout | None,
-    ) -> tuple[Array, list[_Pass]]:
-        states, passes = inputs, []
+    ) -> tuple[Array, list[tuple[Array, Array]]]:
+        states, passes = inputs, []  # of each layer: its stacked inputs, and its derivative times the dropout
         for number, (layer, dilation) in enumerate(zip(self.layers, self.dilations, strict=True)):
             stacked = _stack(states, dilation)
             result = stacked @ layer.weights
@@ -67,19 +60,19 @@ class ConvolutionalNetwork(SequenceNetwork):
             if dropout is None:
                 np.maximum(result, 0, out=result)
             else:
-                slope = (result > 0) & dropout.mask(result.shape)
-                passes.append(_Pass(stacked, slope * dropout.gain))
-                result *= passes[-1].slope
+                slope = (result > 0) * dropout.draw(result.shape)
+                passes.append((stacked, slope))
+                result *= slope
             states = result if number == 0 else states + result
         return states, passes
 
     def backward(self, slope: Array, passed: Any) -> list[Array]:  # noqa: D102
         gradients: list[Array] = []  # from the last to the first
         rows = slope.shape[0] * slope.shape[1]
-        for number in reversed(range(len(self.layers))):
-            inner: Array = slope * passed[number].slope
+        for number, (stacked, layer_slope) in reversed([*enumerate(passed)]):
+            inner: Array = slope * layer_slope
             spread: Array = inner.reshape(rows, -1)
-            gradients += [spread.sum(axis=0), passed[number].stacked.reshape(rows, -1).T @ spread]
+            gradients += [spread.sum(axis=0), stacked.reshape(rows, -1).T @ spread]
             if number:
                 parts = (inner @ self.layers[number].weights.T).reshape(*slope.shape[:2], TAPS, -1)
                 dilation, by_states = self.dilations[number], parts[:, :, 1].copy()  # the derivative of ``_stack``
@@ -186,7 +179,7 @@ class RecurrentNetwork(SequenceNetwork):
             forth, back = passed.outputs[0], passed.outputs[1, ::-1]
             states = np.ascontiguousarray(np.concatenate([forth, back], axis=2).transpose(1, 0, 2))
             if dropout is not None:
-                dropped = dropout.mask(states.shape) * dropout.gain
+                dropped = dropout.draw(states.shape)
                 states = states * dropped
                 passes.append(passed._replace(dropped=dropped))
         return states, passes

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, explain_by_trace
 from lipmotion.engines.coupled.arrays import coupled_from_arrays, coupled_to_arrays
-from lipmotion.engines.coupled.chains.densities import Single, infer_components
+from lipmotion.engines.coupled.chains.densities import infer_components
 from lipmotion.engines.coupled.chains.lattice import Lattice, LatticePosteriors
 from lipmotion.engines.coupled.chains.model import Chains, Inference, VisualStream, speech_observations
 from lipmotion.engines.coupled.chains.product import Product
@@ -67,12 +67,14 @@ def explain_frames(
 
 def list_chain_states(chains: Chains, posteriors: LatticePosteriors, row: int) -> tuple[ChainStates, ...]:
     """Return the most probable states of each chain in a frame, and the probabilities of its asynchrony."""
-    structure, found = chains.structure, []
-    for number, lead in enumerate(sum_lead_posteriors(chains, posteriors)):
-        names = [structure.state_name(number, state) for state in range(structure.state_counts[number])]
-        ranked = _rank_by_probability(names, posteriors.chains[number][row])
-        ahead = dict(zip(list_leads(chains, number), lead[row].tolist(), strict=True))
-        found.append(ChainStates(structure.chains[number].name, ranked, ahead))
+    found = []
+    for number, units in enumerate(infer_units(chains, posteriors, slice(None))):
+        probability = posteriors.chains[number][row]
+        best = np.argsort(-probability, kind="stable")[:MAX_STATES].tolist()
+        named = [NamedProbability(chains.structure.state_name(number, i), float(probability[i])) for i in best]
+        ranked = (named[0], *(state for state in named[1:] if state.probability >= MIN_PROBABILITY))
+        ahead = dict(zip(units.leads, units.lead[row].tolist(), strict=True))
+        found.append(ChainStates(units.name, ranked, ahead))
     return tuple(found)
 
 
@@ -85,39 +87,18 @@ def find_joint_state(chains: Chains, posteriors: LatticePosteriors, row: int) ->
     return NamedProbability(name, float(posteriors.joint.probability[row, best]))
 
 
-def list_leads(chains: Chains, chain: int) -> tuple[int, ...]:
-    """Return by how many states a chain may be ahead of the first; empty: it is the first, or there is no limit."""
-    limit = chains.structure.limit
-    return () if limit is None or chain == 0 else tuple(range(-limit, limit + 1))
-
-
-def sum_lead_posteriors(chains: Chains, posteriors: LatticePosteriors) -> list[Single]:
-    """Return, for each chain, the posteriors of its ``list_leads`` [each shape=(T, len(leads))]."""
-    product, result = chains.transitions.product, []
-    for chain in range(len(chains.structure.chains)):
-        ahead = np.array(list_leads(chains, chain), np.intp)
-        lead = np.zeros((len(posteriors.most_probable), len(ahead)), np.float32)
-        if isinstance(product, Product) and posteriors.joint is not None:
-            leads = product.lead[chain][posteriors.joint.states]
-            lead = posteriors.joint.probability @ (leads[:, None] == ahead).astype(np.float32)
-        result.append(lead)
-    return result
-
-
 def infer_units(chains: Chains, posteriors: LatticePosteriors, frames: slice) -> list[ChainPosteriors]:
-    """Return the posteriors of the units of each chain in some frames."""
-    structure, found = chains.structure, []
-    for number, lead in enumerate(sum_lead_posteriors(chains, posteriors)):
-        name, units = structure.chains[number].name, structure.units[number]
-        probability = posteriors.chains[number][frames].reshape(-1, len(units), structure.states).sum(axis=2)
-        found.append(ChainPosteriors(name, units, probability, list_leads(chains, number), lead[frames]))
+    """Return the posteriors of the units of each chain, and of its leads over the first chain, in some frames."""
+    structure, product, joint, found = chains.structure, chains.transitions.product, posteriors.joint, []
+    for chain, units in enumerate(structure.units):
+        probability = posteriors.chains[chain][frames].reshape(-1, len(units), structure.states).sum(axis=2)
+        leads = () if structure.limit is None or chain == 0 else range(-structure.limit, structure.limit + 1)
+        lead = np.zeros((len(probability), len(leads)), np.float32)
+        if isinstance(product, Product) and joint is not None:
+            ahead = product.lead[chain][joint.states, None] == np.array(leads, np.intp)
+            lead = (joint.probability @ ahead.astype(np.float32))[frames]
+        found.append(ChainPosteriors(structure.chains[chain].name, units, probability, tuple(leads), lead))
     return found
-
-
-def _rank_by_probability(names: Sequence[str], probability: NDArray[np.floating]) -> tuple[NamedProbability, ...]:
-    best = np.argsort(-probability, kind="stable")[:MAX_STATES]
-    named = [NamedProbability(names[i], float(probability[i])) for i in best]
-    return (named[0], *(state for state in named[1:] if state.probability >= MIN_PROBABILITY))
 
 
 def _find_dominant_gaussian(model: CoupledModel, inference: Inference, row: int, stream: int) -> DominantGaussian:

@@ -10,9 +10,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.engines.base import read_presets
 from lipmotion.engines.coupled.chains.densities import Single
 from lipmotion.engines.coupled.chains.model import EIGENLIPS, Chains, Inference, VisualStream
-from lipmotion.engines.coupled.chains.product import PRESETS, STRUCTURES, UNSEEN_LOSS, Structure, list_unit_sets
+from lipmotion.engines.coupled.chains.product import STRUCTURES, UNSEEN_LOSS, Structure, list_unit_sets
 from lipmotion.engines.coupled.conversion import (
     EXACT,
     SOFT,
@@ -94,8 +95,8 @@ class CoupledConfig(Configuration):
     unseen_loss: float = option(UNSEEN_LOSS, Rule(least=0), omit_default=True)
     moves_together: bool = option(default=False, omit_default=True)
 
-    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
-    preset_visual: ClassVar[Mapping[str, str]] = dict.fromkeys(PRESETS, EIGENLIPS)
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = read_presets("coupled")
+    preset_visual: ClassVar[Mapping[str, str]] = dict.fromkeys(presets, EIGENLIPS)
     aliases: ClassVar[Mapping[str, str]] = {
         "crosses": "cross_units",
         "more_mixtures": "speech_only_mixtures",
@@ -165,19 +166,14 @@ class CoupledModel:
         return f"CoupledModel({', '.join(self.chains.streams)}; {size})"
 
     @cached_property
-    def limits(self) -> MotionLimits:
-        """The limits of generated motion: those of the poses and of the rest pose, widened by a standard deviation."""
+    def motion(self) -> LearnedMotion:
+        """What turns means and precisions into motion; limits are those of all poses, and a standard deviation more."""
         poses, deviation = self.pose_limits, np.zeros(self.space.dimensions)
         for stream in self.visual:
             deviation[stream.columns] = stream.deviation[: len(stream.columns)]
         low, high = np.minimum(poses.low, self.rest_pose), np.maximum(poses.high, self.rest_pose)
-        return MotionLimits(low, high).extend(deviation)
-
-    @cached_property
-    def motion(self) -> LearnedMotion:
-        """What turns means and precisions into motion: space, closure, limits, variance scaling."""
         scaling = VarianceScaling(self.scaling, self.rest_pose)
-        return LearnedMotion(self.space, self.closure, self.limits, scaling, self.prior)
+        return LearnedMotion(self.space, self.closure, MotionLimits(low, high).extend(deviation), scaling, self.prior)
 
     @property
     def pose_limits(self) -> MotionLimits:

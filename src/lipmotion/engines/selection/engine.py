@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
 from lipmotion.engines.selection.concatenation import Piece, TimeMap, join_motion, list_shown_units, to_pieces
-from lipmotion.engines.selection.costs import JOIN_AFTER, JOIN_BEFORE, Costs, SelectionConfig, Target, select
+from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target, select
 from lipmotion.engines.selection.inventory import PHONE_NUMBER, SOURCE, RecordedUnits, find_source, list_windows
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
 from lipmotion.engines.selection.selection_training import build_target, fit_selection
@@ -54,18 +54,16 @@ def with_sources(units: Timeline[Unit], starts_s: Array, sources: Sequence[str])
 
 def _source_piece(inventory: RecordedUnits, target: Target, piece: Piece, following: Piece | None) -> SourcePiece:
     """Return a piece in the time of its recording, from the middle of one join to the middle of the next."""
-    clock = TimeMap.of(inventory, target, piece, following)
+    clock = TimeMap.of(inventory, target, piece)
     recorded, shift = inventory.windows.times_s, piece.unit - piece.first
-    first = piece.first - (piece.join == JOIN_BEFORE)
-    stop = piece.stop + (following is not None and following.join == JOIN_AFTER)
-    begin_s, end_s = recorded[first + shift, 0], recorded[stop - 1 + shift, 1]
+    begin_s, end_s = recorded[piece.used.start + shift, 0], recorded[piece.used.stop - 1 + shift, 1]
     if piece.first:
         begin_s = float(clock(np.array([piece.start_s]))[0])
     if following is not None:
         end_s = float(clock(np.array([following.start_s]))[0])
     starts = {
         number: float(recorded[number + shift, 0])
-        for number in range(first, stop)
+        for number in piece.used
         if begin_s - ROUNDING_S <= recorded[number + shift, 0] < end_s - ROUNDING_S
     }
     name = inventory.names[inventory.windows.recording[piece.unit]]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
-from lipmotion.units import PHONES, SILENCE, close_gaps, describe_unknown_phone, find_similar_lips, is_silent
+from lipmotion.units import PHONES, SILENCE, close_gaps, describe_unknown_phone, is_silent
 from lipmotion.units.phones import VISEME_OF, VISEMES
 from lipmotion.units.stress import NUCLEI, find_stress
 
@@ -334,12 +334,6 @@ def digits(bias: int, window: int) -> list[int]:
     left, right = list(range(middle - 1, -1, -1)), list(range(middle + 1, window))
     sides = (left + right, right + left, [column for pair in zip(left, right, strict=True) for column in pair])
     return [middle, *sides[bias]]
-
-
-def find_substitutes(windows: PhoneWindows, usable: NDArray[np.bool_]) -> dict[str, str]:
-    """Return for every phone that no usable unit has the phone that stands in for it."""
-    known = {PHONES[number] for number in np.unique(windows.phones[usable])}
-    return {phone: find_similar_lips(phone, known) for phone in PHONES if phone not in known} if known else {}
 
 
 def _keys(columns: NDArray[np.intp]) -> NDArray[np.int64]:

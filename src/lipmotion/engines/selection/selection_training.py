@@ -48,7 +48,8 @@ def build_target(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
         units = Timeline(tuple(Span(a, b, Unit(SILENCE)) for a, b in pairwise(edges)))
     windows = list_windows([units]) if by_sound else costs.shown(list_windows([units]))
     predicted = interpolate_at(motion, windows.times_s)
-    return costs.target(windows, guide.expanded(predicted), predicted, by_sound=by_sound)
+    guided = guide.centre + (predicted - guide.centre) * guide.expansion  # as wide as recorded motion
+    return costs.target(windows, guided, predicted, by_sound=by_sound)
 
 
 Array = NDArray[np.float64]

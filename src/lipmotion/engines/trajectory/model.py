@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -133,11 +133,13 @@ class AcousticRegression:
 class Emission:
     """Densities of static value, Δ and Δ² (Q dimensions each) of all tied states.
 
+    layout     : the states of phones and silences
     forest     : a decision tree for every state of speech and of silence (``StateLayout.names``)
     means, variances : float32 arrays [shape=(L, 3, Q)], leaf by leaf, tree by tree; the last row is the rest pose
     regression : regression of the means on acoustic features (None: the means are constant)
     """
 
+    layout: StateLayout
     forest: Mapping[str, Tree]
     means: NDArray[np.float32]
     variances: NDArray[np.float32]
@@ -152,18 +154,23 @@ class Emission:
     def _names(self) -> dict[tuple[str, int], str]:
         return {}
 
-    def row(self, state: FullContextState, layout: StateLayout) -> int:
+    def row(self, state: FullContextState) -> int:
         """Return the number of the density of a full-context state: its row in ``means``."""
-        if state == layout.rest:
+        if state == self.layout.rest:
             return len(self.means) - 1
-        name = layout.name(state)
+        name = self.layout.name(state)
         return self._first_rows[name] + self.forest[name].rank(state.context)
 
-    def source(self, state: FullContextState, layout: StateLayout) -> str:
+    def rows(self, states: Sequence[FullContextState]) -> NDArray[np.intp]:
+        """Return the number of the density of each state [shape=(len(states),)]."""
+        distinct = {state: self.row(state) for state in dict.fromkeys(states)}
+        return np.array([distinct[state] for state in states], np.intp)
+
+    def source(self, state: FullContextState) -> str:
         """Return the origin of the density of a state, in words: its tree, its leaf, and the frames of the leaf."""
-        if state == layout.rest:
+        if state == self.layout.rest:
             return "rest"
-        name = layout.name(state)
+        name = self.layout.name(state)
         tree = self.forest[name]
         rank = tree.rank(state.context)
         if (name, rank) not in self._names:
@@ -172,22 +179,17 @@ class Emission:
         left, unit, right = state.context
         return f"{left}-{unit}+{right} {name}: {self._names[name, rank]}"
 
-    def statistics(self, rows: NDArray[np.intp], features: NDArray[np.float32], frames: slice) -> tuple[Array, Array]:
-        """Return means and precisions [each shape=(N, 3, Q)] of N successive frames of densities [shape=(N,)]."""
+    def statistics(
+        self, rows: NDArray[np.intp], features: NDArray[np.float32], frames: slice | NDArray[np.intp]
+    ) -> tuple[Array, Array]:
+        """Return means and precisions [each shape=(N, 3, Q)] of N of the frames, of densities [shape=(N,)]."""
         means, precisions = self.means[rows].astype(float), 1 / self.variances[rows].astype(float)
         if self.regression is not None:
-            add_acoustic_regression(means, self.regression, rows, self.regression.context(features, frames))
+            z, used = self.regression.context(features, frames), self.regression.rows[rows]
+            for row in np.unique(used[used >= 0]):
+                places = np.nonzero(used == row)[0]
+                means[places] += (z[places] @ self.regression.coefficients[row]).reshape(len(places), *means.shape[1:])
         return means, precisions
-
-
-def add_acoustic_regression(
-    means: Array, regression: AcousticRegression, rows: NDArray[np.intp], z: NDArray[np.float32]
-) -> None:
-    """Add the regressions on reduced features [shape=(N, F)] to constant means [shape=(N, 3, Q)], in place."""
-    used = regression.rows[rows]
-    for row in np.unique(used[used >= 0]):
-        frames = np.nonzero(used == row)[0]
-        means[frames] += (z[frames] @ regression.coefficients[row]).reshape(len(frames), *means.shape[1:])
 
 
 def emission_from_arrays(arrays: Arrays, layout: StateLayout, dimensions: int) -> Emission:
@@ -212,7 +214,7 @@ def emission_from_arrays(arrays: Arrays, layout: StateLayout, dimensions: int) -
         if rows.max() >= stored.sizes["C"]:
             raise ValueError(f"a density that uses regression {rows.max()} of {stored.sizes['C']}")
         regression = AcousticRegression(acoustic_context_from_arrays(stored), stored["coefficients"], rows)
-    return Emission(forest, densities["means"], densities["variances"], regression)
+    return Emission(layout, forest, densities["means"], densities["variances"], regression)
 
 
 DENSITIES = {"means": ArraySpec(np.float32, "L 3 Q"), "variances": ArraySpec(np.float32, "L 3 Q", POSITIVE)}
@@ -321,19 +323,14 @@ class TrajectoryModel:
         return f"TrajectoryModel({self.units.name} units, {states}, {self.space.dimensions} dimensions)"
 
     @cached_property
-    def limits(self) -> MotionLimits:
-        """Limits of plausible motion."""
-        return self.poses.extend(np.sqrt(self.emission.variances[:, 0].max(axis=0)))
-
-    @cached_property
     def motion(self) -> LearnedMotion:
         """Motion space, closure, limits and variance scaling, which turn predicted means into motion."""
         scaling = VarianceScaling(self.variance_factors, self.emission.means[-1, 0])
-        prior = self.prior
+        limits, prior = self.poses.extend(np.sqrt(self.emission.variances[:, 0].max(axis=0))), self.prior
         if prior is not None and self.network is not None:
             weaker = replace(prior, weight=TABLE_WEIGHT_WITH_PREDICTOR, known_voice_share=KNOWN_VOICE_SHARE)
             prior = None if self.network.uses_articulation else weaker
-        return LearnedMotion(self.space, self.closure, self.limits, scaling, prior, self.modulation)
+        return LearnedMotion(self.space, self.closure, limits, scaling, prior, self.modulation)
 
     @property
     def poses(self) -> MotionLimits:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -30,13 +30,10 @@ class StreamWeights:
     f0_curvature: float = 1.0
     motion: float = 1.0
 
-    def __iter__(self) -> Iterator[tuple[str, float]]:
-        return ((field.name, getattr(self, field.name)) for field in fields(self))
-
     @property
     def active(self) -> dict[str, float]:
         """The streams whose weight is not 0, and their weights."""
-        return {name: weight for name, weight in self if weight}
+        return {name: weight for name, weight in vars(self).items() if weight}
 
 
 @dataclass(frozen=True, eq=False)

@@ -258,10 +258,13 @@ def grow_joint(
     yield hmm
     for name, count, of_stream in zip((SPEECH, MOTION), splits, mixed, strict=True):
         for part in _split_monitor(of_stream, [1] * count) if name in hmm.models else ():
-            split = _split(hmm, prepared, name, part, work)
-            if split is None:
+            model, statistics = hmm.models[name], accumulate_statistics(hmm, prepared, work).densities[name]
+            if not (statistics.moments[:, :, 0] >= SPLIT_FRAMES).any():
                 break
-            hmm = split
+            halves = model.tied.split(statistics)
+            hmm = replace(hmm, models={**hmm.models, name: replace(model, tied=halves)})
+            stage = f"{halves.mixtures.size[1]} Gaussians for {name}"
+            hmm = _run_em(hmm, prepared, stage, config.iterations, part, work)
             yield hmm
     last(Progress("lengths of states", 1, 1, 1.0))
 
@@ -351,15 +354,3 @@ def _tie_states(
         models[name] = StreamModel(model.scale, forest, untrained.reestimate(of_leaves, config.variance_floor))
         monitor(Progress("trees", step, len(hmm.models), step / len(hmm.models), float(forest.size)))
     return replace(hmm, models=models)
-
-
-def _split(
-    hmm: JointHmm, prepared: PreparedUtterances, name: str, monitor: Monitor, work: Checkpoint
-) -> JointHmm | None:
-    """Return the models with a stream's Gaussians split, and trained; None: too little data."""
-    model, statistics = hmm.models[name], accumulate_statistics(hmm, prepared, work).densities[name]
-    if not (statistics.moments[:, :, 0] >= SPLIT_FRAMES).any():
-        return None
-    tied = model.tied.split(statistics)
-    new = replace(hmm, models={**hmm.models, name: replace(model, tied=tied)})
-    return _run_em(new, prepared, f"{tied.mixtures.size[1]} Gaussians for {name}", hmm.config.iterations, monitor, work)

@@ -1,7 +1,4 @@
-"""Structures of chains, and their product: joint states that chains reach together, arcs between them, probabilities.
-
-The six systems of Xie & Liu 2007 are structures by name.
-"""
+"""Structures of chains, and their product: the joint states that chains reach, arcs between them, probabilities."""
 
 from __future__ import annotations
 
@@ -21,34 +18,6 @@ from lipmotion.units import PHONES, UnitSet, load_unit_set
 HMM, MULTISTREAM, FACTORIAL, COUPLED = "hmm", "multistream", "factorial", "coupled"
 STRUCTURES = (HMM, MULTISTREAM, FACTORIAL, COUPLED)
 UNSEEN_LOSS = 10.0  # chosen on the validation list (docs/results/xieliu2007.md)
-
-AS_PRINTED: dict[str, Any] = {
-    "states": 5,
-    "mixtures": 1,
-    "conversion": "em",
-    "start": "viterbi",
-    "steps": 5,
-    "variance_scaling": False,
-    "closures": False,
-    "articulation": False,
-}
-"""What the paper's systems have in common: five states a unit, lips converted frame by frame, by EM that starts from
-the best path, and nothing done to them afterwards (§4.1, §7.1). Ours, as the print gives no number: one Gaussian a
-state, five steps of EM ("a very few").
-"""
-FREE: dict[str, Any] = {"asynchrony": -1, "unseen_loss": 0.0, "start_asynchrony": 4}
-"""Factorial chains that nothing ties together: every density integrates to 1, and they may be apart from the start."""
-SYSTEMS: dict[str, dict[str, Any]] = {
-    "ph-HMM": AS_PRINTED | {"structure": HMM, "chains": "phone"},
-    "ph-MSHMM": AS_PRINTED | {"structure": MULTISTREAM, "chains": "phone"},
-    "ph-FHMM": AS_PRINTED | FREE | {"structure": FACTORIAL, "chains": "phone phone"},
-    "ph-vi-FHMM": AS_PRINTED | FREE | {"structure": FACTORIAL, "chains": "phone viseme"},
-    "ph-CHMM": AS_PRINTED | {"structure": COUPLED, "chains": "phone phone"},
-    "ph-vi-CHMM": AS_PRINTED | {"structure": COUPLED, "chains": "phone viseme"},
-}
-"""Options of the coupled engine for each system. Source: Xie & Liu 2007, Table 2."""
-PRESETS: dict[str, dict[str, Any]] = SYSTEMS | {"xieliu2007": AS_PRINTED}
-"""The systems by name, and what they share: alone it is the one that the paper proposes, ph-vi-CHMM."""
 
 
 @dataclass(frozen=True)

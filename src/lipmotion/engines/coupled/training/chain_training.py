@@ -283,7 +283,16 @@ def create_chains(
     if structure.limit is None:
         limited = replace(structure, limit=min(structure.start_limit, structure.states - 1))
     transitions = create_transitions(find_reachable(limited, estimate_grammar(limited, data)))
-    chains = _create_untrained_chains(streams, transitions, data, weights)
+    groups, numbers = [], tuple(range(len(streams)))
+    dimensions = [stream.shape[1] for stream in data[0].observations.streams]
+    for members in [numbers] if structure.kind == HMM else [(stream,) for stream in numbers]:
+        edges = np.cumsum([0, *(dimensions[s] for s in members)]).tolist()
+        chain = structure.chain_of(members[0])
+        shape = (structure.state_counts[chain], 1, edges[-1])
+        normal = Mixtures(np.zeros(shape[:2], np.float32), np.zeros(shape, np.float32), np.ones(shape, np.float32))
+        columns, exponents = tuple(slice(a, b) for a, b in pairwise(edges)), tuple(weights[s] for s in members)
+        groups.append(StreamGroup(members, columns, normal, exponents, transitions.product.chain_states[chain]))
+    chains = Chains(streams, transitions, tuple(groups))
     utterances = [build_lattice_utterance(chains, utterance) for utterance in data]
     paths = [split_evenly(transitions.product, utterance.phones, utterance.observations.frames) for utterance in data]
     for _ in range(1 + VITERBI_STEPS):
@@ -295,30 +304,6 @@ def create_chains(
     if structure.kind == FACTORIAL and len(structure.chains) == 2:
         return with_joint_state_densities(chains, transitions, visits, structure)
     return chains
-
-
-def _create_untrained_chains(
-    streams: tuple[str, ...], transitions: Transitions, data: Sequence[AlignedUtterance], weights: Sequence[float]
-) -> Chains:
-    """Return chains whose densities are all standard normal."""
-    product, structure, groups = transitions.product, transitions.product.structure, []
-    numbers = tuple(range(len(streams)))
-    stream_groups = [numbers] if structure.kind == HMM else [(stream,) for stream in numbers]
-    dimensions = [stream.shape[1] for stream in data[0].observations.streams]
-    for members in stream_groups:
-        edges = np.cumsum([0, *(dimensions[s] for s in members)])
-        chain = structure.chain_of(members[0])
-        shape = (structure.state_counts[chain], 1, int(edges[-1]))
-        groups.append(
-            StreamGroup(
-                members,
-                tuple(slice(a, b) for a, b in pairwise(edges.tolist())),
-                Mixtures(np.zeros(shape[:2], np.float32), np.zeros(shape, np.float32), np.ones(shape, np.float32)),
-                tuple(weights[s] for s in members),
-                product.chain_states[chain],
-            )
-        )
-    return Chains(streams, transitions, tuple(groups))
 
 
 def _reestimate_along(
