@@ -178,8 +178,7 @@ class SelectsRecordings(Protocol):
         """Return the pieces of recordings that say some phones best, and the phones with the sources of their units.
 
         units    : phones in time, from 0 s
-        features : acoustic features of every recording, by its name [each shape=(T, D)]; pieces
-            join where these agree
+        features : acoustic features of every recording, by its name [each shape=(T, D)]; pieces join where these agree
         Raises InputError: an unknown phone, or features of other recordings.
         """
 

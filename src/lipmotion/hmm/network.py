@@ -97,8 +97,7 @@ class Network(NetworkArrays):
         path, score = best_path(log_emission, frames, self, windows)
         if not np.isfinite(score):
             raise AlignmentError(
-                f"no path through {len(self.emission)} states in {frames} frames of 10 ms: "
-                "the recording is too short for what should be said in it"
+                f"no path through {len(self.emission)} states in {frames} frames of 10 ms: the recording is too short"
             )
         return path
 

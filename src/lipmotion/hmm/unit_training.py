@@ -246,8 +246,7 @@ def train_hmm(
             sequences.append(sequence)
     if not usable:
         raise CorpusError(
-            f"none of {len(utterances)} utterances has a transcript that fits into its recording; "
-            "check that transcripts and recordings belong together"
+            f"none of {len(utterances)} utterances has a transcript that fits into its recording; check that they match"
         )
     return _Training(usable, sequences, inventory, config, monitor, checkpoint).run()
 
@@ -352,9 +351,8 @@ class _Training:
         self._choose_pronunciations()
 
     def _choose_pronunciations(self) -> None:
-        blocks = (
-            slice(start, start + UTTERANCES_PER_BLOCK) for start in range(0, len(self._data), UTTERANCES_PER_BLOCK)
-        )
+        starts = range(0, len(self._data), UTTERANCES_PER_BLOCK)
+        blocks = (slice(start, start + UTTERANCES_PER_BLOCK) for start in starts)
         jobs = ((self._hmm, self._utterances[block], self._sequences[block]) for block in blocks)
         chosen = self._checkpoint.parallel_map(partial(_choose_sequences, pause=self._inventory.pause), jobs)
         self._sequences = [units for sequences in chosen for units in sequences]
@@ -367,9 +365,8 @@ class _Training:
         spoken = [tuple(silence if unit == pause else unit for unit in units) for units in self._sequences]
         typical_fit = float(np.mean([self._hmm.fit(x) for x in self._data]))
         bigram = estimate_bigram(self._hmm.table.units, spoken)
-        self._hmm = add_contexts(
-            replace(self._hmm, bigram=bigram, typical_fit=typical_fit), self._data, self._sequences
-        )
+        hmm = replace(self._hmm, bigram=bigram, typical_fit=typical_fit)
+        self._hmm = add_contexts(hmm, self._data, self._sequences)
         return len(self._hmm.table.names) - len(self._hmm.log_stay)
 
 

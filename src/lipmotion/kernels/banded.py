@@ -163,12 +163,8 @@ def _room(T: int, P: int) -> tuple[Array, Array, Array, Array, Array]:
     """Return arrays for the solution (until ``_substitute``: L⁻¹ times the right-hand side), the variance (until then:
     1 / D) and both diagonals of L, with row t at t + 2 between rows of zeros, and zeros for values of the rows before.
     """
-    values, variance, lower1, lower2 = (
-        np.empty((T + 4, P)),
-        np.empty((T + 4, P)),
-        np.empty((T + 4, P)),
-        np.empty((T + 4, P)),
-    )
+    values, variance = np.empty((T + 4, P)), np.empty((T + 4, P))
+    lower1, lower2 = np.empty((T + 4, P)), np.empty((T + 4, P))
     for row in (0, 1, T + 2, T + 3):
         values[row], variance[row], lower1[row], lower2[row] = 0, 0, 0, 0
     return values, variance, lower1, lower2, np.zeros((3, P))

@@ -76,14 +76,12 @@ def infer_factorial(
 ) -> FactorialPosteriors:
     """Return the posteriors and expected counts of a recording in two loops.
 
-    stretch : frames whose forward probabilities are stored at once; those of the others are computed twice;
-        None: √T, or as many as ``ROOM_BYTES`` hold
+    stretch : frames whose forward probabilities are stored at once, others are computed twice; None: √T, or what fits
     Log densities in single precision are processed in single precision where that loses nothing, which takes half the
     time. Where few joint states are possible, or double precision may lose paths that count, because they were some 250
     nats below a frame's best, the recording is processed in logarithms.
     Source: Ghahramani & Jordan (1997), "Factorial hidden Markov models", appendix B. Forward and backward probabilities
-    are raised to a least one, never set to 0, and so are upper bounds; how much may come of that follows from the
-    overlap of both in each frame.
+    are raised to a least one, so they are upper bounds; how much comes of that follows from their overlap in a frame.
     Cost: time O(T·Na·Nv·(Ua + Uv)), memory O(stretch + T/stretch) times Na·Nv.
     """
     order = np.lexsort(logs.pairs.T[::-1])
@@ -101,9 +99,8 @@ def infer_factorial(
     results = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
     result = next((each for each in results if each is not None), None)
     if result is None:  # there is no path
-        first, second = (
-            LoopCounts(*map(np.zeros_like, (loop.stay, loop.onward, loop.enter))) for loop in (audio, visual)
-        )
+        loops = ((loop.stay, loop.onward, loop.enter) for loop in (audio, visual))
+        first, second = (LoopCounts(*map(np.zeros_like, parts)) for parts in loops)
         in_audio, in_visual, in_pairs = (np.zeros(log.shape) for log in logs[:3])
         return FactorialPosteriors(in_audio, in_visual, in_pairs, first, second, -np.inf)
     return result._replace(pair=result.pair[:, np.argsort(order)])
@@ -112,13 +109,10 @@ def infer_factorial(
 class _StepBack(NamedTuple):
     """The result of a step back to the frame before.
 
-    audio, visual, pair : [shapes=(Na,), (Nv,), (P,)], posteriors of the states of each loop, and of joint states of
-        their own
-    log_overlap : the logarithm of the sum of forward times backward probabilities, as a share of the product of both
-        wholes
+    audio, visual, pair : [shapes=(Na,), (Nv,), (P,)], posteriors of the states of each loop, and of pairs
+    log_overlap : log of the sum of forward times backward probabilities, as a share of the product of both wholes
     backward : its backward probabilities times densities [shape=(Na, Nv)]
-    audio_entered, visual_entered : [shapes=(U, U)], expected number of transitions from each unit to each, divided by
-        the probability of the transition
+    audio_entered, visual_entered : [shapes=(U, U)], expected numbers of transitions by the transition's probability
     """
 
     audio: Double

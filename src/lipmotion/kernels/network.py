@@ -110,8 +110,7 @@ class ForwardBackwardNetwork(NamedTuple):
         columns       : of each chain [shape=(S,)]
         What is computed is ``log_forward_backward``: by ``_forward_backward`` in the precision of ``log_emissions``;
         where that would lose what counts, in double precision, and at last in logarithms by NumPy.
-        Cost: O(T·E), and exponentials of the chains' densities; in double precision twice, in logarithms some fifty
-        times as slow.
+        Cost: O(T·E), and exponentials of densities; in double precision twice, in logarithms fifty times as slow.
         """
         precision, layout = log_emissions[0].dtype, self.layout
         log_arcs, log_first = arc_log.astype(np.float64), log_initial.astype(np.float64)
@@ -246,15 +245,13 @@ def _forward_backward(
 ) -> tuple[Array, Array, Array, Array, bool]:  # fmt: skip
     """Return the expected counts of a recording in a network; ``emission`` is overwritten by the posteriors.
 
-    emission : [shape=(T, S)], by place: eighth roots of densities relative to the best of each frame; its precision,
-        which the weights have too, is that of the computation
+    emission : [shape=(T, S)], by place: eighth roots of densities relative to each frame's best; its precision is used
     initial  : [shape=(S,)], in double precision, the greatest 1
     runs ... transposed : of ``kernels.arcs.ArcLayout`` and ``_Weights``
     floor, min_scale, off : least probability, least scale of a frame, and largest error of N (see above)
     Returns the expected count of each run arc divided by its weight [shape=(N,)]; the forward probabilities of all
     blocks' sources and the backward ones of their targets in the next frame, whose products summed over time give the
-    counts of block arcs [shapes=(T, ...)]; the scale of each frame, whose product is the likelihood [shape=(T,)]; and
-    whether the precision is enough.
+    counts of block arcs [shapes=(T, ...)]; each frame's scale [shape=(T,)]; and whether the precision is enough.
     """
     T, S = emission.shape
     targets = 0
@@ -290,9 +287,18 @@ def _forward(
         alpha[t] = floor
         if t == 0:
             alpha[t, : len(initial)] = initial
-        else:
-            _forward_runs(alpha, t, runs, run_weight)
-            _forward_blocks(alpha, t, blocks, sources, block_weight, leave, room, share, SHARE * floor)
+        for r in range(len(runs) if t > 0 else 0):
+            target, source, length, first = runs[r, 0], runs[r, 1], runs[r, 2], runs[r, 3]
+            for i in range(length):
+                alpha[t, target + i] += run_weight[first + i] * alpha[t - 1, source + i]
+        for b in range(len(blocks) if t > 0 else 0):
+            target, targets, first, count = blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3]
+            for s in range(count):
+                leave[t - 1, first + s] = alpha[t - 1, sources[first + s]]
+            total = _shares(leave, t - 1, first, count, share, SHARE * floor)
+            _times(share, count, block_weight, first, room)
+            for i in range(targets):
+                alpha[t, target + i] += total * room[i]
         scale[t] = _emit(alpha, density, t, 1 / scale[t - 1] if t > 0 else 1.0, floor)
         if not min_scale < scale[t] < MAX_SCALE:
             return False
@@ -311,10 +317,23 @@ def _backward(
         total = _close(density, alpha, t, beta, onward, 1 / scale[t - 1] if t > 0 else 1.0, floor)
         if not abs(total - 1) < off:
             return False
-        if t > 0:
-            beta[:] = floor
-            _backward_runs(alpha, t - 1, onward, beta, runs, run_weight, few)
-            _backward_blocks(onward, beta, blocks, sources, transposed, enter, t - 1, room, share, SHARE * floor)
+        beta[:] = floor
+        for r in range(len(runs) if t > 0 else 0):
+            target, source, length, first = runs[r, 0], runs[r, 1], runs[r, 2], runs[r, 3]
+            for i in range(length):
+                beta[source + i] += run_weight[first + i] * onward[target + i]
+            for i in range(length):
+                few[first + i] += alpha[t - 1, source + i] * onward[target + i]
+        start = np.uintp(0)
+        for b in range(len(blocks) if t > 0 else 0):
+            target, targets, first, count = blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3]
+            for i in range(targets):
+                enter[t - 1, start + i] = onward[target + i]
+            total = _shares(enter, t - 1, start, targets, share, SHARE * floor)
+            _times(share, targets, transposed, start, room)
+            for s in range(count):
+                beta[sources[first + s]] += total * room[s]
+            start += targets
         if t % FRAMES_SUMMED == 0:
             counts += few
             few[:] = floor
@@ -322,29 +341,6 @@ def _backward(
     for i in range(len(initial)):
         begun += initial[i] * onward[i]
     return abs(begun - 1) < off
-
-
-@compile_to_rounding
-def _forward_runs(alpha: Array, t: int, runs: Unsigned, weight: Array) -> None:
-    for r in range(len(runs)):
-        target, source, length, first = runs[r, 0], runs[r, 1], runs[r, 2], runs[r, 3]
-        for i in range(length):
-            alpha[t, target + i] += weight[first + i] * alpha[t - 1, source + i]
-
-
-@compile_to_rounding
-def _forward_blocks(
-    alpha: Array, t: int, blocks: Unsigned, sources: Unsigned, weight: Array, leaving: Array, room: Array, share: Array,
-    floor: float,
-) -> None:  # fmt: skip
-    for b in range(len(blocks)):
-        target, targets, first, count = blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3]
-        for s in range(count):
-            leaving[t - 1, first + s] = alpha[t - 1, sources[first + s]]
-        total = _shares(leaving, t - 1, first, count, share, floor)
-        _times(share, count, weight, first, room)
-        for i in range(targets):
-            alpha[t, target + i] += total * room[i]
 
 
 @compile_to_rounding
@@ -378,35 +374,6 @@ def _close(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, sc
         total += posterior
         emission[t, i] = posterior if posterior > MIN_POSTERIOR else 0.0
     return total
-
-
-@compile_to_rounding
-def _backward_runs(
-    alpha: Array, t: int, onward: Array, beta: Array, runs: Unsigned, weight: Array, counts: Array
-) -> None:
-    for r in range(len(runs)):
-        target, source, length, first = runs[r, 0], runs[r, 1], runs[r, 2], runs[r, 3]
-        for i in range(length):
-            beta[source + i] += weight[first + i] * onward[target + i]
-        for i in range(length):
-            counts[first + i] += alpha[t, source + i] * onward[target + i]
-
-
-@compile_to_rounding
-def _backward_blocks(
-    onward: Array, beta: Array, blocks: Unsigned, sources: Unsigned, transposed: Array, entering: Array, t: int,
-    room: Array, share: Array, floor: float,
-) -> None:  # fmt: skip
-    start = np.uintp(0)
-    for b in range(len(blocks)):
-        target, targets, first, count = blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3]
-        for i in range(targets):
-            entering[t, start + i] = onward[target + i]
-        total = _shares(entering, t, start, targets, share, floor)
-        _times(share, targets, transposed, start, room)
-        for s in range(count):
-            beta[sources[first + s]] += total * room[s]
-        start += targets
 
 
 @compile_to_rounding

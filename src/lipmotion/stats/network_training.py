@@ -44,8 +44,7 @@ class SequenceNetwork(ABC):
 
     layers : the parameters of all layers below
     output : the linear map
-    SHARDS : parts of a batch, computed in one thread each. Their number is fixed: the sum does not depend on the
-             processors
+    SHARDS : parts of a batch, one thread each; their number is fixed: the sum does not depend on the processors
     """
 
     layers: tuple[Any, ...]

@@ -20,8 +20,7 @@ BLOCK = 4096  # time steps computed at a time, so that the memory does not grow 
 class ConvolutionalNetwork(SequenceNetwork):
     """Convolutions in time with residual connections, and a linear output.
 
-    layers    : convolutions of ``TAPS`` time steps, each followed by max(0, x); the output of each but the first is
-                added to its input
+    layers    : convolutions of ``TAPS`` time steps, then max(0, x); all but the first add their input to the output
     dilations : distance of the taps of each layer, in time steps
     output    : the linear map from the last hidden layer
     Source: Bai, Kolter & Koltun 2018, without causality and without normalisation.
@@ -204,9 +203,8 @@ def make_recurrent_network(inputs: int, cells: int, outputs: int, layers: int, s
         biases = np.zeros((2, GATES, cells), np.float32)
         biases[:, 1] = FORGET_BIAS
         size = 2 * cells if number else inputs
-        made.append(
-            RecurrentLayer(uniform(2, size, GATES * cells), uniform(2, cells, GATES * cells), biases.reshape(-1))
-        )
+        weights, memory = uniform(2, size, GATES * cells), uniform(2, cells, GATES * cells)
+        made.append(RecurrentLayer(weights, memory, biases.reshape(-1)))
     return RecurrentNetwork(tuple(made), LinearMap(uniform(2 * cells, outputs), np.zeros(outputs, np.float32)))
 
 
@@ -269,9 +267,8 @@ def _differentiate_layer(layer: RecurrentLayer, passed: _CellPass, slope: Array)
         of_cell = of_cell * gates[:, step, :, 1]
         of_output = np.matmul(here.reshape(2, batch, GATES * cells), memory)
     flat = inner.reshape(2, length * batch, GATES * cells)
-    inputs, outputs = (
-        values.reshape(2, length * batch, -1).transpose(0, 2, 1) for values in (passed.inputs, _shift(passed.outputs))
-    )
+    seen = passed.inputs, _shift(passed.outputs)
+    inputs, outputs = (values.reshape(2, length * batch, -1).transpose(0, 2, 1) for values in seen)
     of_inputs = np.matmul(flat, layer.weights.transpose(0, 2, 1)).reshape(passed.inputs.shape)
     both = (of_inputs[0] + of_inputs[1, ::-1]).transpose(1, 0, 2)
     return [np.matmul(inputs, flat), np.matmul(outputs, flat), flat.sum(axis=1).reshape(-1)], both

@@ -114,7 +114,7 @@ def test_the_modulation_filter_is_for_voices_that_training_knows():
 
 SMALL = {"states": 3, "silent_states": 7, "components": 2}
 OPTIONS = engines.engine_named("trajectory", SMALL | {"acoustic_regression": False}).config
-LAYOUT = OPTIONS.training_layout
+LAYOUT = OPTIONS.layout(load_unit_set(OPTIONS.units))
 
 
 def fit(corpus, **changes):
@@ -244,7 +244,7 @@ def loud_and_soft(count):
 def error(model, corpus):
     squares = []
     for one in corpus:
-        states = label_full_context(one.speech.units, len(one.valid), REGRESSION.training_layout)
+        states = label_full_context(one.speech.units, len(one.valid), model.emission.layout)
         rows = np.array([model.emission.row(state) for state in states])
         means, _ = model.emission.statistics(rows, one.speech.features.values, slice(None))
         squares.append((means[:, 0, 0] - one.motion["opening"])[60:-60] ** 2)

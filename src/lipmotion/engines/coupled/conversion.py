@@ -44,8 +44,7 @@ def convert(
 
     observations : the first stream is speech; the values of the others are ignored
     lattice      : the joint states that the utterance may be in
-    start        : ``soft``: expected means over all paths, given speech alone; ``viterbi``: means along the best path,
-                   as in the paper
+    start        : ``soft``: expected means over all paths, given speech; ``viterbi``: the paper's, along the best path
     update       : ``exact``: the maximiser of each M-step; ``printed``: Eq. 9 as it stands
     max_steps    : greatest number of EM steps after the start
     speech_inference : posteriors given speech alone, where they are known; a soft start needs them

@@ -49,19 +49,15 @@ class CoupledConfig(Configuration):
     start_asynchrony, unseen_loss : of factorial chains without a limit: how far apart the chains may be while the first
                  densities are learned, and the nats that rare joint states lose (``chains.product.Structure``)
     moves_together : coupled chains may move on in the same frame more often than by chance; the paper's may not
-    mixtures, visual_mixtures : Gaussians per state, of the speech stream and of visual streams (powers of two); the
-                 structure ``hmm`` uses the first for both
+    mixtures, visual_mixtures : Gaussians per state, of speech (``hmm``: of all) and of visual streams (powers of two)
     speech_only_mixtures, speech_only_steps, speech_only_weight : of the second stage of training, on speech without
                  motion: Gaussians per state of speech, EM steps for each number of Gaussians, and the weight of such a
                  frame relative to one of speech with motion
-    audio_weight, visual_weight, eigenlips_weight : stream weights (exponents of the densities) of speech, of geometry,
-                 and of eigenlips
+    audio_weight, visual_weight, eigenlips_weight : exponents of the densities of speech, geometry and eigenlips
     conversion : ``trajectory``: parameter generation from expected precisions and means of static values, Δ and Δ²;
                  ``em``: the paper's, frame by frame;  ``viterbi``: means along the best path
-    start, update, steps : of EM conversion (``conversion.convert``); ``trajectory`` takes no
-                 steps after its soft start unless asked to
-    acoustic_regression : regress visual means on the acoustic features and state posteriors around the frame
-                 (``trajectory`` only)
+    start, update, steps : of EM conversion (``conversion.convert``); ``trajectory`` has a soft start and such steps
+    acoustic_regression : regress visual means on features and state posteriors around the frame (``trajectory`` only)
     components : principal components that all point channels are reduced to
     variance_scaling : scale movements to the variance of the recorded ones
     closures   : make the lips meet in every p, b and m
@@ -142,8 +138,7 @@ class CoupledModel:
 
     space      : the motion space, of Q dimensions
     visual     : the visual streams, in the order of the chains' streams after speech
-    regression : of the visual means: the inputs, and the regression of each visual stream; None: the means are those of
-                 the chains' densities
+    regression : of the visual means: inputs, and the regression of each visual stream; None: means are the densities'
     scaling    : factors of variance scaling, away from the rest pose [shape=(Q,)]
     rest_pose  : the pose in silence away from speech [shape=(Q,)]
     closure    : how the lips close; None: the motion has no opening

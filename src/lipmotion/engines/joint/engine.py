@@ -142,9 +142,8 @@ class JointModel:
     prior: ArticulationPrior | None
 
     def __repr__(self) -> str:
-        return (
-            f"JointModel({self.units.name} units, {len(self.hmm.models)} streams, {self.space.dimensions} dimensions)"
-        )
+        size = f"{len(self.hmm.models)} streams, {self.space.dimensions} dimensions"
+        return f"JointModel({self.units.name} units, {size})"
 
     @cached_property
     def motion(self) -> LearnedMotion:

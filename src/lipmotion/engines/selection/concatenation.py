@@ -79,8 +79,7 @@ def to_pieces(costs: Costs, target: Target, units: UnitNumbers) -> list[Piece]:
 def join_pieces(inventory: RecordedUnits, target: Target, pieces: list[Piece], frames: int) -> Array:
     """Return the motion of some pieces in the motion space, 100 frames a second [shape=(frames, Q)].
 
-    Where pieces overlap, the weight of the next one rises from 0 to 1 along a raised cosine. Abutting pieces are bent
-    towards one another.
+    Where pieces overlap, the next one's weight rises along a raised cosine. Abutting pieces are bent together.
     """
     time_s = np.arange(frames) / FRAME_RATE_HZ
     result, total = np.zeros((frames, inventory.values.shape[1])), np.zeros((frames, 1))
@@ -174,10 +173,8 @@ def _smooth(
     phones = (PHONES[target.windows.phones[number]] for number in (after.first - 1, after.first))
     one, other = (phone in PROTECTED_PHONES for phone in phones)
     shares = (0.0, 1.0) if one and not other else (1.0, 0.0) if other and not one else (0.5, 0.5)
-    spans_s = (
-        SMOOTHED_SHARE * (join_s - times_s[before.first, 0]),
-        SMOOTHED_SHARE * (times_s[after.stop - 1, 1] - join_s),
-    )
+    begin_s, end_s = times_s[before.first, 0], times_s[after.stop - 1, 1]
+    spans_s = SMOOTHED_SHARE * (join_s - begin_s), SMOOTHED_SHARE * (end_s - join_s)
     for side, (share, span_s) in enumerate(zip(shares, spans_s, strict=True)):
         width_s = float(np.clip(span_s, MIN_OVERLAP_S, MAX_OVERLAP_S))
         away_s = (join_s - time_s) if side == 0 else (time_s - join_s)

@@ -361,8 +361,7 @@ def select(
     prune    : leave out candidates that cannot be part of the best sequence, and those beyond the beam
     A candidate whose target cost exceeds the least one of its phone by more than two joins can cost is never the best:
     the one of least target cost in its place would be better. So this does not change the cost of the result. Of the
-    others, the beam keeps those of the least target costs: by how much that changes the cost was measured
-    (docs/results/selection.md).
+    others, the beam keeps those of the least target costs, which changes it little (docs/results/selection.md).
     Source: Minnis & Breen 2000, §3.
     """
     required = required or {}

@@ -22,21 +22,15 @@ from lipmotion.units.stress import NUCLEI, find_stress
 
 PROTECTED_PHONES = ("f", "v", "m", "em", "p", "b")
 """Phones whose lip shape every join must preserve. The paper lists /v/ twice and /b/ never."""
-PROTECTED, INVISIBLE, NORMAL = "protected", "invisible", "normal"
+LIP_CLASSES = PROTECTED, INVISIBLE, NORMAL = "protected", "invisible", "normal"
 
 Overlaps = Mapping[tuple[str, str], float]
 """The forward share of a shared phone, 0 to 1, by the classes of the phones before and after it."""
 
 TABLE_1: Overlaps = {
-    (PROTECTED, PROTECTED): 0.50,
-    (PROTECTED, INVISIBLE): 0.77,
-    (PROTECTED, NORMAL): 0.55,
-    (INVISIBLE, PROTECTED): 0.23,
-    (INVISIBLE, INVISIBLE): 0.50,
-    (INVISIBLE, NORMAL): 0.27,
-    (NORMAL, PROTECTED): 0.45,
-    (NORMAL, INVISIBLE): 0.77,
-    (NORMAL, NORMAL): 0.50,
+    (before, after): share
+    for before, row in zip(LIP_CLASSES, ((0.50, 0.77, 0.55), (0.23, 0.50, 0.27), (0.45, 0.77, 0.50)), strict=True)
+    for after, share in zip(LIP_CLASSES, row, strict=True)
 }
 """Table 1 as printed. Its rows (forward) are the phone before, its columns (backward) the phone after."""
 SYMMETRIC: Overlaps = {**TABLE_1, (NORMAL, INVISIBLE): 0.73}

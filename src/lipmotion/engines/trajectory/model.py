@@ -46,22 +46,18 @@ class TrajectoryConfig(Configuration):
     shrinkage, variance_shrinkage : weights, in frames, of the mean and of the variance of the parent node
     acoustic_regression : regress the means on the acoustic features around the frame (False: plain Gaussians)
     acoustic_components : principal components that the acoustic features around a frame are reduced to
-    ridge, shared_ridge : ridge parameters: of a regression towards that of the parent node, and of the regression that
-                 all nodes share towards zero
+    ridge, shared_ridge : ridge parameters: of a node's regression towards its parent's, of the one of all towards zero
     ridge_frames : smallest number of frames of a node with a regression of its own
     variance_scaling : scale generated movements to the variance of recorded ones
     closures   : make the lips meet in every p, b and m, whatever their units are
-    joint_recogniser : train the joint model as well, where there is enough speech: it recognises the phones of
-                 speakers that it was trained on
-    conditions : acoustic conditions in which each recording is used in the training of the acoustic network; 0: no
-                 network
+    joint_recogniser : train the joint model as well, where there is enough speech: it recognises phones of its speakers
+    conditions : acoustic conditions in which the acoustic network is trained on each recording; 0: no network
     epochs     : how often the training of the network uses each recording
     predictor  : name of the predictor beside the states (docs/extend/predictor.md); ``auto``: an acoustic network, or,
                  where the model stands on another one, a regression on what that makes of the speech
     articulation : lean on the table of English articulation in contexts that training saw little of
     units      : name of a unit set, or path of a table of units (docs/unit-sets.md), which training reads
-    modulation_filter : how far generated motion is given the modulation spectrum of recorded motion: 0 not at all, 1
-                 wholly; more goes beyond it (docs/results/jerk.md)
+    modulation_filter : how far motion gets the modulation spectrum of recordings, 0 to 1 or more (docs/results/jerk.md)
     """
 
     states: int = option(5, ODD)
@@ -105,11 +101,6 @@ class TrajectoryConfig(Configuration):
     def layout(self, units: UnitSet) -> StateLayout:
         """Return the states of phones and silences, for a unit set."""
         return StateLayout(self.states, self.silent_states, self.edge_s, units)
-
-    @property
-    def training_layout(self) -> StateLayout:
-        """The states of the unit set that training reads. Raises InputError: no such unit set, or errors in a table."""
-        return self.layout(load_unit_set(self.units))
 
 
 Array = NDArray[np.float64]
@@ -201,9 +192,7 @@ def emission_from_arrays(arrays: Arrays, layout: StateLayout, dimensions: int) -
     """
     forest = trees_from_arrays(arrays)
     if len(forest) != layout.speech + layout.silence or list(forest) != layout.names:
-        raise ValueError(
-            f"trees for {len(forest)} states, required {layout.speech} of speech and {layout.silence} of silence"
-        )
+        raise ValueError(f"trees for {len(forest)} states, required {layout.speech} and {layout.silence} of silence")
     leaves = sum(len(tree.leaves) for tree in forest.values()) + 1
     densities = check_arrays(arrays, DENSITIES, L=leaves, Q=dimensions)
     check_spread(densities["means"][:, 0], densities["variances"][:, 0])

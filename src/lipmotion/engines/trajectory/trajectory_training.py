@@ -39,6 +39,7 @@ from lipmotion.stats.trees import (
 )
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Example, Monitor, Progress, Speech, sub_monitor
+from lipmotion.units import load_unit_set
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +55,6 @@ class TrainingClip:
     states: list[FullContextState]
     frames: NDArray[np.intp]
     rows: NDArray[np.float32]
-
-    @property
-    def features(self) -> NDArray[np.float32]:
-        """Acoustic features [shape=(T, D)]."""
-        return np.asarray(self.speech.features.values)
 
     @property
     def training_states(self) -> list[FullContextState]:
@@ -80,10 +76,9 @@ def fit_acoustic_regression(emission: Emission, clips: Sequence[TrainingClip], o
     Every node of the trees with enough frames has a linear regression on the features around the frame, shrunk towards
     that of its parent node, so that states with few frames share the regression of their relatives.
     """
-    context = fit_acoustic_context((clip.features for clip in clips), options.acoustic_components)
-    min_frames = max(
-        options.ridge_frames, sum(float(tree.frames[0]) for tree in emission.forest.values()) / SHARE_DIVISOR
-    )
+    context = fit_acoustic_context((clip.speech.features.values for clip in clips), options.acoustic_components)
+    frames = sum(float(tree.frames[0]) for tree in emission.forest.values())
+    min_frames = max(options.ridge_frames, frames / SHARE_DIVISOR)
     owners: list[_Node | None] = []  # of each density, the last node on its path with enough frames; or the root
     for name, tree in emission.forest.items():
         for leaf in tree.leaves.tolist():
@@ -97,7 +92,7 @@ def fit_acoustic_regression(emission: Emission, clips: Sequence[TrainingClip], o
     for start in range(0, len(clips), CLIPS_PER_BLOCK):
         block = clips[start : start + CLIPS_PER_BLOCK]
         rows = np.concatenate([emission.rows(clip.training_states) for clip in block])
-        z = np.concatenate([context(clip.features, clip.frames) for clip in block])
+        z = np.concatenate([context(clip.speech.features.values, clip.frames) for clip in block])
         error = np.concatenate([clip.rows for clip in block]) - emission.means[rows]
         order = np.argsort(number_of_row[rows], kind="stable")
         z, error = z[order], error[order].reshape(len(order), -1).astype(np.float32)
@@ -127,7 +122,7 @@ def _variances(emission: Emission, clips: Sequence[TrainingClip], options: Traje
     squares, counts = np.zeros(emission.means.shape), np.zeros(len(emission.means))
     for clip in clips:
         rows = emission.rows(clip.training_states)
-        means, _ = emission.statistics(rows, clip.features, clip.frames)
+        means, _ = emission.statistics(rows, clip.speech.features.values, clip.frames)
         np.add.at(squares, rows, np.square(clip.rows - means))
         np.add.at(counts, rows, 1)
     strength = options.variance_shrinkage
@@ -155,20 +150,17 @@ def fit_trajectory(
     if options.joint_recogniser:
         phone_recogniser = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.3), checkpoint)
     monitor = sub_monitor(monitor, 0.3, 1)
-    layout = options.training_layout
+    layout = options.layout(load_unit_set(options.units))
     clips = []
     for example, x in zip(examples, values, strict=True):
         frames = np.nonzero(mark_known_dynamics(example.valid))[0]
         rows = with_dynamics(x)[frames].astype(np.float32)
-        clips.append(
-            TrainingClip(example.speech, label_full_context(example.speech.units, len(x), layout), frames, rows)
-        )
+        labels = label_full_context(example.speech.units, len(x), layout)
+        clips.append(TrainingClip(example.speech, labels, frames, rows))
     states = (state for clip in clips for state in clip.training_states)
     covered = {layout.name(state) for state in states if state.unit not in layout.units.silence}
     if len(covered) < layout.speech:
-        raise CorpusError(
-            f"motion was seen in {len(covered)} of {layout.speech} states of a phone; learn from more speech"
-        )
+        raise CorpusError(f"{len(covered)} of {layout.speech} states of a phone have motion; learn from more speech")
     monitor(Progress(_STAGE, 1, 3, 0.1))
     emission = _fit_emission(clips, options, layout)
     if options.acoustic_regression:
@@ -179,9 +171,8 @@ def fit_trajectory(
     kind = choose_predictor(options.predictor, examples)
     if kind is not None:
         predictor_monitor = sub_monitor(monitor, 0.4, 0.99)
-        network, held_out = kind.fit(
-            PredictorTraining(examples, values, direct, options.epochs, predictor_monitor, checkpoint)
-        )
+        training = PredictorTraining(examples, values, direct, options.epochs, predictor_monitor, checkpoint)
+        network, held_out = kind.fit(training)
         if held_out is not None:
             share = _weigh_predictor(held_out, clips, options, layout, direct)
     recorded, generated = list[NDArray[np.float32]](), list[Array]()
@@ -220,8 +211,8 @@ def _weigh_predictor(
         if options.acoustic_regression:
             emission = fit_acoustic_regression(emission, learned, options)
         for number in outside:
-            clip = clips[number]
-            means, precisions = emission.statistics(emission.rows(clip.states), clip.features, slice(None))
+            clip, features = clips[number], clips[number].speech.features.values
+            means, precisions = emission.statistics(emission.rows(clip.states), features, slice(None))
             states = solve_mlpg(means, precisions)[0][clip.frames, :direct]
             recorded, predicted = clip.rows[:, 0, :direct], predictions[number][clip.frames, :direct]
             spread = np.maximum(recorded.std(axis=0), 1e-6)
@@ -233,9 +224,9 @@ def _weigh_predictor(
 
 def _fit_emission(clips: Sequence[TrainingClip], options: TrajectoryConfig, layout: StateLayout) -> Emission:
     """Return the Gaussians of all leaves; each mean and variance is shrunk towards that of its parent node."""
-    moving = np.concatenate(
-        [clip.rows[[state != layout.rest for state in clip.training_states]] for clip in clips], dtype=np.float64
-    )
+    moves = ([state != layout.rest for state in clip.training_states] for clip in clips)
+    rows = [clip.rows[inside] for clip, inside in zip(clips, moves, strict=True)]
+    moving = np.concatenate(rows, dtype=np.float64)
     centre, overall = moving.mean(axis=0), moving.var(axis=0)
     floor = np.maximum(MIN_VARIANCE_SHARE * overall, MIN_VARIANCE)
     scale = np.sqrt(np.maximum(overall, floor))
@@ -254,11 +245,8 @@ def _fit_emission(clips: Sequence[TrainingClip], options: TrajectoryConfig, layo
         )
         for name, contexts in grouped.items()
     }
-    leaves = [
-        gaussian
-        for name, tree in forest.items()
-        for gaussian in _fit_leaves(tree, grouped[name], overall.size, options)
-    ]
+    fitted = (_fit_leaves(tree, grouped[name], overall.size, options) for name, tree in forest.items())
+    leaves = [gaussian for of_tree in fitted for gaussian in of_tree]
     means, variances = (np.array(rows).reshape(-1, *overall.shape) for rows in zip(*leaves, strict=True))
     poses = [
         clip.rows[number, 0]

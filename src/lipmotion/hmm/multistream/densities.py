@@ -143,8 +143,7 @@ class GaussianStatistics:
     """Sufficient statistics of frames for G densities of M Gaussians each.
 
     frames  : [shape=(G,)], sums of posteriors over all frames
-    moments : [shape=(G, M, 1 + 2·D)], over the frames with a value, sums of posteriors, and of values and of squared
-              values weighted by them
+    moments : [shape=(G, M, 1 + 2·D)], over frames with a value, sums of posteriors, and of values and squares by them
     """
 
     frames: Array
@@ -174,8 +173,7 @@ class TiedDensities:
 
     mixtures : of standardised values
     voiced   : [shape=(G,)], the probability that a frame has a value; None: a frame without one has log density 0
-    Source: Tokuda, Masuko, Miyazaki & Kobayashi 1999 (multi-space distributions), with one space of D dimensions and
-    one of none.
+    Source: Tokuda, Masuko, Miyazaki & Kobayashi 1999 (multi-space distributions): spaces of D dimensions and of none.
     """
 
     mixtures: Mixtures

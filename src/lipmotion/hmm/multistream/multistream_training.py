@@ -278,12 +278,23 @@ def _start(
     streams = [name for name in STREAMS if any(name in utterance.observed.streams for utterance in utterances)]
     if not set(streams) & set(config.training.active):
         raise InputError(f"switched on are {', '.join(config.training.active)}; observed were {', '.join(streams)}")
-    hmm = _make_equal_models(utterances, inventory, config, streams)
+    occurring = {unit for utterance in utterances for unit in utterance.units} | {inventory.silence}
+    spoken = tuple(unit for unit in inventory.names if unit in occurring)
+    models = {}
+    for name in streams:
+        scale, known = fit_scale([u.observed.streams[name] for u in utterances if name in u.observed.streams])
+        forest = build_unit_forest(inventory, spoken)
+        tied = make_standard_normals(forest.size, len(scale.mean), name in F0_STREAMS, known)
+        models[name] = StreamModel(scale, forest, tied)
+    free, silence = inventory.free, inventory.silence
+    sequences = [tuple(silence if unit in free else unit for unit in utterance.units) for utterance in utterances]
+    log_stay = np.log(limit_stay((unit for unit, _ in inventory.monophones), free))
+    bigram = estimate_bigram(inventory.names, sequences)
+    hmm = JointHmm(config, inventory, models, log_stay, spoken, bigram)
     prepared = prepare_utterances(hmm, [(each.observed, each.units) for each in utterances])
     if not any(item.fits for item in prepared.items):
         raise CorpusError(
-            f"none of {len(utterances)} utterances has room for the states of its units; "
-            "check that units and recordings belong together, or give units fewer states"
+            f"none of {len(utterances)} utterances has room for the states of its units; check them, or use fewer"
         )
 
     def posteriors() -> Iterator[tuple[PreparedUtterance, StatePosteriors]]:
@@ -301,24 +312,6 @@ def _start(
 
     sums = _add_up(_Accounts(hmm, hmm.leaves(prepared.triphones), by_triphone=False), posteriors())
     return reestimate_hmm(hmm, _statistics(hmm, sums)), prepared
-
-
-def _make_equal_models(
-    utterances: Sequence[TrainingUtterance], inventory: Inventory, config: JointConfig, streams: Sequence[str]
-) -> JointHmm:
-    occurring = {unit for utterance in utterances for unit in utterance.units} | {inventory.silence}
-    spoken = tuple(unit for unit in inventory.names if unit in occurring)
-    models = {}
-    for name in streams:
-        scale, known = fit_scale([u.observed.streams[name] for u in utterances if name in u.observed.streams])
-        forest = build_unit_forest(inventory, spoken)
-        tied = make_standard_normals(forest.size, len(scale.mean), name in F0_STREAMS, known)
-        models[name] = StreamModel(scale, forest, tied)
-    free, silence = inventory.free, inventory.silence
-    sequences = [tuple(silence if unit in free else unit for unit in utterance.units) for utterance in utterances]
-    log_stay = np.log(limit_stay((unit for unit, _ in inventory.monophones), inventory.free))
-    bigram = estimate_bigram(inventory.names, sequences)
-    return JointHmm(config, inventory, models, log_stay, spoken, bigram)
 
 
 def _split_monitor(monitor: Monitor, widths: Sequence[int]) -> list[Monitor]:

@@ -26,8 +26,7 @@ class Structure:
 
     kind        : ``hmm`` (one chain, one mixture over all streams), ``multistream`` (one chain, one mixture for each
                   stream), ``factorial`` (chains with independent transitions, emission densities of joint states) or
-                  ``coupled`` (chains whose transitions depend on the states of all chains, emission densities of each
-                  chain's states)
+                  ``coupled`` (chains whose transitions depend on the states of all, densities of each chain's states)
     chains      : the unit set of each chain; the first chain emits speech, and its bigram decides which unit follows
     states      : states per unit, left to right, without skips
     limit       : the greatest asynchrony, in states; None: no limit
@@ -59,9 +58,7 @@ class Structure:
         if self.limit is None and (self.kind != FACTORIAL or len(self.chains) != 2):
             raise InputError("asynchrony is -1, no limit, which only two factorial chains have")
         if self.limit is not None and not 0 <= self.limit < self.states:
-            raise InputError(
-                f"asynchrony is {self.limit} states, required 0 to {self.states - 1} (fewer than a unit has), or -1"
-            )
+            raise InputError(f"asynchrony is {self.limit} states, required 0 to {self.states - 1}, or -1: no limit")
 
     @cached_property
     def units(self) -> tuple[tuple[str, ...], ...]:
@@ -149,8 +146,7 @@ class Product:
     moves            : whether each chain moves on along each arc [shape=(C, E)]
     unit_probability : of the units that each arc enters, among those that may be entered [shape=(E,)]
     initial          : probability of beginning in each joint state [shape=(S,)]
-    Source: Xie & Liu 2007, Eqs. 17–19. The mask of Eq. 19 removes entries from the rows of the transition tables; the
-    rest of each row is normalised to sum to 1 (``transitions``).
+    Source: Xie & Liu 2007, Eqs. 17–19. What the mask of Eq. 19 leaves of a row of the tables is normalised to sum to 1.
     """
 
     structure: Structure
@@ -249,9 +245,8 @@ def _enter_units(
         entered = {unit: float(row[unit] / total) for unit in candidates}
     probabilities: dict[tuple[int, ...], float] = defaultdict(float)
     for unit, probability in entered.items():
-        probabilities[tuple(corresponding[c][unit] if out else units[c] for c, out in enumerate(leaving))] += (
-            probability
-        )
+        after = tuple(corresponding[c][unit] if out else units[c] for c, out in enumerate(leaving))
+        probabilities[after] += probability
     return probabilities
 
 
@@ -273,8 +268,7 @@ class Transitions:
               move together, its table has such rows for every combination of the chains before it that move
 
     The weight of an arc is the product of its chains' probabilities of moving on or staying and of the probability of
-    the units entered. Its probability is this weight, divided by the sum over the arcs from the same joint state that
-    the mask leaves.
+    the units entered. Its probability is this weight by the sum over the arcs that the mask leaves to the same source.
     Source: Xie & Liu 2007, Eqs. 2, 17–19. Deviation: which unit follows is decided by the bigram, not by the tables.
     """
 
@@ -321,10 +315,8 @@ class Transitions:
                 share = (moved + old) / (np.bincount(rows, counts, len(old)) + 1)
                 shares.append(np.clip(share, MIN_ADVANCE, 1 - MIN_ADVANCE))
             return replace(self, advance=tuple(shares))
-        left: Array = np.bincount(self.product.arc_from, counts, len(self.product.joint_states)).astype(float)[
-            self.product.arc_from
-        ]
-        current = self
+        left: Array = np.bincount(self.product.arc_from, counts, len(self.product.joint_states)).astype(float)
+        left, current = left[self.product.arc_from], self
         for _ in range(MAX_SWEEPS):
             before = current.advance
             for chain in range(len(self.rows)):

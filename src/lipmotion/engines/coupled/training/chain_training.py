@@ -93,10 +93,8 @@ def split_evenly(product: Product, phones: Timeline[Unit], frames: int) -> Index
 
 def estimate_grammar(structure: Structure, data: Sequence[AlignedUtterance]) -> Grammar:
     """Return the bigrams, and the probabilities of the first unit, of every chain, from labels."""
-    sentences = [
-        [unit for unit, _, _ in list_unit_segments(structure, utterance.phones, utterance.observations.frames)]
-        for utterance in data
-    ]
+    segments = (list_unit_segments(structure, each.phones, each.observations.frames) for each in data)
+    sentences = [[unit for unit, _, _ in of_utterance] for of_utterance in segments]
     bigrams, initials = [], []
     for units, corresponding in zip(structure.units, structure.corresponding_units, strict=True):
         chain_sentences = [[units[corresponding[unit]] for unit in sentence] for sentence in sentences]
@@ -154,13 +152,11 @@ def e_step(chains: Chains, utterances: Sequence[LatticeUtterance], work: Checkpo
     sums = sum_statistics(_shard_sums, chains, shards, work)
     if not sums or not sums["frames"]:
         raise InputError(f"none of {len(utterances)} recordings has a path through the chains; check their labels")
-    emissions = tuple(
-        EmissionStatistics(
-            tuple(sums[f"products {number} {stream}"] for stream in group.streams), sums[f"occupancy {number}"]
-        )
-        for number, group in enumerate(chains.groups)
-    )
-    return ChainStatistics(emissions, sums["transitions"], float(sums["log likelihood"]), float(sums["frames"]))
+    emissions = []
+    for number, group in enumerate(chains.groups):
+        products = tuple(sums[f"products {number} {stream}"] for stream in group.streams)
+        emissions.append(EmissionStatistics(products, sums[f"occupancy {number}"]))
+    return ChainStatistics(tuple(emissions), sums["transitions"], float(sums["log likelihood"]), float(sums["frames"]))
 
 
 def m_step(
@@ -330,20 +326,15 @@ def _reestimate_along(
     statistics_of_paths = ChainStatistics(tuple(emission_statistics), arc_counts, 0.0, 1)
     chains = m_step(chains, statistics_of_paths, floors, streams=range(len(chains.streams)), transitions=False)
     transitions = transitions.reestimated(arc_counts)
-    structure = chains.structure
-    groups = tuple(
-        _with_borrowed_densities(
-            group, statistics.occupancy.sum(axis=0) > 0, structure, structure.chain_of(group.streams[0])
-        )
-        for group, statistics in zip(chains.groups, emission_statistics, strict=True)
-    )
-    return replace(chains, transitions=transitions, groups=groups), transitions
+    groups = []
+    for group, statistics in zip(chains.groups, emission_statistics, strict=True):
+        groups.append(_with_borrowed_densities(group, statistics.occupancy.sum(axis=0) > 0, chains.structure))
+    return replace(chains, transitions=transitions, groups=tuple(groups)), transitions
 
 
-def _with_borrowed_densities(
-    group: StreamGroup, learned: NDArray[np.bool_], structure: Structure, chain: int
-) -> StreamGroup:
+def _with_borrowed_densities(group: StreamGroup, learned: NDArray[np.bool_], structure: Structure) -> StreamGroup:
     """Return the group in which states that were not ``learned`` have the densities of the most similar unit."""
+    chain = structure.chain_of(group.streams[0])
     units, unit_set = structure.units[chain], structure.chains[chain]
     source = np.arange(len(learned))
     for state in np.flatnonzero(~learned):
