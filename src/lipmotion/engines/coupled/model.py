@@ -101,9 +101,7 @@ class CoupledConfig(Configuration):
         "follows": "acoustic_regression",
         "full_range": "variance_scaling",
     }
-    hints: ClassVar[Mapping[str, str]] = {
-        "units": 'there is a unit set for each chain; say --set chains="phone viseme", not --units'
-    }
+    hints: ClassVar[Mapping[str, str]] = {"units": 'each chain has its own; say --set chains="phone viseme"'}
 
     def check_files(self) -> None:  # noqa: D102
         self.structure_with(list_unit_sets(self.chains))
