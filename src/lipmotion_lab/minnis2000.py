@@ -19,15 +19,7 @@ from numpy.typing import NDArray
 from lipmotion.corpora import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.engines.selection.concatenation import Piece, to_pieces
-from lipmotion.engines.selection.costs import (
-    ABUTTING_JOIN,
-    JOIN_BEFORE,
-    MINNIS_2000,
-    Costs,
-    SelectionConfig,
-    Target,
-    select,
-)
+from lipmotion.engines.selection.costs import ABUTTING_JOIN, JOIN_BEFORE, Costs, SelectionConfig, Target, select
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.selection_training import build_target
@@ -133,7 +125,7 @@ def list_rows(*, guided: bool = True) -> dict[str, SelectionConfig]:
 
     guided : with the rows whose models learn from the sound, a guide or phones of the speaker's own
     """
-    printed = SelectionConfig.parsed(MINNIS_2000)
+    printed = SelectionConfig.parsed(SelectionConfig.presets["minnis2000"])
     configurations = {PRINTED: printed} | {
         name: replace(printed, **{key: getattr(SelectionConfig(), key) for key in keys})
         for name, keys in ADDITIONS.items()
@@ -186,7 +178,7 @@ def run_minnis2000(
         figures[split] = _measure_list(corpus, names, model, systems, checkpoint, part)
     about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": seconds}
     about |= {key: model.about[key] for key in ("utterances", "minutes")}
-    printed = vars(SelectionConfig.parsed(MINNIS_2000))
+    printed = vars(SelectionConfig.parsed(SelectionConfig.presets["minnis2000"]))
     about["rows"] = {
         name: {key: value for key, value in vars(config).items() if value != printed[key]}
         for name, config in systems.items()

@@ -3,14 +3,13 @@ import pytest
 
 from lipmotion import Corpus, Model, Selection, types
 from lipmotion.engines.coupled import engine, model
-from lipmotion.engines.coupled.chains.product import SYSTEMS
 from lipmotion.measures import curves
 from lipmotion.testing import examples
 from lipmotion_lab.evaluation.held_out import HeldOutRecordings, generate_clips, load_held_out
 from lipmotion_lab.xie_liu2007 import systems
 from pipeline.made import recogniser_of
 
-SMALL = SYSTEMS["ph-MSHMM"] | {"chains": "viseme", "states": 2}
+SMALL = systems.SYSTEMS["ph-MSHMM"] | {"chains": "viseme", "states": 2}
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +69,7 @@ def test_of_equal_trials_the_first_is_the_best():
 
 
 def test_options_are_told_where_they_are_not_those_printed():
-    for system, options in SYSTEMS.items():
+    for system, options in systems.SYSTEMS.items():
         changed = systems.list_changed_options(
             model.CoupledConfig(**options | {"audio_weight": 0.3, "unseen_loss": 3.0})
         )

@@ -8,13 +8,14 @@ from hypothesis import strategies as st
 
 from hmm.synthetic import known_hmm, random_hmm, recordings, speaker
 from lipmotion.hmm import align, model, network, unit_training
-from lipmotion.hmm.unit_training import accumulate_statistics, adapt_contexts, baum_welch, reestimate_states
+from lipmotion.hmm.unit_training import accumulate_statistics, adapt_contexts, reestimate_states
+from lipmotion.stats.em import run_em
 from oracles import paths
 
 
 def step(hmm, data, said):
     """Return the models after one step of Baum–Welch, and the mean log likelihood per frame before it."""
-    result = baum_welch(hmm, data, said)
+    result = run_em(hmm, lambda model: accumulate_statistics(model, data, said), reestimate_states, 1)
     return result.model, result.log_likelihoods[0]
 
 
@@ -112,8 +113,9 @@ def test_contexts_get_densities_where_there_are_frames_enough():
 
     def in_context(context_frames):
         given = replace(hmm, config=replace(hmm.config, context_frames=context_frames))
-        result = baum_welch(
-            unit_training.add_contexts(given, data, said), data, said, hmm.config.iterations, adapt_contexts
+        start = unit_training.add_contexts(given, data, said)
+        result = run_em(
+            start, lambda each: accumulate_statistics(each, data, said), adapt_contexts, given.config.iterations
         )
         return result.model, result.log_likelihoods
 

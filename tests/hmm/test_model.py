@@ -63,9 +63,7 @@ def test_states_depend_on_the_nearer_neighbour():
 def test_names_of_states_say_the_neighbour_that_counts():
     assert TABLE.names[:7] == ("sil.0", "sil.1", "sil.2", "sp.0", "b.0", "b.1", "b.2")  # unit by unit
     assert [TABLE.name("sil", "ih", "b", state) for state in range(3)] == ["ih.0<sil", "ih.1", "ih.2>b"]
-    assert [TABLE.neighbour("sil", "ih", "b", state) for state in range(3)] == ["sil", None, "b"]
     assert TABLE.side("sil", 2) == ""  # free units depend on none
-    assert TABLE.neighbour("b", "sil", "ih", 2) is None
     assert TABLE.name("b", "sil", "ih", 2) == "sil.2"
 
 

@@ -28,7 +28,7 @@ def stream_density(model, leaf, value, known) -> float:
 def log_density(hmm, observed, state, frame, weights) -> float:
     """Return the weighted sum of all streams' log densities of a state in its context."""
     total = 0.0
-    for name, weight in weights:
+    for name, weight in vars(weights).items():
         if weight and name in hmm.models and name in observed.streams:
             stream, model = observed.streams[name], hmm.models[name]
             leaf = model.forest.leaf(state)

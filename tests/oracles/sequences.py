@@ -40,7 +40,7 @@ def score(hmm, features, units, durations, silence: str = "sil") -> float:
     frame, lasting = 0, iter(durations)
     for position, unit in enumerate(units):
         for state in range(hmm.table.count(unit)):
-            neighbour = hmm.table.neighbour(neighbours[position], unit, neighbours[position + 2], state)
+            neighbour = neighbours[position + (2 if hmm.table.side(unit, state) == ">" else 0)]
             density, count = hmm.table.density(unit, state, neighbour), next(lasting)
             total += float(hmm.mixtures.log_likelihood(features[frame : frame + count])[:, density].sum())
             total += (count - 1) * hmm.stay(unit, state) + hmm.move(unit, state)

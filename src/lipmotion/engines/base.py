@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib import resources
 from typing import Any, ClassVar, Generic, Protocol, TypeVar, cast, runtime_checkable
 
 import numpy as np
@@ -28,6 +30,12 @@ from lipmotion.types import (
 
 ModelT = TypeVar("ModelT")
 Arrays = Mapping[str, NDArray[Any]]
+
+
+def read_presets(engine: str) -> dict[str, dict[str, Any]]:
+    """Return the options of each system of a paper, as printed (docs/papers), that is a preset of a built-in engine."""
+    presets = json.loads(resources.files(__package__).joinpath("presets.json").read_text("utf-8"))[engine]
+    return cast(dict[str, dict[str, Any]], presets)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,8 +178,7 @@ class SelectsRecordings(Protocol):
         """Return the pieces of recordings that say some phones best, and the phones with the sources of their units.
 
         units    : phones in time, from 0 s
-        features : acoustic features of every recording, by its name [each shape=(T, D)]; pieces
-            join where these agree
+        features : acoustic features of every recording, by its name [each shape=(T, D)]; pieces join where these agree
         Raises InputError: an unknown phone, or features of other recordings.
         """
 

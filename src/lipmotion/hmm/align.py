@@ -41,10 +41,11 @@ def expand_states(hmm: UnitHmm, units: Sequence[str]) -> StateSequence:
     neighbours = [silence, *(silence if unit in table.free else unit for unit in units), silence]
     names, densities, plain, positions = list[str](), list[int](), list[int](), list[int]()
     for i, unit in enumerate(units):
+        beside = {"<": neighbours[i], ">": neighbours[i + 2], "": ""}
         for state in range(table.count(unit)):
             names.append(table.name(neighbours[i], unit, neighbours[i + 2], state))
             plain.append(table.density(unit, state))
-            densities.append(table.density(unit, state, table.neighbour(neighbours[i], unit, neighbours[i + 2], state)))
+            densities.append(table.density(unit, state, beside[table.side(unit, state)]))
             positions.append(i)
     return StateSequence(tuple(names), *(np.array(numbers, np.intp) for numbers in (densities, plain, positions)))
 
@@ -75,8 +76,7 @@ class SpokenWord(NamedTuple):
 
     word    : its position in the transcript; -1 for silence and pauses
     variant : the number of the pronunciation
-    units   : those of the pronunciation, without the possible pauses in it that were not made; none where a possible
-              pause between words was not made
+    units   : those of the pronunciation, without pauses that were possible but not made
     """
 
     word: int
@@ -87,8 +87,7 @@ class SpokenWord(NamedTuple):
 class PlacedWord(NamedTuple):
     """A word or a silence as it was pronounced, and where.
 
-    fit    : by how much its states are less probable than the best of all states, the mean of its frames in nats, 0 or
-             less; NaN where it was not asked for
+    fit    : how its states compare with the best of all states, mean of its frames in nats, up to 0; NaN: not computed
     """
 
     spoken: SpokenWord
@@ -107,8 +106,7 @@ def place_words(
 
     words   : for each word, its possible pronunciations; a pause inside of one may be left out
     pause   : the unit that may stand between words; silence (the first free unit) surrounds them all
-    windows : of the words: the frames that each may have; a pause may have those of both words beside it; with windows
-              the fit is computed
+    windows : frames that each word may have, and a pause those of both words beside it; with them, fits are computed
     Only states without context are used: then the states of a pronunciation do not depend on the words beside it.
     Raises AlignmentError: the words do not fit into the frames, or into their windows.
     """

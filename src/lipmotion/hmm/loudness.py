@@ -49,9 +49,8 @@ def measure_levels(log_energy: NDArray[np.floating]) -> tuple[float, float]:
     smooth = smooth_level(log_energy)
     spoken = smooth > loud - NEAR_LOUD
     half = NOISE_FRAMES // 2
-    before, after = (
-        minimum_filter1d(smooth, half + 1, mode="nearest", origin=side) for side in (half // 2, -(half // 2))
-    )
+    sides = half // 2, -(half // 2)
+    before, after = (minimum_filter1d(smooth, half + 1, mode="nearest", origin=side) for side in sides)
     lowest = np.maximum(before, after)  # at the edge of another silence, the noise is that of the other side
     return loud, float(np.median(lowest[spoken])) if spoken.any() else loud
 

@@ -15,8 +15,6 @@ from lipmotion.stats.mixture import MIXTURES, Mixtures, mixtures_from_arrays
 from lipmotion.storage.schema import NEGATIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Configuration
 
-Neighbour = str | None  # the neighbouring unit that a state depends on; None: none
-
 
 @dataclass(frozen=True)
 class StateTable:
@@ -55,17 +53,11 @@ class StateTable:
         side = self.side(unit, state)
         return f"{unit}.{state}" + (side + {"<": left, ">": right}[side] if side else "")
 
-    def density(self, unit: str, state: int, neighbour: Neighbour = None) -> int:
+    def density(self, unit: str, state: int, neighbour: str = "") -> int:
         """Return the density of a state beside a neighbour, or the one without context where there is none for it."""
-        if neighbour is not None:
-            density = self._index.get(f"{unit}.{state}{self.side(unit, state)}{neighbour}")
-            if density is not None:
-                return density
-        return self._index[f"{unit}.{state}"]
-
-    def neighbour(self, left: str, unit: str, right: str, state: int) -> Neighbour:
-        """Return the neighbour that a state depends on."""
-        return {"<": left, ">": right, "": None}[self.side(unit, state)]
+        plain = f"{unit}.{state}"
+        in_context = f"{plain}{self.side(unit, state)}{neighbour}" if neighbour else plain
+        return self._index.get(in_context, self._index[plain])
 
     def parents(self) -> NDArray[np.intp]:
         """Return the density without context of the same state, for every density [shape=(G,)]."""

@@ -97,8 +97,7 @@ class Network(NetworkArrays):
         path, score = best_path(log_emission, frames, self, windows)
         if not np.isfinite(score):
             raise AlignmentError(
-                f"no path through {len(self.emission)} states in {frames} frames of 10 ms: "
-                "the recording is too short for what should be said in it"
+                f"no path through {len(self.emission)} states in {frames} frames of 10 ms: the recording is too short"
             )
         return path
 
@@ -208,7 +207,10 @@ def build_loop(
             nodes[unit].append(_StateNodes(left, right, np.array(numbers, np.intp)))
             owners += [unit] * nodes[unit][-1].numbers.size
         for stay, (source, target) in zip(log_stay[unit], pairwise(nodes[unit]), strict=False):
-            _advance(builder, source, target, float(np.log(-np.expm1(stay))))
+            move = float(np.log(-np.expm1(stay)))
+            for left, left_after in set(zip(source.left.tolist(), target.left.tolist(), strict=True)):
+                for right, right_after in set(zip(source.right.tolist(), target.right.tolist(), strict=True)):
+                    builder.arc(int(source.numbers[left, right]), int(target.numbers[left_after, right_after]), move)
     for unit in densities:
         first, last = nodes[unit][0], nodes[unit][-1]
         for following in densities:
@@ -228,13 +230,6 @@ def _classify(rows: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the class of every row: those of equal rows are the same [shape=(N,)]."""
     classes = dict[bytes, int]()  # many times faster than ``np.unique`` of rows
     return np.array([classes.setdefault(row.tobytes(), len(classes)) for row in rows], np.intp)
-
-
-def _advance(builder: NetworkBuilder, source: _StateNodes, target: _StateNodes, log_move: float) -> None:
-    """Join two successive states: left neighbours that the second tells apart, and right ones that the first did."""
-    for left, left_after in set(zip(source.left.tolist(), target.left.tolist(), strict=True)):
-        for right, right_after in set(zip(source.right.tolist(), target.right.tolist(), strict=True)):
-            builder.arc(int(source.numbers[left, right]), int(target.numbers[left_after, right_after]), log_move)
 
 
 def build_unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:

@@ -18,7 +18,7 @@ from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_from_arrays, hmm_to_arra
 from lipmotion.hmm.network import compute_log_likelihoods
 from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors
 from lipmotion.stats.bigram import estimate_bigram
-from lipmotion.stats.em import EmResult, Sums, no_report, run_em, sum_statistics
+from lipmotion.stats.em import Sums, run_em, sum_statistics
 from lipmotion.stats.mixture import Mixtures, with_squares
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Monitor, Progress
@@ -30,8 +30,6 @@ MIN_POSTERIOR = 1e-3  # smaller state posteriors are left out of the statistics 
 LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES = 200.0, 12.0
 """Largest mean duration, in frames, of a state of silence, and of a state of any other unit. Without the second limit
 the closure of a stop that begins every other sentence absorbs the silence before it."""
-AfterStep = Callable[[int, UnitHmm, "UnitStatistics"], None]
-"""Called after every EM step with its number, the new models, and the statistics that they were estimated from."""
 Maximise = Callable[[UnitHmm, "UnitStatistics"], UnitHmm]
 
 
@@ -57,25 +55,6 @@ def adapt_contexts(model: UnitHmm, statistics: UnitStatistics) -> UnitHmm:
     return replace(model, mixtures=mixtures)
 
 
-def baum_welch(
-    hmm: UnitHmm,
-    data: Sequence[NDArray[np.float32]],
-    sequences: Sequence[tuple[str, ...]],
-    steps: int = 1,
-    maximise: Maximise = reestimate_states,
-    after_step: AfterStep = no_report,
-    work: Checkpoint = NO_CHECKPOINT,
-) -> EmResult[UnitHmm, UnitStatistics]:
-    """Take some steps of embedded Baum–Welch.
-
-    data      : features of every utterance [shape=(T, D)]
-    sequences : the units spoken in each; an utterance too short for its units is left out
-    maximise  : the M-step: ``reestimate_states`` or ``adapt_contexts``
-    work      : as of ``sum_statistics``
-    """
-    return run_em(hmm, lambda model: accumulate_statistics(model, data, sequences, work), maximise, steps, after_step)
-
-
 def reestimate_mixtures(hmm: UnitHmm, statistics: UnitStatistics) -> Mixtures:
     """Return the densities re-estimated (M-step); with less than one frame of data they stay."""
     mixtures = hmm.mixtures.copy()
@@ -92,11 +71,16 @@ def accumulate_statistics(
     sequences: Sequence[tuple[str, ...]],
     work: Checkpoint = NO_CHECKPOINT,
 ) -> UnitStatistics:
-    """Return the sufficient statistics of utterances for every state (the E-step). Parameters as ``baum_welch``."""
+    """Return the sufficient statistics of utterances for every state (the E-step of embedded Baum–Welch).
+
+    data      : features of every utterance [shape=(T, D)]
+    sequences : the units spoken in each; an utterance too short for its units is left out
+    work      : as of ``sum_statistics``
+    """
     states = [sum(hmm.table.count(unit) for unit in sequence) for sequence in sequences]
     batches = group_by_length([len(x) for x in data], states)
     shards = [([data[i] for i in batch], [sequences[i] for i in batch]) for batch in batches]
-    return sum_unit_statistics(sum_statistics(_shard_sums, hmm, shards, work))
+    return UnitStatistics(**sum_statistics(_shard_sums, hmm, shards, work))
 
 
 def _shard_sums(job: tuple[UnitHmm, tuple[list[NDArray[np.float32]], list[tuple[str, ...]]]]) -> Sums:
@@ -109,8 +93,8 @@ def _shard_sums(job: tuple[UnitHmm, tuple[list[NDArray[np.float32]], list[tuple[
     posteriors = infer_chains(log_emissions, [hmm.log_stay[chain.plain] for chain in chains])
     log_likelihood = np.array([each.log_likelihood for each in posteriors])
     possible, frames = log_likelihood > LOG_ZERO / 2, np.array([len(x) for x in data])
-    total = {"log likelihood": log_likelihood[possible].sum(), "frames": frames[possible].sum()}
-    return {**add_up(hmm, data, chains, [(each.states, each.stay) for each in posteriors]), **total}
+    total = {"log_likelihood": log_likelihood[possible].sum(), "frames": frames[possible].sum()}
+    return {**_add_up(hmm, data, chains, posteriors), **total}
 
 
 class StatePosteriors(NamedTuple):
@@ -137,19 +121,16 @@ def infer_chains(
     ]
 
 
-def add_up(
+def _add_up(
     hmm: UnitHmm,
     data: Sequence[NDArray[np.float32]],
     chains: Sequence[StateSequence],
-    posteriors: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]],
+    posteriors: Sequence[StatePosteriors],
 ) -> Sums:
-    """Return the sums of ``UnitStatistics`` over utterances, without their likelihood.
-
-    posteriors : of each, those of its states [shape=(T, S)], and expected transitions to themselves [shape=(S,)]
-    """
+    """Return the sums of ``UnitStatistics`` over utterances, without their likelihood."""
     stays, occupied = np.zeros((2, len(hmm.log_stay)))
     pairs = []
-    for x, chain, (posterior, stay) in zip(data, chains, posteriors, strict=True):
+    for x, chain, (posterior, stay, _) in zip(data, chains, posteriors, strict=True):
         np.add.at(stays, chain.plain, stay)
         np.add.at(occupied, chain.plain, posterior.sum(axis=0))
         frame, state = np.nonzero(posterior > MIN_POSTERIOR)
@@ -186,30 +167,25 @@ class UnitStatistics:
     stay, occupied : [shape=(R,)], expected transitions of every state without context to itself, and its frames
     components     : of every density [shape=(G, M, 2 D + 1)], as of ``Mixtures.component_sums``
     features       : of all frames [shape=(2 D + 1,)], alike
+    log_likelihood, frames : of the utterances that have a path
     """
 
     stay: NDArray[np.float64]
     occupied: NDArray[np.float64]
     components: NDArray[np.float64]
     features: NDArray[np.float64]
-    log_likelihood: float = 0.0
-    frames: int = 0
+    log_likelihood: NDArray[np.float64] | float = 0.0
+    frames: NDArray[np.intp] | int = 0
 
     @property
     def mean_log_likelihood(self) -> float:
         """Mean log likelihood per frame."""
-        return self.log_likelihood / max(self.frames, 1)
+        return float(self.log_likelihood) / max(int(self.frames), 1)
 
     @property
     def frames_of_densities(self) -> NDArray[np.float64]:
         """Expected frames of every density [shape=(G,)]."""
         return self.components[:, :, -1].sum(axis=1)
-
-
-def sum_unit_statistics(sums: Sums) -> UnitStatistics:
-    """Return sums by name as statistics."""
-    total = float(sums.get("log likelihood", 0.0)), int(sums.get("frames", 0))
-    return UnitStatistics(sums["stay"], sums["occupied"], sums["components"], sums["features"], *total)
 
 
 def limit_stay(units: Iterable[str], free: Collection[str]) -> NDArray[np.float64]:
@@ -270,8 +246,7 @@ def train_hmm(
             sequences.append(sequence)
     if not usable:
         raise CorpusError(
-            f"none of {len(utterances)} utterances has a transcript that fits into its recording; "
-            "check that transcripts and recordings belong together"
+            f"none of {len(utterances)} utterances has a transcript that fits into its recording; check that they match"
         )
     return _Training(usable, sequences, inventory, config, monitor, checkpoint).run()
 
@@ -353,7 +328,10 @@ class _Training:
                 self._hmm = hmm
                 self._report(stage, statistics.mean_log_likelihood)
 
-            baum_welch(self._hmm, self._data, self._sequences, steps, stage.maximise, after_step, self._checkpoint)
+            run_em(self._hmm, self._expect, stage.maximise, steps, after_step)
+
+    def _expect(self, hmm: UnitHmm) -> UnitStatistics:
+        return accumulate_statistics(hmm, self._data, self._sequences, self._checkpoint)
 
     def _report(self, stage: _Stage, figure: float | None) -> None:
         self._done += 1
@@ -373,9 +351,8 @@ class _Training:
         self._choose_pronunciations()
 
     def _choose_pronunciations(self) -> None:
-        blocks = (
-            slice(start, start + UTTERANCES_PER_BLOCK) for start in range(0, len(self._data), UTTERANCES_PER_BLOCK)
-        )
+        starts = range(0, len(self._data), UTTERANCES_PER_BLOCK)
+        blocks = (slice(start, start + UTTERANCES_PER_BLOCK) for start in starts)
         jobs = ((self._hmm, self._utterances[block], self._sequences[block]) for block in blocks)
         chosen = self._checkpoint.parallel_map(partial(_choose_sequences, pause=self._inventory.pause), jobs)
         self._sequences = [units for sequences in chosen for units in sequences]
@@ -388,9 +365,8 @@ class _Training:
         spoken = [tuple(silence if unit == pause else unit for unit in units) for units in self._sequences]
         typical_fit = float(np.mean([self._hmm.fit(x) for x in self._data]))
         bigram = estimate_bigram(self._hmm.table.units, spoken)
-        self._hmm = add_contexts(
-            replace(self._hmm, bigram=bigram, typical_fit=typical_fit), self._data, self._sequences
-        )
+        hmm = replace(self._hmm, bigram=bigram, typical_fit=typical_fit)
+        self._hmm = add_contexts(hmm, self._data, self._sequences)
         return len(self._hmm.table.names) - len(self._hmm.log_stay)
 
 
@@ -446,8 +422,8 @@ def _make_flat_start(
         tail = len(energy) - offset
         path[offset:] = silence + speech + np.arange(tail) * (len(chain.plain) - silence - speech) // max(tail, 1)
         posterior[np.arange(len(x)), path] = 1
-        posteriors.append((posterior, np.zeros(len(chain.plain))))
-    return replace(hmm, mixtures=reestimate_mixtures(hmm, sum_unit_statistics(add_up(hmm, data, chains, posteriors))))
+        posteriors.append(StatePosteriors(posterior, np.zeros(len(chain.plain)), 0.0))
+    return replace(hmm, mixtures=reestimate_mixtures(hmm, UnitStatistics(**_add_up(hmm, data, chains, posteriors))))
 
 
 def add_contexts(hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]]) -> UnitHmm:

@@ -99,12 +99,8 @@ def _order_states(states: int, groups: _Groups, source: Index, target: Index) ->
 def _fill_blocks(groups: _Groups, arc_from: Index, place: Index) -> tuple[Index, Index, Index]:
     total = sum(len(arcs) for _, arcs in groups)
     widest = max((-(-len(targets) // PADDING_ROWS) * PADDING_ROWS for targets, _ in groups), default=PADDING_ROWS)
-    blocks, sources, matrix = (
-        np.empty((len(groups), 4), np.intp),
-        np.empty(total, np.intp),
-        np.full((total, widest), -1),
-    )
-    first = 0
+    blocks, sources = np.empty((len(groups), 4), np.intp), np.empty(total, np.intp)
+    matrix, first = np.full((total, widest), -1), 0
     for number, (targets, arcs) in enumerate(groups):
         blocks[number] = place[targets[0]], len(targets), first, len(arcs)
         sources[first : first + len(arcs)] = place[arc_from[arcs[:, 0]]]

@@ -83,16 +83,14 @@ def solve(bands: Bands) -> tuple[Array, Array]:
     if pays(len(bands[0])):
         return _solve(*bands)
     shape = bands[0].shape
+    # the numbers of a single channel cost a twentieth of arrays
     rows = (diagonal[:, 0].tolist() if shape[1] == 1 else list(diagonal) for diagonal in bands)
     values, variance = _back_substitute(*_eliminate_rows(*rows))
     return values.reshape(shape), variance.reshape(shape)
 
 
 def _eliminate_rows(main: Rows, first: Rows, second: Rows, right: Rows) -> tuple[Rows, Rows, Rows, Rows]:
-    """Return 1 / D and both diagonals of L of the factorisation LDLᵀ, and L⁻¹ times the right-hand side.
-
-    Rows are arrays of all channels, or the numbers of a single one: these cost a twentieth.
-    """
+    """Return 1 / D and both diagonals of L of the factorisation LDLᵀ, and L⁻¹ times the right-hand side."""
     inverse, lower1, lower2, x = Rows(), Rows(), Rows(), Rows()
     near = far = next_far = l1 = l2 = earlier_l2 = x1 = x2 = 0.0
     for diagonal, below, two_below, wanted in zip(main, first, second, right, strict=True):
@@ -130,7 +128,21 @@ def _generate(mean: Array, precision: Array) -> tuple[Array, Array]:
     bands = np.empty((4, 1, P))
     main, first, second, right = bands
     for t in range(T):
-        _assemble(mean, precision, t, bands)
+        before, after = max(t - 1, 0), min(t + 1, T - 1)
+        inner = 1.0 if 0 < t < T - 1 else 0.0  # Δ and Δ² of the first and last frame have no weight
+        has_before = 1.0 if t > 1 else 0.0
+        has_after = 1.0 if t + 2 < T else 0.0
+        for c in range(P):
+            p0, p2 = precision[t, 0, c], precision[t, 2, c] * inner
+            p1_before, p2_before = precision[before, 1, c] * has_before, precision[before, 2, c] * has_before
+            p1_after, p2_after = precision[after, 1, c] * has_after, precision[after, 2, c] * has_after
+            w1_before, w2_before = p1_before * mean[before, 1, c], p2_before * mean[before, 2, c]
+            w1_after, w2_after = p1_after * mean[after, 1, c], p2_after * mean[after, 2, c]
+            bands[0, 0, c] = p0 + 4 * p2 + (0.25 * p1_before + p2_before) + (0.25 * p1_after + p2_after)
+            bands[1, 0, c] = -2 * (p2 + p2_after)
+            bands[2, 0, c] = p2_after - 0.25 * p1_after
+            plain = p0 * mean[t, 0, c] - 2 * (p2 * mean[t, 2, c])
+            bands[3, 0, c] = plain + (0.5 * w1_before + w2_before) + (-0.5 * w1_after + w2_after)
         _eliminate(main, first, second, right, 0, t, values, variance, lower1, lower2, previous)
     _substitute(values, variance, lower1, lower2, previous)
     return values[2 : T + 2], variance[2 : T + 2]
@@ -148,41 +160,14 @@ def _solve(main: Array, first: Array, second: Array, right: Array) -> tuple[Arra
 
 @compiled
 def _room(T: int, P: int) -> tuple[Array, Array, Array, Array, Array]:
-    """Return empty arrays for the solution, the variance and both diagonals of L [shapes=(T + 4, P)], with row t at
-    t + 2 between rows of zeros, and zeros for values of the rows before [shape=(3, P)].
-
-    Until ``_substitute``, the solution holds L⁻¹ times the right-hand side, and the variance 1 / D.
+    """Return arrays for the solution (until ``_substitute``: L⁻¹ times the right-hand side), the variance (until then:
+    1 / D) and both diagonals of L, with row t at t + 2 between rows of zeros, and zeros for values of the rows before.
     """
-    values, variance, lower1, lower2 = (
-        np.empty((T + 4, P)),
-        np.empty((T + 4, P)),
-        np.empty((T + 4, P)),
-        np.empty((T + 4, P)),
-    )
+    values, variance = np.empty((T + 4, P)), np.empty((T + 4, P))
+    lower1, lower2 = np.empty((T + 4, P)), np.empty((T + 4, P))
     for row in (0, 1, T + 2, T + 3):
         values[row], variance[row], lower1[row], lower2[row] = 0, 0, 0, 0
     return values, variance, lower1, lower2, np.zeros((3, P))
-
-
-@compiled
-def _assemble(mean: Array, precision: Array, t: int, bands: Array) -> None:
-    """Fill in one row of the normal equations; Δ and Δ² of the first and last frame have no weight."""
-    T = len(mean)
-    before, after = max(t - 1, 0), min(t + 1, T - 1)
-    inner = 1.0 if 0 < t < T - 1 else 0.0
-    has_before = 1.0 if t > 1 else 0.0
-    has_after = 1.0 if t + 2 < T else 0.0
-    for c in range(mean.shape[2]):
-        p0, p2 = precision[t, 0, c], precision[t, 2, c] * inner
-        p1_before, p2_before = precision[before, 1, c] * has_before, precision[before, 2, c] * has_before
-        p1_after, p2_after = precision[after, 1, c] * has_after, precision[after, 2, c] * has_after
-        w1_before, w2_before = p1_before * mean[before, 1, c], p2_before * mean[before, 2, c]
-        w1_after, w2_after = p1_after * mean[after, 1, c], p2_after * mean[after, 2, c]
-        bands[0, 0, c] = p0 + 4 * p2 + (0.25 * p1_before + p2_before) + (0.25 * p1_after + p2_after)
-        bands[1, 0, c] = -2 * (p2 + p2_after)
-        bands[2, 0, c] = p2_after - 0.25 * p1_after
-        plain = p0 * mean[t, 0, c] - 2 * (p2 * mean[t, 2, c])
-        bands[3, 0, c] = plain + (0.5 * w1_before + w2_before) + (-0.5 * w1_after + w2_after)
 
 
 @compiled

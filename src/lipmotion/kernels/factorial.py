@@ -76,14 +76,12 @@ def infer_factorial(
 ) -> FactorialPosteriors:
     """Return the posteriors and expected counts of a recording in two loops.
 
-    stretch : frames whose forward probabilities are stored at once; those of the others are computed twice;
-        None: √T, or as many as ``ROOM_BYTES`` hold
+    stretch : frames whose forward probabilities are stored at once, others are computed twice; None: √T, or what fits
     Log densities in single precision are processed in single precision where that loses nothing, which takes half the
     time. Where few joint states are possible, or double precision may lose paths that count, because they were some 250
     nats below a frame's best, the recording is processed in logarithms.
     Source: Ghahramani & Jordan (1997), "Factorial hidden Markov models", appendix B. Forward and backward probabilities
-    are raised to a least one, never set to 0, and so are upper bounds; how much may come of that follows from the
-    overlap of both in each frame.
+    are raised to a least one, so they are upper bounds; how much comes of that follows from their overlap in a frame.
     Cost: time O(T·Na·Nv·(Ua + Uv)), memory O(stretch + T/stretch) times Na·Nv.
     """
     order = np.lexsort(logs.pairs.T[::-1])
@@ -101,37 +99,26 @@ def infer_factorial(
     results = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
     result = next((each for each in results if each is not None), None)
     if result is None:  # there is no path
-        first, second = (
-            LoopCounts(*map(np.zeros_like, (loop.stay, loop.onward, loop.enter))) for loop in (audio, visual)
-        )
+        loops = ((loop.stay, loop.onward, loop.enter) for loop in (audio, visual))
+        first, second = (LoopCounts(*map(np.zeros_like, parts)) for parts in loops)
         in_audio, in_visual, in_pairs = (np.zeros(log.shape) for log in logs[:3])
         return FactorialPosteriors(in_audio, in_visual, in_pairs, first, second, -np.inf)
     return result._replace(pair=result.pair[:, np.argsort(order)])
 
 
-class _Frame(NamedTuple):
-    """Posteriors of a frame.
+class _StepBack(NamedTuple):
+    """The result of a step back to the frame before.
 
-    audio, visual, pair : [shapes=(Na,), (Nv,), (P,)], of the states of each loop, and of joint states of their own
-    log_overlap         : the logarithm of the sum of forward times backward probabilities, as a share of the product of
-        both wholes
+    audio, visual, pair : [shapes=(Na,), (Nv,), (P,)], posteriors of the states of each loop, and of pairs
+    log_overlap : log of the sum of forward times backward probabilities, as a share of the product of both wholes
+    backward : its backward probabilities times densities [shape=(Na, Nv)]
+    audio_entered, visual_entered : [shapes=(U, U)], expected numbers of transitions by the transition's probability
     """
 
     audio: Double
     visual: Double
     pair: Double
     log_overlap: float
-
-
-class _StepBack(NamedTuple):
-    """The result of a step back to the frame before.
-
-    backward : its backward probabilities times densities [shape=(Na, Nv)]
-    audio_entered, visual_entered : [shapes=(U, U)], expected number of transitions from each unit to each, divided by
-        the probability of the transition
-    """
-
-    frame: _Frame
     backward: Array
     audio_entered: Array
     visual_entered: Array
@@ -161,14 +148,14 @@ def _forward_backward(
         for t in range(start + len(forward) - 1, start - 1, -1):
             before = forward[t - start][0]
             step = way.end(before) if t == last else way.back(before, backward, leaving, t)
-            if not step.frame.log_overlap > way.min_log_overlap:
+            if not step.log_overlap > way.min_log_overlap:
                 return None
             if t == last:
-                log_likelihood += step.frame.log_overlap
+                log_likelihood += step.log_overlap
             backward, leaving = step.backward, forward[t - start][1]
-            for part, values in zip(posteriors, step.frame[:3], strict=True):
+            for part, values in zip(posteriors, step[:3], strict=True):
                 part[t] = values
-            entered = [part + more for part, more in zip(entered, step[2:], strict=True)]
+            entered = [part + more for part, more in zip(entered, step[-2:], strict=True)]
     counts = [_counted(*parts) for parts in zip(loops, posteriors[:2], entered, strict=True)]
     for part in (*posteriors, *counts[0], *counts[1]):
         part[part < MIN_POSTERIOR] = 0
@@ -218,9 +205,10 @@ class _Scaled:
         return log_total
 
     def end(self, before: Array) -> _StepBack:
-        frame = _frame(np.log(before.astype(np.float64)), self.final, self.logs.pairs, self.whole)
         backward, log = self._shares(self.final + self.logs.joint(len(self.logs.audio) - 1))
-        return _StepBack(frame if log > -math.inf else frame._replace(log_overlap=-math.inf), backward, *_NONE)
+        frame = _frame(np.log(before.astype(np.float64)), self.final, self.logs.pairs, self.whole)
+        step = _StepBack(*frame, backward, *_NONE)
+        return step if log > -math.inf else step._replace(log_overlap=-math.inf)
 
     def back(self, before: Array, backward: Array, leaving: Array, t: int) -> _StepBack:
         """Return the result of a step back to frame ``t``.
@@ -240,8 +228,9 @@ class _Scaled:
         enough = met > 0 and total > MIN_TOTAL[self.kind]
         scale = np.float64(1 / met if enough else 0.0)
         log_overlap = math.log(met) - 2 * math.log(self.whole) if enough else -math.inf
-        frame = _Frame(sums[0] * scale, sums[1] * scale, sums[2] * scale, log_overlap)
-        return _StepBack(frame, after, scale * (before[-units:] @ moved[:units].T), scale * (leaving.T @ first))
+        audio, visual, pair = (part * scale for part in sums)
+        entered = scale * (before[-units:] @ moved[:units].T), scale * (leaving.T @ first)
+        return _StepBack(audio, visual, pair, log_overlap, after, *entered)
 
     def _shares(self, joint: Double) -> tuple[Array, float]:
         """Return probabilities, scaled, and the log of their sum before, from log probabilities."""
@@ -287,7 +276,7 @@ class _InLogs:
 
     def end(self, before: Array) -> _StepBack:
         last = self.logs.joint(len(self.logs.audio) - 1)
-        return _StepBack(_frame(before, self.final, self.logs.pairs), self.final + last, *_NONE)
+        return _StepBack(*_frame(before, self.final, self.logs.pairs), self.final + last, *_NONE)
 
     def back(self, before: Array, backward: Array, leaving: Array, t: int) -> _StepBack:
         units_audio, units_visual = len(self.audio.leaving), len(self.visual.leaving)
@@ -295,16 +284,14 @@ class _InLogs:
         moved = self.visual_back.forward(backward.T[::-1], np.ones(backward.shape[1], bool))[::-1].T
         beta = self.audio_back.forward(moved[::-1], possible)[::-1]
         frame = _frame(before, beta, self.logs.pairs)
-        of_audio = _count_entered(before[-units_audio:], moved[:units_audio], frame.log_overlap)
-        of_visual = _count_entered(leaving.T, backward[:, :units_visual].T, frame.log_overlap)
-        return _StepBack(frame, beta + self.logs.joint(t), of_audio, of_visual)
+        of_audio = _count_entered(before[-units_audio:], moved[:units_audio], frame[3])
+        of_visual = _count_entered(leaving.T, backward[:, :units_visual].T, frame[3])
+        return _StepBack(*frame, beta + self.logs.joint(t), of_audio, of_visual)
 
 
 @compiled
 def _meet_in_logs(before: Double, beta: Double, pairs: Index) -> tuple[Double, Double, Double, float, float]:
-    """Return the sums of the products of probabilities [shapes=(N, M)] along both axes, and those of pairs, relative to
-    the greatest; its logarithm; and the sum of all.
-    """
+    """Return sums of the products along both axes, products of pairs, the greatest's logarithm, and the sum of all."""
     audio, visual, pair = np.zeros(before.shape[0]), np.zeros(before.shape[1]), np.zeros(len(pairs))
     best, total = -np.inf, 0.0
     for i in range(len(before)):
@@ -339,11 +326,11 @@ def _count_entered(last: Array, first: Array, log_overlap: float) -> Double:
 _NONE = np.zeros(()), np.zeros(())  # expected transitions out of the last frame
 
 
-def _frame(before: Double, beta: Double, pairs: Index, whole: float = 1.0) -> _Frame:
-    """Return the posteriors of a frame from logarithms of forward (of sum ``whole``) and backward probabilities."""
+def _frame(before: Double, beta: Double, pairs: Index, whole: float = 1.0) -> tuple[Double, Double, Double, float]:
+    """Return posteriors and log overlap of a frame from logarithms of forward (of sum ``whole``) and backward."""
     audio, visual, pair, best, total = _meet_in_logs(before, beta, pairs)
     log_overlap, whole = (best + math.log(total / whole), total) if total else (-math.inf, 1.0)
-    return _Frame(audio / whole, visual / whole, pair / whole, log_overlap)
+    return audio / whole, visual / whole, pair / whole, log_overlap
 
 
 def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:
@@ -389,12 +376,10 @@ def _forward(
     density_0: Array, density_1: Array, pair: Array, pair_0: Index, pair_1: Index, floor: float, whole: float,
     after: Array,
 ) -> float:  # fmt: skip
-    """Fill in joint probabilities one frame on along both axes, times densities, normalised; return their sum before
-    as a share of the whole.
+    """Fill in joint probabilities one frame on along both axes, times densities, normalised; return their sum before.
 
     entering_0, entering_1 : [shapes=(U, M), (N, U)], probabilities of entering the first states
     pair, pair_0, pair_1 : the densities of pairs, and the two states of each, sorted by the first
-    floor : smaller products are set to 0
     """
     moved, prior = np.empty(before.shape[1], before.dtype), np.empty(before.shape[1], before.dtype)
     total, p = np.float64(0), 0
@@ -414,12 +399,10 @@ def _backward(
     density_0: Array, density_1: Array, pair: Array, pair_0: Index, pair_1: Index, floor: float, whole: float,
     after: Array, posterior_0: Array, posterior_1: Array, posterior_pair: Array,
 ) -> float:  # fmt: skip
-    """Fill in backward probabilities times densities, normalised, and posteriors, not normalised; return the sum of the
-    former before, as a share of the whole.
+    """Fill in posteriors, not normalised, and backward probabilities times densities, normalised; return their sum.
 
-    before : forward probabilities
-    moved  : backward probabilities that were moved back along axis 1; they are moved along axis 0 here
-    left   : [shape=(U, M)], those of leaving the last states
+    moved : backward probabilities that were moved back along axis 1; they are moved along axis 0 here
+    left  : [shape=(U, M)], those of leaving the last states
     """
     beta = np.empty(before.shape[1], before.dtype)
     units, total, p = len(left), np.float64(0), 0

@@ -74,9 +74,8 @@ class FactorialLogLikelihoods(NamedTuple):
         tops = [log.max(axis=1, initial=-np.inf).astype(np.float64) for log in logs]
         top_audio, top_visual = (np.where(np.isfinite(top), top, 0) for top in tops[:2])
         best = np.maximum(top_audio + top_visual, tops[2])
-        audio, visual, pair = (
-            np.exp(log - top[:, None]) for log, top in zip(logs, (top_audio, best - top_audio, best), strict=True)
-        )
+        bounds = zip(logs, (top_audio, best - top_audio, best), strict=True)
+        audio, visual, pair = (np.exp(log - top[:, None]) for log, top in bounds)
         return [FrameDensity(*rows) for rows in zip(audio, visual, pair, best.tolist(), strict=True)]
 
 
@@ -123,9 +122,7 @@ class LogTransitions(NamedTuple):
         return LogTransitions(*map(np.ascontiguousarray, parts))
 
     def best_forward(self, score: Array) -> tuple[Array, NDArray[Any]]:
-        """Return the best scores a frame on, along axis 0, and decisions: U for staying, U + 1 for the next, else the
-        unit left.
-        """
+        """Return the best scores a frame on, along axis 0, and decisions: U to stay, U + 1 to go on, or a unit left."""
         units = len(self.leaving)
         after = score + self.stay[:, None]
         decision = np.full(score.shape, units, np.min_scalar_type(units + 1))
@@ -162,8 +159,7 @@ def find_factorial_path(
 ) -> tuple[Index, Index, float]:
     """Return the most probable states of both loops [shapes=(T,)], and the log probability of path and recording.
 
-    stretch : frames whose decisions are stored at once; those of the others are computed twice; None: as
-        ``infer_factorial``
+    stretch : frames whose decisions are stored at once; others are computed twice; None: as ``infer_factorial``
     Where there is no path: states 0, and -inf.  Of equally probable paths, any one.
     Source: the Viterbi recursion, along one loop's axis and then along the other's.
     Cost: time O(T·Na·Nv·(Ua + Uv)), memory O(stretch + T/stretch) times Na·Nv.
@@ -207,13 +203,7 @@ def find_factorial_path(
 
 @compiled
 def _take_best_entering(last: Array, leaving: Array, score: Array, decision: Array) -> None:
-    """Replace the log scores of first states by those of the best transition from a last state, where that is greater,
-    and their decisions by the unit that is left.
-
-    last     : log scores of the last states [shape=(U, M)]
-    leaving  : log probabilities of the transitions from them to the first states [shape=(U, U)]
-    score, decision : of the first states [shapes=(U, M)]
-    """
+    """Replace scores and decisions of first states [shapes=(U, M)] where leaving a last state [(U, M)] is better."""
     for i in range(len(score)):
         best, unit = score[i], decision[i]
         for u in range(len(last)):

@@ -94,45 +94,29 @@ def _chains(
     log_likelihood = np.empty(len(frames))
     for u in range(len(frames)):
         T, S = frames[u], states[u]
-        emission = log_emission[:T, u, :S]
-        alpha, log_stays = posterior[:T, u, :S], stays[:T, u, :S]
-        _forward(emission, log_stay[u], log_move[u], alpha)
-        log_likelihood[u] = alpha[T - 1, S - 1] + log_move[u, S - 1]
-        _backward(emission, log_stay[u], log_move[u], alpha, log_stays, log_likelihood[u])
+        emission, stay, move = log_emission[:T, u, :S], log_stay[u], log_move[u]
+        alpha = posterior[:T, u, :S]  # forward scores, from which posteriors are made in place
+        alpha[0, 0] = emission[0, 0]
+        for t in range(1, T):
+            alpha[t, 0] = max(alpha[t - 1, 0] + stay[0] + emission[t, 0], LOG_ZERO)
+            for s in range(1, S):
+                arrive = _log_sum(alpha[t - 1, s] + stay[s], alpha[t - 1, s - 1] + move[s - 1])
+                alpha[t, s] = max(arrive + emission[t, s], LOG_ZERO)
+        total = log_likelihood[u] = alpha[T - 1, S - 1] + move[S - 1]
+        beta, onward = np.full(S, LOG_ZERO), np.empty(S)
+        beta[S - 1] = move[S - 1]
+        for t in range(T - 1, -1, -1):
+            if t + 1 < T:
+                for s in range(S):
+                    onward[s] = emission[t + 1, s] + beta[s]
+                for s in range(S):
+                    keep = stay[s] + onward[s]
+                    stays[t, u, s] = alpha[t, s] + keep - total
+                    reach = _log_sum(keep, move[s] + onward[s + 1]) if s + 1 < S else keep
+                    beta[s] = max(reach, LOG_ZERO)
+            for s in range(S):
+                alpha[t, s] = alpha[t, s] + beta[s] - total
     return posterior, stays, log_likelihood
-
-
-@compiled
-def _forward(log_emission: Array, log_stay: Array, log_move: Array, alpha: Array) -> None:
-    """Fill in the forward scores [shape=(T, S)]."""
-    alpha[0, 0] = log_emission[0, 0]
-    for t in range(1, len(alpha)):
-        alpha[t, 0] = max(alpha[t - 1, 0] + log_stay[0] + log_emission[t, 0], LOG_ZERO)
-        for s in range(1, alpha.shape[1]):
-            arrive = _log_sum(alpha[t - 1, s] + log_stay[s], alpha[t - 1, s - 1] + log_move[s - 1])
-            alpha[t, s] = max(arrive + log_emission[t, s], LOG_ZERO)
-
-
-@compiled
-def _backward(
-    log_emission: Array, log_stay: Array, log_move: Array, alpha: Array, stays: Array, log_likelihood: float
-) -> None:
-    """Replace the forward scores ``alpha`` by log posteriors, and fill in those of staying in a state."""
-    T, S = alpha.shape
-    beta = np.full(S, LOG_ZERO)
-    beta[S - 1] = log_move[S - 1]
-    onward = np.empty(S)
-    for t in range(T - 1, -1, -1):
-        if t + 1 < T:
-            for s in range(S):
-                onward[s] = log_emission[t + 1, s] + beta[s]
-            for s in range(S):
-                keep = log_stay[s] + onward[s]
-                stays[t, s] = alpha[t, s] + keep - log_likelihood
-                reach = _log_sum(keep, log_move[s] + onward[s + 1]) if s + 1 < S else keep
-                beta[s] = max(reach, LOG_ZERO)
-        for s in range(S):
-            alpha[t, s] = alpha[t, s] + beta[s] - log_likelihood
 
 
 @compiled

@@ -110,59 +110,39 @@ class ForwardBackwardNetwork(NamedTuple):
         columns       : of each chain [shape=(S,)]
         What is computed is ``log_forward_backward``: by ``_forward_backward`` in the precision of ``log_emissions``;
         where that would lose what counts, in double precision, and at last in logarithms by NumPy.
-        Cost: O(T·E), and exponentials of the chains' densities; in double precision twice, in logarithms some fifty
-        times as slow.
+        Cost: O(T·E), and exponentials of densities; in double precision twice, in logarithms fifty times as slow.
         """
-        precision, weights = log_emissions[0].dtype, _weigh(self.layout, arc_log.astype(np.float64))
-        initial = log_initial.astype(np.float64)
-        expected = self._scale(weights, initial, log_emissions, columns)
-        logs = [log.astype(np.float64, copy=False) for log in log_emissions]
-        if expected is None and precision != np.float64:
-            expected = self._scale(weights, initial, logs, columns)
-        if expected is not None:
-            return expected
+        precision, layout = log_emissions[0].dtype, self.layout
+        log_arcs, log_first = arc_log.astype(np.float64), log_initial.astype(np.float64)
+        weights, (initial, best_first) = _weigh(layout, log_arcs), _probabilities(log_first[layout.order])
+        for kind in dict.fromkeys((precision, np.dtype(np.float64))):
+            logs = [log.astype(kind, copy=False) for log in log_emissions]
+            root, best = _products(logs, columns)
+            run_counts, leaving, entering, scales, is_enough = _forward_backward(
+                root, initial, weights.run_bounds, weights.runs.astype(kind),
+                layout.blocks.astype(np.uintp), layout.block_sources.astype(np.uintp),
+                weights.blocks.astype(kind), weights.transposed.astype(kind), *LIMITS[kind],
+            )  # fmt: skip
+            if is_enough:
+                counts, start = np.zeros(len(self.arc_from)), 0
+                counts[layout.run_arcs] = run_counts[weights.unpadded] * weights.runs[weights.unpadded]
+                for _, targets, place, sources in layout.blocks:  # one matrix product each
+                    arcs = slice(place, place + sources), slice(0, targets)
+                    pairs = leaving[:, arcs[0]].T @ entering[:, start : start + targets]
+                    counts[layout.block_arcs[arcs]] = pairs * weights.blocks[arcs]
+                    start += targets
+                log_likelihood = (np.log(scales) + best).sum() + best_first + (len(root) - 1) * weights.best
+                return NetworkPosteriors(root, counts, float(log_likelihood))
         arc_to = np.repeat(np.arange(len(self.arc_start)), np.diff(self.arc_start, append=len(self.arc_from)))
         log_posterior, counts, log_likelihood = log_forward_backward(
-            initial, _joint(logs, columns)[:, self.layout.place], self.arc_from, arc_to, arc_log.astype(np.float64),
-            np.zeros(len(initial)),
+            log_first, _joint(logs, columns)[:, layout.place], self.arc_from, arc_to, log_arcs,
+            np.zeros(len(log_first)),
         )  # fmt: skip
-        return NetworkPosteriors(np.exp(log_posterior)[:, self.layout.order].astype(precision), counts, log_likelihood)
-
-    def _scale(
-        self,
-        weights: _Weights,
-        log_initial: Array,
-        log_emissions: Sequence[NDArray[np.floating[Any]]],
-        columns: Sequence[Index],
-    ) -> NetworkPosteriors | None:
-        """Return the posteriors by scaled probabilities, in the precision of ``log_emissions``; None: it loses some."""
-        root, best = _products(log_emissions, columns)
-        layout = self.layout
-        initial, first = _probabilities(log_initial[layout.order])
-        run_counts, leaving, entering, scales, is_enough = _forward_backward(
-            root, initial, weights.run_bounds, weights.runs.astype(root.dtype),
-            layout.blocks.astype(np.uintp), layout.block_sources.astype(np.uintp),
-            weights.blocks.astype(root.dtype), weights.transposed.astype(root.dtype), *LIMITS[root.dtype],
-        )  # fmt: skip
-        if not is_enough:
-            return None
-        counts = np.zeros(len(self.arc_from))
-        counts[layout.run_arcs] = run_counts[weights.unpadded] * weights.runs[weights.unpadded]
-        start = 0
-        for _, targets, place, sources in layout.blocks:  # one matrix product each
-            arcs = slice(place, place + sources), slice(0, targets)
-            pairs = leaving[:, arcs[0]].T @ entering[:, start : start + targets]
-            counts[layout.block_arcs[arcs]] = pairs * weights.blocks[arcs]
-            start += targets
-        log_likelihood = (np.log(scales) + best).sum() + first + (len(root) - 1) * weights.best
-        return NetworkPosteriors(root, counts, float(log_likelihood))
+        return NetworkPosteriors(np.exp(log_posterior)[:, layout.order].astype(precision), counts, log_likelihood)
 
 
 def _roots(log_density: NDArray[np.floating[Any]]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the eighth roots of densities relative to the best of each frame, and the logarithm of the best.
-
-    Roots of densities above e⁻⁶⁴⁰ are normal numbers in single precision; lower densities are raised to that.
-    """
+    """Return eighth roots of densities relative to the best of each frame, e⁻⁸⁰ at least, and the best's logarithm."""
     best = log_density.max(axis=1)
     best[~np.isfinite(best)] = 0
     root = log_density - best[:, None]
@@ -173,10 +153,7 @@ def _roots(log_density: NDArray[np.floating[Any]]) -> tuple[NDArray[Any], NDArra
 def _products(
     log_densities: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index]
 ) -> tuple[NDArray[Any], Array]:
-    """Return the roots of joint densities, by place, relative to each frame's best, and the logarithm of the best.
-
-    Densities lower than the best by some 560 nats may be 0; where all are, the logarithm is -inf.
-    """
+    """Return roots of joint densities, by place, relative to each frame's best, and its logarithm (-inf: all are 0)."""
     firsts = np.cumsum([0, *(log.shape[1] for log in log_densities[:-1])])
     shifted = (np.stack(columns) + firsts[:, None]).astype(np.uint32)
     frames = len(log_densities[0])
@@ -230,12 +207,10 @@ def _weigh(layout: ArcLayout, arc_log: Array) -> _Weights:
 
 @compile_to_rounding
 def _fill_joint_roots(roots: Array, columns: NDArray[np.uint32], joint: Array, best: Array) -> None:
-    """Fill in the roots of joint densities relative to the best of each frame, and the root of the best.
+    """Fill in the roots of joint densities relative to the best of each frame, and the root of the best [shape=(T,)].
 
-    roots   : float32 or float64 [shape=(T, G)], of all chains side by side, each relative to the chain's best
+    roots   : [shape=(T, G)], of all chains side by side, each relative to the chain's best
     columns : [shape=(C, S)], for each chain, the column of the state at each place
-    joint   : [shape=(T, S)], of the precision of ``roots``
-    best    : [shape=(T,)]; 0 where all are 0
     """
     states = columns.shape[1]
     factor, product, tops = np.empty(roots.shape[1], roots.dtype), np.empty(states), np.empty(8)
@@ -270,17 +245,13 @@ def _forward_backward(
 ) -> tuple[Array, Array, Array, Array, bool]:  # fmt: skip
     """Return the expected counts of a recording in a network; ``emission`` is overwritten by the posteriors.
 
-    emission     : [shape=(T, S)], by place: the eighth roots of densities relative to the best of each frame; its
-                   precision, which the weights have too, is that of the computation
-    initial      : [shape=(S,)], in double precision, the greatest 1
-    runs, run_weight : of the layout and its weights (``kernels.arcs``), padded with arcs of weight 0; weights up to 1
-    blocks ... block_weight : of the layout and its weights
-    transposed   : the weights of blocks, targets as rows
+    emission : [shape=(T, S)], by place: eighth roots of densities relative to each frame's best; its precision is used
+    initial  : [shape=(S,)], in double precision, the greatest 1
+    runs ... transposed : of ``kernels.arcs.ArcLayout`` and ``_Weights``
     floor, min_scale, off : least probability, least scale of a frame, and largest error of N (see above)
     Returns the expected count of each run arc divided by its weight [shape=(N,)]; the forward probabilities of all
     blocks' sources and the backward ones of their targets in the next frame, whose products summed over time give the
-    counts of block arcs [shapes=(T, ...)]; the scale of each frame, whose product is the likelihood [shape=(T,)]; and
-    whether the precision is enough.
+    counts of block arcs [shapes=(T, ...)]; each frame's scale [shape=(T,)]; and whether the precision is enough.
     """
     T, S = emission.shape
     targets = 0
@@ -316,9 +287,18 @@ def _forward(
         alpha[t] = floor
         if t == 0:
             alpha[t, : len(initial)] = initial
-        else:
-            _forward_runs(alpha, t, runs, run_weight)
-            _forward_blocks(alpha, t, blocks, sources, block_weight, leave, room, share, SHARE * floor)
+        for r in range(len(runs) if t > 0 else 0):
+            target, source, length, first = runs[r, 0], runs[r, 1], runs[r, 2], runs[r, 3]
+            for i in range(length):
+                alpha[t, target + i] += run_weight[first + i] * alpha[t - 1, source + i]
+        for b in range(len(blocks) if t > 0 else 0):
+            target, targets, first, count = blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3]
+            for s in range(count):
+                leave[t - 1, first + s] = alpha[t - 1, sources[first + s]]
+            total = _shares(leave, t - 1, first, count, share, SHARE * floor)
+            _times(share, count, block_weight, first, room)
+            for i in range(targets):
+                alpha[t, target + i] += total * room[i]
         scale[t] = _emit(alpha, density, t, 1 / scale[t - 1] if t > 0 else 1.0, floor)
         if not min_scale < scale[t] < MAX_SCALE:
             return False
@@ -337,10 +317,23 @@ def _backward(
         total = _close(density, alpha, t, beta, onward, 1 / scale[t - 1] if t > 0 else 1.0, floor)
         if not abs(total - 1) < off:
             return False
-        if t > 0:
-            beta[:] = floor
-            _backward_runs(alpha, t - 1, onward, beta, runs, run_weight, few)
-            _backward_blocks(onward, beta, blocks, sources, transposed, enter, t - 1, room, share, SHARE * floor)
+        beta[:] = floor
+        for r in range(len(runs) if t > 0 else 0):
+            target, source, length, first = runs[r, 0], runs[r, 1], runs[r, 2], runs[r, 3]
+            for i in range(length):
+                beta[source + i] += run_weight[first + i] * onward[target + i]
+            for i in range(length):
+                few[first + i] += alpha[t - 1, source + i] * onward[target + i]
+        start = np.uintp(0)
+        for b in range(len(blocks) if t > 0 else 0):
+            target, targets, first, count = blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3]
+            for i in range(targets):
+                enter[t - 1, start + i] = onward[target + i]
+            total = _shares(enter, t - 1, start, targets, share, SHARE * floor)
+            _times(share, targets, transposed, start, room)
+            for s in range(count):
+                beta[sources[first + s]] += total * room[s]
+            start += targets
         if t % FRAMES_SUMMED == 0:
             counts += few
             few[:] = floor
@@ -348,29 +341,6 @@ def _backward(
     for i in range(len(initial)):
         begun += initial[i] * onward[i]
     return abs(begun - 1) < off
-
-
-@compile_to_rounding
-def _forward_runs(alpha: Array, t: int, runs: Unsigned, weight: Array) -> None:
-    for r in range(len(runs)):
-        target, source, length, first = runs[r, 0], runs[r, 1], runs[r, 2], runs[r, 3]
-        for i in range(length):
-            alpha[t, target + i] += weight[first + i] * alpha[t - 1, source + i]
-
-
-@compile_to_rounding
-def _forward_blocks(
-    alpha: Array, t: int, blocks: Unsigned, sources: Unsigned, weight: Array, leaving: Array, room: Array, share: Array,
-    floor: float,
-) -> None:  # fmt: skip
-    for b in range(len(blocks)):
-        target, targets, first, count = blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3]
-        for s in range(count):
-            leaving[t - 1, first + s] = alpha[t - 1, sources[first + s]]
-        total = _shares(leaving, t - 1, first, count, share, floor)
-        _times(share, count, weight, first, room)
-        for i in range(targets):
-            alpha[t, target + i] += total * room[i]
 
 
 @compile_to_rounding
@@ -404,35 +374,6 @@ def _close(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, sc
         total += posterior
         emission[t, i] = posterior if posterior > MIN_POSTERIOR else 0.0
     return total
-
-
-@compile_to_rounding
-def _backward_runs(
-    alpha: Array, t: int, onward: Array, beta: Array, runs: Unsigned, weight: Array, counts: Array
-) -> None:
-    for r in range(len(runs)):
-        target, source, length, first = runs[r, 0], runs[r, 1], runs[r, 2], runs[r, 3]
-        for i in range(length):
-            beta[source + i] += weight[first + i] * onward[target + i]
-        for i in range(length):
-            counts[first + i] += alpha[t, source + i] * onward[target + i]
-
-
-@compile_to_rounding
-def _backward_blocks(
-    onward: Array, beta: Array, blocks: Unsigned, sources: Unsigned, transposed: Array, entering: Array, t: int,
-    room: Array, share: Array, floor: float,
-) -> None:  # fmt: skip
-    start = np.uintp(0)
-    for b in range(len(blocks)):
-        target, targets, first, count = blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3]
-        for i in range(targets):
-            entering[t, start + i] = onward[target + i]
-        total = _shares(entering, t, start, targets, share, floor)
-        _times(share, targets, transposed, start, room)
-        for s in range(count):
-            beta[sources[first + s]] += total * room[s]
-        start += targets
 
 
 @compile_to_rounding

@@ -63,8 +63,7 @@ def best_path(
 ) -> tuple[Index, float]:
     """Return the most probable path and its log probability (-inf: no path).
 
-    log_emission : of G emission densities; called for at most the frames of a block and one, and for each frame at most
-                   twice, with the same result
+    log_emission : of G densities; called for the frames of a block and one at most, for each twice with the same result
     count        : frames, T
     network      : logarithms in single precision
     windows      : the frames that each state may have; None: any
@@ -128,9 +127,8 @@ class _Block:
         row = np.full(self.states.stop - self.states.start, -np.inf, np.float32)
         first, stop = max(self.states.start, before.states.start), min(self.states.stop, before.states.stop)
         if first < stop:
-            row[first - self.states.start : stop - self.states.start] = last[
-                first - before.states.start : stop - before.states.start
-            ]
+            here, there = self.states.start, before.states.start
+            row[first - here : stop - here] = last[first - there : stop - there]
         return row
 
     def log_emission(self, log_emission: LogEmission) -> Scores:
@@ -166,11 +164,7 @@ class _Block:
 
 
 def _scores(network: NetworkArrays, first: Scores, log_emission: Scores, is_compiled: bool) -> tuple[Scores, float]:
-    """Return the scores of the best path to every state, relative to each frame's best, and the sum of these best.
-
-    first        : the scores in the first frame [shape=(S,)]
-    log_emission : [shape=(T, G)]
-    """
+    """Return the scores of the best path to every state, relative to each frame's best, and the sum of these best."""
     emission, arc_from, arc_log, arc_start, _, _ = network
     delta = np.empty((len(log_emission), len(emission)), np.float32)
     delta[0] = first
@@ -257,9 +251,8 @@ def find_cheapest(start: Array, steps: Array) -> tuple[Array, NDArray[np.uint8]]
     start : cost of each state before the first step [shape=(C,)]; infinite: impossible
     steps : cost of going from state i to state j [shape=(C, C, T), i first]; for every j one is finite, C ≤ 256
     Ties go to the lower state. A long recording is processed by stretches: the costs returned start the next stretch.
-    Exact: Viterbi, Δ_t(j) = min_i Δ_{t−1}(i) + steps(i, j, t). In the algebra of (min, +) a piece of √T frames is
-    one C × C matrix; first these of all pieces at once, then the costs between pieces, one after another, then the
-    costs within all pieces at once.
+    Exact: Viterbi, Δ_t(j) = min_i Δ_{t−1}(i) + steps(i, j, t). In the algebra of (min, +) a piece of √T frames is one
+    C × C matrix; first these of all pieces at once, then costs between pieces in turn, then within all pieces at once.
     Cost: O(T·C³) time in O(√T) array operations, O(T·C²) memory.
     """
     states, frames = len(start), steps.shape[2]

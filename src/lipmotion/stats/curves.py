@@ -40,8 +40,7 @@ def measure_modulation_spectrum(clips: Sequence[Array], rate_hz: float) -> tuple
     """Return frequencies in Hz [shape=(F,)] and the mean power of curves at each of them [shape=(F, P)].
 
     clips : curves [each shape=(T_i, P)]
-    Windows are Hann windows; each one is freed of its mean, and a clip that is shorter than one has one of its own
-    length. The frequency 0 is left out.
+    Hann windows, each freed of its mean; a clip shorter than one has one of its length. The frequency 0 is left out.
     Source: Takamichi, Toda, Black, Neubig, Sakti & Nakamura 2016, who compute it over whole utterances.  Deviation: the
     mean over windows, so that clips of different lengths have one spectrum.
     """

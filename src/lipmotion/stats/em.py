@@ -70,8 +70,7 @@ def run_em(
     after_step : is called after every step with its number (from 1), the new model, and the statistics of the step
     min_gain : stop at the first step whose E-step finds a mean log likelihood per frame that is higher by less than
                  this than that of the step before; -inf: always take ``max_steps`` steps
-    maximise_converged : whether the step at which EM stops for want of gain still has its M-step; without it, that step
-                 is not reported to ``after_step``
+    maximise_converged : whether the step at which EM stops for want of gain has an M-step, and is reported
     Source: Dempster, Laird & Rubin 1977.
     """
     log_likelihoods: list[float] = []
@@ -93,8 +92,7 @@ def sum_statistics(
     """Return the sufficient statistics of all shards under a model (the E-step); without shards, none.
 
     expect : a module's function of the model and one shard, which any process may call
-    work   : distributes the shards; its folder keeps what is summed so far, under a digest of model and shards: a
-             training that is repeated after a stop finds it
+    work   : distributes the shards; its folder keeps what is summed so far, by a digest of model and shards
     The sum is in the order of the shards: the same to the bit, whoever computes them.
     """
     stage = f"sum-{_digest((expect.__qualname__, model, shards))}" if work.folder is not None else ""

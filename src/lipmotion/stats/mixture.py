@@ -54,9 +54,8 @@ class Mixtures:
         """Return the chosen densities as the coefficients of a quadratic form; None: all."""
         pick = slice(None) if chosen is None else chosen
         means, precision = self.means[pick], 1 / self.variances[pick]
-        constant = self.log_weights[pick] - 0.5 * (
-            means.shape[2] * LOG_2PI - np.log(precision).sum(axis=2) + (means * means * precision).sum(axis=2)
-        )
+        volume = means.shape[2] * LOG_2PI - np.log(precision).sum(axis=2)
+        constant = self.log_weights[pick] - 0.5 * (volume + (means * means * precision).sum(axis=2))
         form = np.concatenate([means * precision, precision / -2], axis=2).transpose(2, 1, 0)
         return QuadraticForm(np.ascontiguousarray(form).reshape(len(form), -1), constant.T.astype(np.float32))
 

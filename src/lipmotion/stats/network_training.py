@@ -34,14 +34,9 @@ class Dropout(NamedTuple):
     share: float
     rng: np.random.Generator
 
-    def mask(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-        """Return which units stay on [shape as given]."""
-        return self.rng.random(shape, np.float32) >= self.share
-
-    @property
-    def gain(self) -> np.float32:
-        """The factor of the units that stay on."""
-        return np.float32(1 / (1 - self.share))
+    def draw(self, shape: tuple[int, ...]) -> Array:
+        """Return the factors of the units [shape as given]: 0 where they are off, else what makes up for these."""
+        return (self.rng.random(shape, np.float32) >= self.share) * np.float32(1 / (1 - self.share))
 
 
 class SequenceNetwork(ABC):
@@ -49,8 +44,7 @@ class SequenceNetwork(ABC):
 
     layers : the parameters of all layers below
     output : the linear map
-    SHARDS : parts of a batch, computed in one thread each. Their number is fixed: the sum does not depend on the
-             processors
+    SHARDS : parts of a batch, one thread each; their number is fixed: the sum does not depend on the processors
     """
 
     layers: tuple[Any, ...]

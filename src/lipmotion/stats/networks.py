@@ -15,20 +15,12 @@ TAPS = 3  # time steps that each unit sees of the layer below: one before, the s
 BLOCK = 4096  # time steps computed at a time, so that the memory does not grow with the sequence
 
 
-class _Pass(NamedTuple):
-    """What the backward pass needs of one layer: its stacked inputs, and its derivative times the dropout mask."""
-
-    stacked: Array
-    slope: Array
-
-
 @final
 @dataclass(frozen=True, eq=False)
 class ConvolutionalNetwork(SequenceNetwork):
     """Convolutions in time with residual connections, and a linear output.
 
-    layers    : convolutions of ``TAPS`` time steps, each followed by max(0, x); the output of each but the first is
-                added to its input
+    layers    : convolutions of ``TAPS`` time steps, then max(0, x); all but the first add their input to the output
     dilations : distance of the taps of each layer, in time steps
     output    : the linear map from the last hidden layer
     Source: Bai, Kolter & Koltun 2018, without causality and without normalisation.
@@ -58,8 +50,8 @@ class ConvolutionalNetwork(SequenceNetwork):
         inputs: Array,
         inside: NDArray[np.bool_],  # noqa: ARG002 - beyond the end there are zeros
         dropout: Dropout | None,
-    ) -> tuple[Array, list[_Pass]]:
-        states, passes = inputs, []
+    ) -> tuple[Array, list[tuple[Array, Array]]]:
+        states, passes = inputs, []  # of each layer: its stacked inputs, and its derivative times the dropout
         for number, (layer, dilation) in enumerate(zip(self.layers, self.dilations, strict=True)):
             stacked = _stack(states, dilation)
             result = stacked @ layer.weights
@@ -67,19 +59,19 @@ class ConvolutionalNetwork(SequenceNetwork):
             if dropout is None:
                 np.maximum(result, 0, out=result)
             else:
-                slope = (result > 0) & dropout.mask(result.shape)
-                passes.append(_Pass(stacked, slope * dropout.gain))
-                result *= passes[-1].slope
+                slope = (result > 0) * dropout.draw(result.shape)
+                passes.append((stacked, slope))
+                result *= slope
             states = result if number == 0 else states + result
         return states, passes
 
     def backward(self, slope: Array, passed: Any) -> list[Array]:  # noqa: D102
         gradients: list[Array] = []  # from the last to the first
         rows = slope.shape[0] * slope.shape[1]
-        for number in reversed(range(len(self.layers))):
-            inner: Array = slope * passed[number].slope
+        for number, (stacked, layer_slope) in reversed([*enumerate(passed)]):
+            inner: Array = slope * layer_slope
             spread: Array = inner.reshape(rows, -1)
-            gradients += [spread.sum(axis=0), passed[number].stacked.reshape(rows, -1).T @ spread]
+            gradients += [spread.sum(axis=0), stacked.reshape(rows, -1).T @ spread]
             if number:
                 parts = (inner @ self.layers[number].weights.T).reshape(*slope.shape[:2], TAPS, -1)
                 dilation, by_states = self.dilations[number], parts[:, :, 1].copy()  # the derivative of ``_stack``
@@ -186,7 +178,7 @@ class RecurrentNetwork(SequenceNetwork):
             forth, back = passed.outputs[0], passed.outputs[1, ::-1]
             states = np.ascontiguousarray(np.concatenate([forth, back], axis=2).transpose(1, 0, 2))
             if dropout is not None:
-                dropped = dropout.mask(states.shape) * dropout.gain
+                dropped = dropout.draw(states.shape)
                 states = states * dropped
                 passes.append(passed._replace(dropped=dropped))
         return states, passes
@@ -211,9 +203,8 @@ def make_recurrent_network(inputs: int, cells: int, outputs: int, layers: int, s
         biases = np.zeros((2, GATES, cells), np.float32)
         biases[:, 1] = FORGET_BIAS
         size = 2 * cells if number else inputs
-        made.append(
-            RecurrentLayer(uniform(2, size, GATES * cells), uniform(2, cells, GATES * cells), biases.reshape(-1))
-        )
+        weights, memory = uniform(2, size, GATES * cells), uniform(2, cells, GATES * cells)
+        made.append(RecurrentLayer(weights, memory, biases.reshape(-1)))
     return RecurrentNetwork(tuple(made), LinearMap(uniform(2 * cells, outputs), np.zeros(outputs, np.float32)))
 
 
@@ -276,9 +267,8 @@ def _differentiate_layer(layer: RecurrentLayer, passed: _CellPass, slope: Array)
         of_cell = of_cell * gates[:, step, :, 1]
         of_output = np.matmul(here.reshape(2, batch, GATES * cells), memory)
     flat = inner.reshape(2, length * batch, GATES * cells)
-    inputs, outputs = (
-        values.reshape(2, length * batch, -1).transpose(0, 2, 1) for values in (passed.inputs, _shift(passed.outputs))
-    )
+    seen = passed.inputs, _shift(passed.outputs)
+    inputs, outputs = (values.reshape(2, length * batch, -1).transpose(0, 2, 1) for values in seen)
     of_inputs = np.matmul(flat, layer.weights.transpose(0, 2, 1)).reshape(passed.inputs.shape)
     both = (of_inputs[0] + of_inputs[1, ::-1]).transpose(1, 0, 2)
     return [np.matmul(inputs, flat), np.matmul(outputs, flat), flat.sum(axis=1).reshape(-1)], both

@@ -94,10 +94,7 @@ def _find_largest(squares: NDArray[np.float64], count: int, threshold: float) ->
 
 
 def _iterate_subspace(values: NDArray[Any], mean: NDArray[np.float64], components: int) -> NDArray[np.float64]:
-    """Return the first components of a large table [shape=(K, D)], by block power iteration from some of its own rows.
-
-    Source: Halko, Martinsson & Tropp 2011, §4.5 (subspace iteration) and §5.1; Rayleigh-Ritz at its end.
-    """
+    """Return the first components of a large table [shape=(K, D)] (Halko, Martinsson & Tropp 2011, §4.5 and §5.1)."""
     size = min(components + SPARE_DIRECTIONS, *values.shape)
     start = values[choose_evenly(size, len(values))] - mean
     directions = np.linalg.qr(start.T.astype(np.float32))[0]

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora import Corpus
 from lipmotion.engines import Animator, engine_named
+from lipmotion.engines.base import read_presets
 from lipmotion.engines.coupled.arrays import coupled_to_arrays
-from lipmotion.engines.coupled.chains.product import HMM, SYSTEMS, UNSEEN_LOSS
+from lipmotion.engines.coupled.chains.product import HMM, UNSEEN_LOSS
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.coupled.training.coupled_training import THREADS, grow_models
@@ -28,6 +29,7 @@ from lipmotion_lab.evaluation.evaluate import sum_correlations, sum_distances
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, ComparedClip, HeldOutRecordings
 
 Options = Mapping[str, Any]
+SYSTEMS = {name: options for name, options in read_presets("coupled").items() if "structure" in options}
 TIED = {"unseen_loss": UNSEEN_LOSS, "start_asynchrony": 1}
 """Factorial chains that are tied together: rare joint states lose 10 nats, and the chains begin a state apart."""
 TOGETHER = {"moves_together": True}

@@ -6,14 +6,7 @@ import pytest
 
 from engines.coupled.tiny import KINDS, chains, observations, structure
 from lipmotion import engines, types
-from lipmotion.engines.coupled.engine import (
-    explain_frames,
-    find_joint_state,
-    infer_units,
-    list_chain_states,
-    list_leads,
-    sum_lead_posteriors,
-)
+from lipmotion.engines.coupled.engine import explain_frames, find_joint_state, infer_units, list_chain_states
 from lipmotion.motion import generation
 from lipmotion.testing import CHANNELS, examples, speech, timeline
 from oracles import coupled as oracle
@@ -31,12 +24,11 @@ def small(kind, sets, limit):
 def test_the_asynchrony_is_that_of_all_paths(kind, sets, limit):
     found, posteriors, joint = small(kind, sets, limit)
     product = found.transitions.product
-    for chain, lead in enumerate(sum_lead_posteriors(found, posteriors)):
-        ahead = list_leads(found, chain)
-        assert ahead == (tuple(range(-limit, limit + 1)) if chain else ())
-        for column, states in enumerate(ahead):
+    for chain, units in enumerate(infer_units(found, posteriors, slice(None))):
+        assert units.leads == (tuple(range(-limit, limit + 1)) if chain else ())
+        for column, states in enumerate(units.leads):
             expected = joint[:, product.lead[chain] == states].sum(axis=1)
-            np.testing.assert_allclose(lead[:, column], expected, atol=2e-5)
+            np.testing.assert_allclose(units.lead[:, column], expected, atol=2e-5)
     for row in range(len(joint)):
         for chain, states in enumerate(list_chain_states(found, posteriors, row)):
             if chain:
@@ -70,7 +62,7 @@ def test_posteriors_of_units_are_sums_over_their_states():
         for unit, _ in enumerate(one.units):
             own = posteriors.chains[number][1:4, 2 * unit : 2 * unit + 2].sum(axis=1)
             np.testing.assert_allclose(one.probability[:, unit], own, rtol=1e-6)
-    np.testing.assert_array_equal(second.lead, sum_lead_posteriors(found, posteriors)[1][1:4])
+    np.testing.assert_array_equal(second.lead, infer_units(found, posteriors, slice(None))[1].lead[1:4])
 
 
 def coupled_options(name):

@@ -16,7 +16,6 @@ from lipmotion.engines.selection.inventory import (
     SILENT,
     TABLE_1,
     RecordedUnits,
-    find_substitutes,
     index_units,
     list_windows,
 )
@@ -83,8 +82,8 @@ def test_where_matches_are_excluded_the_next_shorter_ones_enter() -> None:
     assert index.candidates(wanted, 0, excluded).tolist() == [17]
 
 
-def test_a_phone_without_units_has_a_similar_one_in_its_place(model) -> None:
-    stand_ins = find_substitutes(model.inventory.windows, model.inventory.usable)
+def test_a_phone_without_units_has_a_similar_one_in_its_place(model, engine) -> None:
+    stand_ins = model.costs(engine.config).stand_ins
     assert stand_ins["ao"] == "aa"
     assert not set(SPOKEN) & set(stand_ins)
 

@@ -114,7 +114,7 @@ def test_the_modulation_filter_is_for_voices_that_training_knows():
 
 SMALL = {"states": 3, "silent_states": 7, "components": 2}
 OPTIONS = engines.engine_named("trajectory", SMALL | {"acoustic_regression": False}).config
-LAYOUT = OPTIONS.training_layout
+LAYOUT = OPTIONS.layout(load_unit_set(OPTIONS.units))
 
 
 def fit(corpus, **changes):
@@ -128,7 +128,7 @@ def frames_by_density(corpus, emission):
         x = example.motion["opening"]
         for t, state in list(enumerate(label_full_context(example.speech.units, len(x), LAYOUT)))[1:-1]:
             row = [x[t], (x[t + 1] - x[t - 1]) / 2, x[t + 1] - 2 * x[t] + x[t - 1]]
-            found.setdefault(emission.row(state, LAYOUT), []).append(row)
+            found.setdefault(emission.row(state), []).append(row)
     return {density: np.array(rows) for density, rows in found.items()}
 
 
@@ -148,7 +148,7 @@ def test_without_shrinkage_each_leaf_has_the_mean_and_variance_of_its_frames():
 def test_trees_tell_apart_what_moves_apart():
     emission = fit(examples(12)).emission
     middle = {
-        phone: emission.means[emission.row(FullContextState("t", phone, "s", 1), LAYOUT), 0, 0]
+        phone: emission.means[emission.row(FullContextState("t", phone, "s", 1)), 0, 0]
         for phone in ("aa", "iy", "uw", "p")
     }
     assert middle["aa"] > middle["iy"] + 0.1
@@ -162,7 +162,7 @@ def test_a_channel_that_never_moves_keeps_a_variance():
         example.motion.values[:, 1] = 0.0
     emission = fit(corpus, acoustic_regression=True, acoustic_components=20).emission
     assert (emission.variances >= MIN_VARIANCE / 1e4).all()
-    rows = np.array([emission.row(state, LAYOUT) for state in label_full_context(corpus[0].speech.units, 99, LAYOUT)])
+    rows = np.array([emission.row(state) for state in label_full_context(corpus[0].speech.units, 99, LAYOUT)])
     for statistic in emission.statistics(rows, corpus[0].speech.features.values, slice(0, 99)):
         assert np.isfinite(statistic).all()
 
@@ -244,8 +244,8 @@ def loud_and_soft(count):
 def error(model, corpus):
     squares = []
     for one in corpus:
-        states = label_full_context(one.speech.units, len(one.valid), REGRESSION.training_layout)
-        rows = np.array([model.emission.row(state, REGRESSION.training_layout) for state in states])
+        states = label_full_context(one.speech.units, len(one.valid), model.emission.layout)
+        rows = np.array([model.emission.row(state) for state in states])
         means, _ = model.emission.statistics(rows, one.speech.features.values, slice(None))
         squares.append((means[:, 0, 0] - one.motion["opening"])[60:-60] ** 2)
     return float(np.sqrt(np.concatenate(squares).mean()))

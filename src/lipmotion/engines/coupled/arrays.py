@@ -110,10 +110,8 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
             (f"group_{number}/{key}" for number in range(len(streams)) for key in GROUP),
             (f"around/{key}" for key in REGRESSION_INPUTS),
         )
-        if structure.state_counts[0] > arrays["group_0/tie"].size:
-            raise ValueError(
-                f"{structure.state_counts[0]} states of the first chain, of {arrays['group_0/tie'].size} in all"
-            )
+        if structure.state_counts[0] > (count := arrays["group_0/tie"].size):
+            raise ValueError(f"{structure.state_counts[0]} states of the first chain, of {count} in all")
         transitions = _transitions(arrays, structure)
         visual = tuple(
             _visual(select_arrays(arrays, f"visual_{number}/"), name, space.dimensions, config.dynamic)
@@ -225,9 +223,8 @@ def _regression(
     check_arrays(of_inputs, REGRESSION_INPUTS, N=structure.state_counts[0])
     size = of_inputs["window_basis"].shape[1] + of_inputs["belief"].shape[1] * len(OFFSETS)
     checked = check_arrays(of_inputs, REGRESSION_INPUTS, N=structure.state_counts[0], I=size)
-    inputs = RegressionInputs(
-        acoustic_context_from_arrays(checked), checked["belief"], checked["mean"], checked["basis"]
-    )
+    acoustic = acoustic_context_from_arrays(checked)
+    inputs = RegressionInputs(acoustic, checked["belief"], checked["mean"], checked["basis"])
     regressions = []
     for number, stream in enumerate(visual):
         count = structure.state_counts[structure.chain_of(number + 1)]

@@ -10,7 +10,7 @@ and this one towards that of all visemes; the posteriors of the visual chain wei
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,8 +44,7 @@ def convert(
 
     observations : the first stream is speech; the values of the others are ignored
     lattice      : the joint states that the utterance may be in
-    start        : ``soft``: expected means over all paths, given speech alone; ``viterbi``: means along the best path,
-                   as in the paper
+    start        : ``soft``: expected means over all paths, given speech; ``viterbi``: the paper's, along the best path
     update       : ``exact``: the maximiser of each M-step; ``printed``: Eq. 9 as it stands
     max_steps    : greatest number of EM steps after the start
     speech_inference : posteriors given speech alone, where they are known; a soft start needs them
@@ -251,17 +250,9 @@ def fit_visual_regression(
     ]
     pairs = zip(statistics, family.tolist(), strict=True)
     coefficients = np.array([ridge(own, families[f], OWN_RIDGE) for own, f in pairs], np.float32)
-    unit_variances = np.ones((len(regression_of_state), outputs), np.float32)
-    regression = VisualRegression(regression_of_state, coefficients, unit_variances)
-    return VisualRegression(regression_of_state, coefficients, _variances(regression, inputs, utterances, stream))
-
-
-def _variances(
-    regression: VisualRegression, inputs: RegressionInputs, utterances: Sequence[RegressionUtterance], stream: int
-) -> Single:
-    """Return the variance of a visual stream around its regressed means, for each state [shape=(N_v, D)]."""
-    squares, counts = np.zeros(regression.variances.shape), np.zeros(len(regression.regression_of_state))
-    for utterance in utterances:
+    squares, counts = np.zeros((len(regression_of_state), outputs)), np.zeros(len(regression_of_state))
+    regression = VisualRegression(regression_of_state, coefficients, np.ones(squares.shape, np.float32))
+    for utterance in utterances:  # the variances around the regressed means
         posterior = utterance.chain_posteriors[stream][utterance.observed]
         means = regression.means(inputs.observed_frames(utterance), posterior)
         error = utterance.targets[stream][utterance.observed] - means
@@ -269,7 +260,7 @@ def _variances(
         counts += posterior.sum(axis=0)
     overall = squares.sum(axis=0) / counts.sum()
     variances = (squares + MIN_FRAMES * overall) / (counts + MIN_FRAMES)[:, None]
-    return np.maximum(variances, 1e-6).astype(np.float32)
+    return replace(regression, variances=np.maximum(variances, 1e-6).astype(np.float32))
 
 
 def _find_principal_axes(covariance: Array, size: int) -> Single:
@@ -277,10 +268,7 @@ def _find_principal_axes(covariance: Array, size: int) -> Single:
 
 
 def _context(acoustic: AcousticContext, features: Single, reduced_posteriors: Single) -> Single:
-    """Return the acoustic context and the posteriors at ``OFFSETS`` of all frames, side by side [shape=(T, F')].
-
-    Posteriors are moving averages with a cosine window; frames beyond the edges repeat these.
-    """
+    """Return the acoustic context and the smoothed posteriors at ``OFFSETS`` of all frames, side by side."""
     scale = ACOUSTIC_WEIGHT / float(np.linalg.norm(acoustic.basis[:, 0]))
     frames = np.arange(len(reduced_posteriors))
     windows = []

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, explain_by_trace
 from lipmotion.engines.coupled.arrays import coupled_from_arrays, coupled_to_arrays
-from lipmotion.engines.coupled.chains.densities import Single, infer_components
+from lipmotion.engines.coupled.chains.densities import infer_components
 from lipmotion.engines.coupled.chains.lattice import Lattice, LatticePosteriors
-from lipmotion.engines.coupled.chains.model import Chains, Inference, VisualStream, speech_observations
+from lipmotion.engines.coupled.chains.model import Chains, Inference, speech_observations
 from lipmotion.engines.coupled.chains.product import Product
 from lipmotion.engines.coupled.conversion import convert, group_index, path_to_means
 from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, CoupledModel
@@ -67,12 +67,14 @@ def explain_frames(
 
 def list_chain_states(chains: Chains, posteriors: LatticePosteriors, row: int) -> tuple[ChainStates, ...]:
     """Return the most probable states of each chain in a frame, and the probabilities of its asynchrony."""
-    structure, found = chains.structure, []
-    for number, lead in enumerate(sum_lead_posteriors(chains, posteriors)):
-        names = [structure.state_name(number, state) for state in range(structure.state_counts[number])]
-        ranked = _rank_by_probability(names, posteriors.chains[number][row])
-        ahead = dict(zip(list_leads(chains, number), lead[row].tolist(), strict=True))
-        found.append(ChainStates(structure.chains[number].name, ranked, ahead))
+    found = []
+    for number, units in enumerate(infer_units(chains, posteriors, slice(None))):
+        probability = posteriors.chains[number][row]
+        best = np.argsort(-probability, kind="stable")[:MAX_STATES].tolist()
+        named = [NamedProbability(chains.structure.state_name(number, i), float(probability[i])) for i in best]
+        ranked = (named[0], *(state for state in named[1:] if state.probability >= MIN_PROBABILITY))
+        ahead = dict(zip(units.leads, units.lead[row].tolist(), strict=True))
+        found.append(ChainStates(units.name, ranked, ahead))
     return tuple(found)
 
 
@@ -80,44 +82,25 @@ def find_joint_state(chains: Chains, posteriors: LatticePosteriors, row: int) ->
     """Return the most probable joint state in a frame; None where joint states are not listed."""
     if posteriors.joint is None:
         return None
-    best = int(posteriors.joint.probability[row].argmax())
-    name = chains.structure.name(chains.transitions.product.chain_states[:, posteriors.joint.states[best]].tolist())
-    return NamedProbability(name, float(posteriors.joint.probability[row, best]))
-
-
-def list_leads(chains: Chains, chain: int) -> tuple[int, ...]:
-    """Return by how many states a chain may be ahead of the first; empty: it is the first, or there is no limit."""
-    limit = chains.structure.limit
-    return () if limit is None or chain == 0 else tuple(range(-limit, limit + 1))
-
-
-def sum_lead_posteriors(chains: Chains, posteriors: LatticePosteriors) -> list[Single]:
-    """Return, for each chain, the posteriors of its ``list_leads`` [each shape=(T, len(leads))]."""
-    product, result = chains.transitions.product, []
-    for chain in range(len(chains.structure.chains)):
-        ahead = np.array(list_leads(chains, chain), np.intp)
-        lead = np.zeros((len(posteriors.most_probable), len(ahead)), np.float32)
-        if isinstance(product, Product) and posteriors.joint is not None:
-            leads = product.lead[chain][posteriors.joint.states]
-            lead = posteriors.joint.probability @ (leads[:, None] == ahead).astype(np.float32)
-        result.append(lead)
-    return result
+    states, probability = posteriors.joint
+    best = int(probability[row].argmax())
+    name = chains.structure.name(chains.transitions.product.chain_states[:, states[best]].tolist())
+    return NamedProbability(name, float(probability[row, best]))
 
 
 def infer_units(chains: Chains, posteriors: LatticePosteriors, frames: slice) -> list[ChainPosteriors]:
-    """Return the posteriors of the units of each chain in some frames."""
-    structure, found = chains.structure, []
-    for number, lead in enumerate(sum_lead_posteriors(chains, posteriors)):
-        name, units = structure.chains[number].name, structure.units[number]
-        probability = posteriors.chains[number][frames].reshape(-1, len(units), structure.states).sum(axis=2)
-        found.append(ChainPosteriors(name, units, probability, list_leads(chains, number), lead[frames]))
+    """Return the posteriors of the units of each chain, and of its leads over the first chain, in some frames."""
+    structure, product, found = chains.structure, chains.transitions.product, []
+    for chain, units in enumerate(structure.units):
+        probability = posteriors.chains[chain][frames].reshape(-1, len(units), structure.states).sum(axis=2)
+        leads = () if structure.limit is None or chain == 0 else range(-structure.limit, structure.limit + 1)
+        lead = np.zeros((len(probability), len(leads)), np.float32)
+        if isinstance(product, Product) and posteriors.joint is not None:
+            states, of_states = posteriors.joint
+            ahead = product.lead[chain][states, None] == np.array(leads, np.intp)
+            lead = (of_states @ ahead.astype(np.float32))[frames]
+        found.append(ChainPosteriors(structure.chains[chain].name, units, probability, tuple(leads), lead))
     return found
-
-
-def _rank_by_probability(names: Sequence[str], probability: NDArray[np.floating]) -> tuple[NamedProbability, ...]:
-    best = np.argsort(-probability, kind="stable")[:MAX_STATES]
-    named = [NamedProbability(names[i], float(probability[i])) for i in best]
-    return (named[0], *(state for state in named[1:] if state.probability >= MIN_PROBABILITY))
 
 
 def _find_dominant_gaussian(model: CoupledModel, inference: Inference, row: int, stream: int) -> DominantGaussian:
@@ -132,9 +115,14 @@ def _find_dominant_gaussian(model: CoupledModel, inference: Inference, row: int,
     mean, variance = (x[density, component].astype(float) for x in (mixtures.means, mixtures.variances))
     channels: Mapping[str, ChannelValue] = {}
     if stream:
-        visual = model.visual[stream - 1]
+        visual, space = model.visual[stream - 1], model.space
         means, precisions = visual.unstandardised(mean[None], 1 / variance[None])
-        channels = _list_channel_values(model, visual, means[0, 0], 1 / precisions[0, 0])
+        values, variances = np.zeros((2, 1, space.dimensions))
+        values[:, visual.columns], variances[:, visual.columns] = means[0, 0], 1 / precisions[0, 0]
+        motion, deviations = space.restore(values)[0].tolist(), np.sqrt(variances @ space.mixing)[0].tolist()
+        missing = np.delete(space.mixing, visual.columns, axis=0).max(axis=0, initial=0) > 0  # of other streams
+        rows = zip(space.channels, motion, deviations, missing.tolist(), strict=True)
+        channels = {channel.name: ChannelValue(value, spread) for channel, value, spread, gone in rows if not gone}
     observed, distance = inference.observations.observed[stream], None
     if observed is None or observed[row]:  # how far the observation is from the Gaussian, in standard deviations (RMS)
         error = inference.observations.streams[stream][row] - mean
@@ -153,19 +141,6 @@ def _find_dominant_gaussian(model: CoupledModel, inference: Inference, row: int,
         distance,
         channels,
     )
-
-
-def _list_channel_values(
-    model: CoupledModel, stream: VisualStream, means: Array, variances: Array
-) -> Mapping[str, ChannelValue]:
-    """Return values and standard deviations of the channels of a stream, by name, from means and variances."""
-    space = model.space
-    values, variance = (np.zeros((1, space.dimensions)) for _ in range(2))
-    values[:, stream.columns], variance[:, stream.columns] = means, variances
-    motion, deviations = space.restore(values)[0].tolist(), np.sqrt(variance @ space.mixing)[0].tolist()
-    missing = np.asarray(np.delete(space.mixing, stream.columns, axis=0).max(axis=0, initial=0) > 0)  # of other streams
-    channels = zip(space.channels, motion, deviations, missing.tolist(), strict=True)
-    return {channel.name: ChannelValue(value, deviation) for channel, value, deviation, gone in channels if not gone}
 
 
 ENCODING_SHARE = 0.8

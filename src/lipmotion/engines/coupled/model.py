@@ -10,9 +10,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.engines.base import read_presets
 from lipmotion.engines.coupled.chains.densities import Single
 from lipmotion.engines.coupled.chains.model import EIGENLIPS, Chains, Inference, VisualStream
-from lipmotion.engines.coupled.chains.product import PRESETS, STRUCTURES, UNSEEN_LOSS, Structure, list_unit_sets
+from lipmotion.engines.coupled.chains.product import STRUCTURES, UNSEEN_LOSS, Structure, list_unit_sets
 from lipmotion.engines.coupled.conversion import (
     EXACT,
     SOFT,
@@ -48,19 +49,15 @@ class CoupledConfig(Configuration):
     start_asynchrony, unseen_loss : of factorial chains without a limit: how far apart the chains may be while the first
                  densities are learned, and the nats that rare joint states lose (``chains.product.Structure``)
     moves_together : coupled chains may move on in the same frame more often than by chance; the paper's may not
-    mixtures, visual_mixtures : Gaussians per state, of the speech stream and of visual streams (powers of two); the
-                 structure ``hmm`` uses the first for both
+    mixtures, visual_mixtures : Gaussians per state, of speech (``hmm``: of all) and of visual streams (powers of two)
     speech_only_mixtures, speech_only_steps, speech_only_weight : of the second stage of training, on speech without
                  motion: Gaussians per state of speech, EM steps for each number of Gaussians, and the weight of such a
                  frame relative to one of speech with motion
-    audio_weight, visual_weight, eigenlips_weight : stream weights (exponents of the densities) of speech, of geometry,
-                 and of eigenlips
+    audio_weight, visual_weight, eigenlips_weight : exponents of the densities of speech, geometry and eigenlips
     conversion : ``trajectory``: parameter generation from expected precisions and means of static values, Δ and Δ²;
                  ``em``: the paper's, frame by frame;  ``viterbi``: means along the best path
-    start, update, steps : of EM conversion (``conversion.convert``); ``trajectory`` takes no
-                 steps after its soft start unless asked to
-    acoustic_regression : regress visual means on the acoustic features and state posteriors around the frame
-                 (``trajectory`` only)
+    start, update, steps : of EM conversion (``conversion.convert``); ``trajectory`` has a soft start and such steps
+    acoustic_regression : regress visual means on features and state posteriors around the frame (``trajectory`` only)
     components : principal components that all point channels are reduced to
     variance_scaling : scale movements to the variance of the recorded ones
     closures   : make the lips meet in every p, b and m
@@ -94,8 +91,8 @@ class CoupledConfig(Configuration):
     unseen_loss: float = option(UNSEEN_LOSS, Rule(least=0), omit_default=True)
     moves_together: bool = option(default=False, omit_default=True)
 
-    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
-    preset_visual: ClassVar[Mapping[str, str]] = dict.fromkeys(PRESETS, EIGENLIPS)
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = read_presets("coupled")
+    preset_visual: ClassVar[Mapping[str, str]] = dict.fromkeys(presets, EIGENLIPS)
     aliases: ClassVar[Mapping[str, str]] = {
         "crosses": "cross_units",
         "more_mixtures": "speech_only_mixtures",
@@ -104,9 +101,7 @@ class CoupledConfig(Configuration):
         "follows": "acoustic_regression",
         "full_range": "variance_scaling",
     }
-    hints: ClassVar[Mapping[str, str]] = {
-        "units": 'there is a unit set for each chain; say --set chains="phone viseme", not --units'
-    }
+    hints: ClassVar[Mapping[str, str]] = {"units": 'each chain has its own; say --set chains="phone viseme"'}
 
     def check_files(self) -> None:  # noqa: D102
         self.structure_with(list_unit_sets(self.chains))
@@ -141,8 +136,7 @@ class CoupledModel:
 
     space      : the motion space, of Q dimensions
     visual     : the visual streams, in the order of the chains' streams after speech
-    regression : of the visual means: the inputs, and the regression of each visual stream; None: the means are those of
-                 the chains' densities
+    regression : of the visual means: inputs, and the regression of each visual stream; None: means are the densities'
     scaling    : factors of variance scaling, away from the rest pose [shape=(Q,)]
     rest_pose  : the pose in silence away from speech [shape=(Q,)]
     closure    : how the lips close; None: the motion has no opening
@@ -165,19 +159,14 @@ class CoupledModel:
         return f"CoupledModel({', '.join(self.chains.streams)}; {size})"
 
     @cached_property
-    def limits(self) -> MotionLimits:
-        """The limits of generated motion: those of the poses and of the rest pose, widened by a standard deviation."""
+    def motion(self) -> LearnedMotion:
+        """What turns means and precisions into motion; limits are those of all poses, and a standard deviation more."""
         poses, deviation = self.pose_limits, np.zeros(self.space.dimensions)
         for stream in self.visual:
             deviation[stream.columns] = stream.deviation[: len(stream.columns)]
         low, high = np.minimum(poses.low, self.rest_pose), np.maximum(poses.high, self.rest_pose)
-        return MotionLimits(low, high).extend(deviation)
-
-    @cached_property
-    def motion(self) -> LearnedMotion:
-        """What turns means and precisions into motion: space, closure, limits, variance scaling."""
         scaling = VarianceScaling(self.scaling, self.rest_pose)
-        return LearnedMotion(self.space, self.closure, self.limits, scaling, self.prior)
+        return LearnedMotion(self.space, self.closure, MotionLimits(low, high).extend(deviation), scaling, self.prior)
 
     @property
     def pose_limits(self) -> MotionLimits:

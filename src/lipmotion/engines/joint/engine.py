@@ -11,7 +11,7 @@ from typing import Any, ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
+from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, read_presets
 from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.hmm.multistream.densities import MOTION, StreamObservations, StreamWeights, stream_observations
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_arrays, joint_to_arrays
@@ -44,17 +44,6 @@ from lipmotion.units import LIP_CLOSING, UnitSet, is_silent, load_unit_set
 
 COUNT = Rule(least=1)
 WEIGHT = Rule(least=0)
-HOFER_2008: Mapping[str, Any] = {
-    "units": "eVis",
-    "states": 5,
-    "mixtures": 8,
-    "recognise_units": True,
-    "own_alignment": True,
-    "both_neighbours": True,
-    "closures": False,
-    "articulation": False,
-}
-"""The system of Hofer 2008, as printed; docs/papers/hofer2008.md says what the print leaves open."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +93,7 @@ class JointEngineConfig(Configuration):
     flat_start: bool = option(False, omit_default=True)
     channels: str = option("", omit_default=True)
 
-    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"hofer2008": HOFER_2008}
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = read_presets("joint")
     removed: ClassVar[Mapping[str, Any]] = {"paths": 1, "seed": 0}
     aliases: ClassVar[Mapping[str, str]] = {"sees": "motion_in_training", "recognises": "recognise_units"}
 
@@ -153,19 +142,14 @@ class JointModel:
     prior: ArticulationPrior | None
 
     def __repr__(self) -> str:
-        return (
-            f"JointModel({self.units.name} units, {len(self.hmm.models)} streams, {self.space.dimensions} dimensions)"
-        )
-
-    @cached_property
-    def limits(self) -> MotionLimits:
-        """Limits of plausible motion."""
-        return self.poses.extend(self.hmm.models[MOTION].scale.deviation[: self.space.dimensions])
+        size = f"{len(self.hmm.models)} streams, {self.space.dimensions} dimensions"
+        return f"JointModel({self.units.name} units, {size})"
 
     @cached_property
     def motion(self) -> LearnedMotion:
         """What turns predicted means into motion."""
-        return LearnedMotion(self.space, self.closure, self.limits, prior=self.prior)
+        limits = self.poses.extend(self.hmm.models[MOTION].scale.deviation[: self.space.dimensions])
+        return LearnedMotion(self.space, self.closure, limits, prior=self.prior)
 
     @property
     def poses(self) -> MotionLimits:
@@ -240,7 +224,8 @@ class JointEngine(Engine[JointModel]):
             units = speech.units
             if self.config.own_alignment and speech.units_known and not speech.times_given:
                 units = _align_times(model, observations, units, duration_s)
-            path = _align(model, observations, units)
+            names, bounds = units_to_frames(units, observations.frames, model.units.silence[0], model.units.unit_of)
+            path = align(model.hmm, observations, names, bounds)
         means, precisions = merge_gaussians(select_densities(model.hmm, path))
         motion, variance = model.motion.generate(
             lambda frames: (means[frames], precisions[frames]),
@@ -251,11 +236,11 @@ class JointEngine(Engine[JointModel]):
             closing_units=tuple(u for u in model.units.units if set(model.units.phones(u)).issubset(LIP_CLOSING)),
         )
         forest = model.hmm.models[MOTION].forest
-        names = tuple(
+        states = tuple(
             f"{left}-{unit}+{right}.{state}: {forest.name(forest.leaf(((left, unit, right), state)))}"
             for (left, unit, right), state in path.states.triphones
         )
-        return Generation(motion, variance, with_unit_names(units, model.units), StateTrace(names, path.frames))
+        return Generation(motion, variance, with_unit_names(units, model.units), StateTrace(states, path.frames))
 
     def describe(self, model: JointModel) -> str:  # noqa: D102
         return model.hmm.text()
@@ -297,8 +282,3 @@ def _align_times(
     except AlignmentError:
         return units
     return frames_to_units((span.label for span in spoken), bounds, duration_s)
-
-
-def _align(model: JointModel, observations: StreamObservations, units: Timeline[Unit]) -> StatePath:
-    sequence, bounds = units_to_frames(units, observations.frames, model.units.silence[0], model.units.unit_of)
-    return align(model.hmm, observations, sequence, bounds)

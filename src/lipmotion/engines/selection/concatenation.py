@@ -36,6 +36,7 @@ class Piece:
     """Units that were recorded in succession, and where they are used.
 
     first, stop : the phones of the target
+    used        : these, and those beside them in which it overlaps with another piece
     join        : kind of the join with the piece before: ``ABUTTING_JOIN``, ``JOIN_BEFORE`` or ``JOIN_AFTER``
     start_s     : time of that join in the target; the piece counts for half there
     overlap_s   : the pieces overlap from so much before this time to so much after it; 0 for a hard join
@@ -43,6 +44,7 @@ class Piece:
 
     first: int
     stop: int
+    used: range
     unit: int
     join: int
     start_s: float
@@ -68,20 +70,21 @@ def to_pieces(costs: Costs, target: Target, units: UnitNumbers) -> list[Piece]:
             start_s = begin_s + share * (end_s - begin_s)
             overlap_s = float(np.clip(min(share, 1 - share) * (end_s - begin_s), MIN_OVERLAP_S, MAX_OVERLAP_S))
         start_s = latest_s = max(start_s, latest_s + SHORTEST_S)
-        pieces.append(Piece(first, stop, int(units[first]), kinds[first], start_s, overlap_s))
+        is_shared = kinds[stop : stop + 1] == [JOIN_AFTER]
+        used = range(first - (kinds[first] == JOIN_BEFORE), stop + is_shared)
+        pieces.append(Piece(first, stop, used, int(units[first]), kinds[first], start_s, overlap_s))
     return pieces
 
 
 def join_pieces(inventory: RecordedUnits, target: Target, pieces: list[Piece], frames: int) -> Array:
     """Return the motion of some pieces in the motion space, 100 frames a second [shape=(frames, Q)].
 
-    Where pieces overlap, the weight of the next one rises from 0 to 1 along a raised cosine. Abutting pieces are bent
-    towards one another.
+    Where pieces overlap, the next one's weight rises along a raised cosine. Abutting pieces are bent together.
     """
     time_s = np.arange(frames) / FRAME_RATE_HZ
     result, total = np.zeros((frames, inventory.values.shape[1])), np.zeros((frames, 1))
     nexts = [*pieces[1:], None]
-    clocks = [TimeMap.of(inventory, target, *pair) for pair in zip(pieces, nexts, strict=True)]
+    clocks = [TimeMap.of(inventory, target, piece) for piece in pieces]
     for number, (piece, following, clock) in enumerate(zip(pieces, nexts, clocks, strict=True)):
         begin_s = piece.start_s - piece.overlap_s if number else -np.inf
         end_s = following.start_s + following.overlap_s if following is not None else np.inf
@@ -106,10 +109,8 @@ def list_shown_units(target: Target, pieces: Sequence[Piece], frames: int) -> Un
     time_s = np.arange(frames) / FRAME_RATE_HZ + ROUNDING_S
     leading = np.maximum(np.searchsorted([piece.start_s for piece in pieces], time_s, side="right") - 1, 0)
     numbers = np.maximum(np.searchsorted(target.windows.times_s[:, 0], time_s, side="right") - 1, 0)
-    followed = [piece.join == JOIN_AFTER for piece in pieces[1:]] + [False]
-    lowest = np.array([piece.first - (piece.join == JOIN_BEFORE) for piece in pieces])[leading]
-    highest = np.array([piece.stop - 1 + more for piece, more in zip(pieces, followed, strict=True)])[leading]
-    shift = np.array([piece.unit - piece.first for piece in pieces])[leading]
+    bounds = [(piece.used.start, piece.used.stop - 1, piece.unit - piece.first) for piece in pieces]
+    lowest, highest, shift = np.array(bounds)[leading].T
     return np.clip(numbers, lowest, highest) + shift
 
 
@@ -126,13 +127,11 @@ class TimeMap:
     recorded_s: Array
 
     @classmethod
-    def of(cls, inventory: RecordedUnits, target: Target, piece: Piece, following: Piece | None) -> TimeMap:
+    def of(cls, inventory: RecordedUnits, target: Target, piece: Piece) -> TimeMap:
         """Return the map of a piece."""
-        first = piece.first - (piece.join == JOIN_BEFORE)
-        stop = piece.stop + (following is not None and following.join == JOIN_AFTER)
         shift = piece.unit - piece.first
         pairs = []  # the start and the end of each phone, in the target and in the recording; of a silence, its pause
-        for number in range(first, stop):
+        for number in piece.used:
             start_s, end_s = target.windows.times_s[number].tolist()
             from_s, to_s = inventory.windows.times_s[number + shift].tolist()
             pairs.append((start_s, from_s))
@@ -174,10 +173,8 @@ def _smooth(
     phones = (PHONES[target.windows.phones[number]] for number in (after.first - 1, after.first))
     one, other = (phone in PROTECTED_PHONES for phone in phones)
     shares = (0.0, 1.0) if one and not other else (1.0, 0.0) if other and not one else (0.5, 0.5)
-    spans_s = (
-        SMOOTHED_SHARE * (join_s - times_s[before.first, 0]),
-        SMOOTHED_SHARE * (times_s[after.stop - 1, 1] - join_s),
-    )
+    begin_s, end_s = times_s[before.first, 0], times_s[after.stop - 1, 1]
+    spans_s = SMOOTHED_SHARE * (join_s - begin_s), SMOOTHED_SHARE * (end_s - join_s)
     for side, (share, span_s) in enumerate(zip(shares, spans_s, strict=True)):
         width_s = float(np.clip(span_s, MIN_OVERLAP_S, MAX_OVERLAP_S))
         away_s = (join_s - time_s) if side == 0 else (time_s - join_s)

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.engines.base import read_presets
 from lipmotion.engines.selection.inventory import (
     INVISIBLE,
     INVISIBLE_SYMBOL,
@@ -23,30 +24,16 @@ from lipmotion.engines.selection.inventory import (
     UnitIndex,
     UnitNumbers,
     find_lip_class,
-    find_substitutes,
     index_units,
     parse_invisible,
 )
 from lipmotion.errors import InputError
 from lipmotion.motion.predictors import AUTOMATIC, check_predictor
 from lipmotion.types import FRAME_RATE_HZ, Configuration, Rule, option
-from lipmotion.units import PHONES
+from lipmotion.units import PHONES, find_similar_lips
 from lipmotion.units.phones import CLASSES
 
 NOT_NEGATIVE = Rule(least=0)
-MINNIS_2000: Mapping[str, Any] = {
-    "candidates": 0,
-    "beam": 0,
-    "suppressed": True,
-    "overlap": "printed",
-    "duration": 0.0,
-    "guide": 0.0,
-    "join": 0.0,
-    "joint_recogniser": False,
-    "closures": False,
-    "articulation": False,
-}
-"""The system of Minnis & Breen 2000, as far as it is printed (docs/papers/minnis2000.md)."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +99,7 @@ class SelectionConfig(Configuration):
     predictor: str = option(AUTOMATIC, omit_default=True)
     suppressed: bool = option(False, omit_default=True)
 
-    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"minnis2000": MINNIS_2000}
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = read_presets("selection")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -187,8 +174,9 @@ class Costs:
 
     @cached_property
     def stand_ins(self) -> dict[str, str]:
-        """The phone that stands in for each phone which the inventory lacks."""
-        return find_substitutes(self.inventory.windows, self.inventory.usable)
+        """The phone that stands in for each phone that no usable unit has; none, if no unit is usable."""
+        known = {PHONES[number] for number in np.unique(self.inventory.windows.phones[self.inventory.usable])}
+        return {phone: find_similar_lips(phone, known) for phone in PHONES if phone not in known and known}
 
     def shown(self, windows: PhoneWindows) -> PhoneWindows:
         """Return the phones of one recording without those that are suppressed, if any are."""
@@ -373,8 +361,7 @@ def select(
     prune    : leave out candidates that cannot be part of the best sequence, and those beyond the beam
     A candidate whose target cost exceeds the least one of its phone by more than two joins can cost is never the best:
     the one of least target cost in its place would be better. So this does not change the cost of the result. Of the
-    others, the beam keeps those of the least target costs: by how much that changes the cost was measured
-    (docs/results/selection.md).
+    others, the beam keeps those of the least target costs, which changes it little (docs/results/selection.md).
     Source: Minnis & Breen 2000, §3.
     """
     required = required or {}

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
 from lipmotion.engines.selection.concatenation import Piece, TimeMap, join_motion, list_shown_units, to_pieces
-from lipmotion.engines.selection.costs import JOIN_AFTER, JOIN_BEFORE, Costs, SelectionConfig, Target, select
+from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target, select
 from lipmotion.engines.selection.inventory import PHONE_NUMBER, SOURCE, RecordedUnits, find_source, list_windows
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
 from lipmotion.engines.selection.selection_training import build_target, fit_selection
@@ -42,30 +42,28 @@ SOUND: dict[str, Any] = {
 ROUNDING_S = 1e-6
 
 
-def with_sources(units: Timeline[Unit], starts_s: Array, sources: Sequence[str]) -> Timeline[Unit]:
+def _name_sources(
+    units: Timeline[Unit], target: Target, inventory: RecordedUnits, chosen: NDArray[np.intp]
+) -> Timeline[Unit]:
     """Return the timeline with the unit of every phone named by its recorded source."""
-    return Timeline(
-        tuple(
-            replace(span, label=replace(span.label, unit=sources[int(np.argmin(np.abs(starts_s - span.start_s)))]))
-            for span in units
-        )
-    )
+    nearest = [int(np.argmin(np.abs(target.windows.times_s[:, 0] - span.start_s))) for span in units]
+    sources = [find_source(inventory, int(chosen[number])) for number in nearest]
+    labelled = zip(units, sources, strict=True)
+    return Timeline(tuple(replace(span, label=replace(span.label, unit=source)) for span, source in labelled))
 
 
 def _source_piece(inventory: RecordedUnits, target: Target, piece: Piece, following: Piece | None) -> SourcePiece:
     """Return a piece in the time of its recording, from the middle of one join to the middle of the next."""
-    clock = TimeMap.of(inventory, target, piece, following)
+    clock = TimeMap.of(inventory, target, piece)
     recorded, shift = inventory.windows.times_s, piece.unit - piece.first
-    first = piece.first - (piece.join == JOIN_BEFORE)
-    stop = piece.stop + (following is not None and following.join == JOIN_AFTER)
-    begin_s, end_s = recorded[first + shift, 0], recorded[stop - 1 + shift, 1]
+    begin_s, end_s = recorded[piece.used.start + shift, 0], recorded[piece.used.stop - 1 + shift, 1]
     if piece.first:
         begin_s = float(clock(np.array([piece.start_s]))[0])
     if following is not None:
         end_s = float(clock(np.array([following.start_s]))[0])
     starts = {
         number: float(recorded[number + shift, 0])
-        for number in range(first, stop)
+        for number in piece.used
         if begin_s - ROUNDING_S <= recorded[number + shift, 0] < end_s - ROUNDING_S
     }
     name = inventory.names[inventory.windows.recording[piece.unit]]
@@ -113,11 +111,9 @@ class SelectionEngine(Engine[SelectionModel]):
         units = select(costs, target, required=_find_named_units(costs, target, speech.units))[0]
         pieces = to_pieces(costs, target, units)
         motion, variance = join_motion(model, costs, target, units, pieces, speech, constraints)
-        sources = [find_source(costs.inventory, unit) for unit in units.tolist()]
-        starts_s = target.windows.times_s[:, 0]
         shown, places = np.unique(list_shown_units(target, pieces, frames), return_inverse=True)
         trace = StateTrace(tuple(find_source(costs.inventory, unit) for unit in shown.tolist()), places.astype(np.intp))
-        return Generation(motion, variance, with_sources(speech.units, starts_s, sources), trace)
+        return Generation(motion, variance, _name_sources(speech.units, target, costs.inventory, units), trace)
 
     def recordings(self, model: SelectionModel) -> tuple[str, ...]:  # noqa: D102
         return model.inventory.names
@@ -139,8 +135,7 @@ class SelectionEngine(Engine[SelectionModel]):
             if name not in features or len(features[name]) != length:
                 found = f"{len(features[name])} frames" if name in features else "nothing"
                 raise InputError(
-                    f"recording {name}: {found} of sound, required {length} frames; "
-                    "give the corpus that the model learned"
+                    f"recording {name}: {found} of sound, required {length} frames; give the learned corpus"
                 )
         sound = np.concatenate([np.asarray(features[name], float) for name in inventory.names])
         inventory = replace(inventory, stored_ranges=np.array([[0, len(sound)]]), motion=sound, predicted=None)
@@ -148,12 +143,9 @@ class SelectionEngine(Engine[SelectionModel]):
         target = costs.target(list_windows([units]), None, None)
         chosen = select(costs, target)[0]
         pieces = to_pieces(costs, target, chosen)
-        sources = [find_source(inventory, unit) for unit in chosen.tolist()]
         pairs = zip(pieces, [*pieces[1:], None], strict=True)
-        return (
-            tuple(_source_piece(inventory, target, *pair) for pair in pairs),
-            with_sources(units, target.windows.times_s[:, 0], sources),
-        )
+        sources = tuple(_source_piece(inventory, target, *pair) for pair in pairs)
+        return sources, _name_sources(units, target, inventory, chosen)
 
     def to_arrays(self, model: SelectionModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         return model_arrays(model)

@@ -16,27 +16,21 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
-from lipmotion.units import PHONES, SILENCE, close_gaps, describe_unknown_phone, find_similar_lips, is_silent
+from lipmotion.units import PHONES, SILENCE, close_gaps, describe_unknown_phone, is_silent
 from lipmotion.units.phones import VISEME_OF, VISEMES
 from lipmotion.units.stress import NUCLEI, find_stress
 
 PROTECTED_PHONES = ("f", "v", "m", "em", "p", "b")
 """Phones whose lip shape every join must preserve. The paper lists /v/ twice and /b/ never."""
-PROTECTED, INVISIBLE, NORMAL = "protected", "invisible", "normal"
+LIP_CLASSES = PROTECTED, INVISIBLE, NORMAL = "protected", "invisible", "normal"
 
 Overlaps = Mapping[tuple[str, str], float]
 """The forward share of a shared phone, 0 to 1, by the classes of the phones before and after it."""
 
 TABLE_1: Overlaps = {
-    (PROTECTED, PROTECTED): 0.50,
-    (PROTECTED, INVISIBLE): 0.77,
-    (PROTECTED, NORMAL): 0.55,
-    (INVISIBLE, PROTECTED): 0.23,
-    (INVISIBLE, INVISIBLE): 0.50,
-    (INVISIBLE, NORMAL): 0.27,
-    (NORMAL, PROTECTED): 0.45,
-    (NORMAL, INVISIBLE): 0.77,
-    (NORMAL, NORMAL): 0.50,
+    (before, after): share
+    for before, row in zip(LIP_CLASSES, ((0.50, 0.77, 0.55), (0.23, 0.50, 0.27), (0.45, 0.77, 0.50)), strict=True)
+    for after, share in zip(LIP_CLASSES, row, strict=True)
 }
 """Table 1 as printed. Its rows (forward) are the phone before, its columns (backward) the phone after."""
 SYMMETRIC: Overlaps = {**TABLE_1, (NORMAL, INVISIBLE): 0.73}
@@ -334,12 +328,6 @@ def digits(bias: int, window: int) -> list[int]:
     left, right = list(range(middle - 1, -1, -1)), list(range(middle + 1, window))
     sides = (left + right, right + left, [column for pair in zip(left, right, strict=True) for column in pair])
     return [middle, *sides[bias]]
-
-
-def find_substitutes(windows: PhoneWindows, usable: NDArray[np.bool_]) -> dict[str, str]:
-    """Return for every phone that no usable unit has the phone that stands in for it."""
-    known = {PHONES[number] for number in np.unique(windows.phones[usable])}
-    return {phone: find_similar_lips(phone, known) for phone in PHONES if phone not in known} if known else {}
 
 
 def _keys(columns: NDArray[np.intp]) -> NDArray[np.int64]:

@@ -34,10 +34,6 @@ class Guide:
     centre: Array
     expansion: Array
 
-    def expanded(self, predicted: Array) -> Array:
-        """Return predicted motion [shape=(..., Q)] as wide as recorded motion."""
-        return self.centre + (predicted - self.centre) * self.expansion
-
 
 def interpolate_at(motion: Array, times_s: Array) -> Array:
     """Return motion of one recording [shape=(T, Q)] at the points of each of its phones [shape=(U, POINTS, Q)]."""

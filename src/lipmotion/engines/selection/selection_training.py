@@ -48,7 +48,8 @@ def build_target(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
         units = Timeline(tuple(Span(a, b, Unit(SILENCE)) for a, b in pairwise(edges)))
     windows = list_windows([units]) if by_sound else costs.shown(list_windows([units]))
     predicted = interpolate_at(motion, windows.times_s)
-    return costs.target(windows, guide.expanded(predicted), predicted, by_sound=by_sound)
+    guided = guide.centre + (predicted - guide.centre) * guide.expansion  # as wide as recorded motion
+    return costs.target(windows, guided, predicted, by_sound=by_sound)
 
 
 Array = NDArray[np.float64]
@@ -98,7 +99,7 @@ def fit_selection(
     weights = np.ones(len(deviations))
     weights[:count] = [CHANNEL_WEIGHTS.get(name, 1.0) for name in motion.space.direct_names]
     scale = np.sqrt(weights) / deviations
-    rest, unknown = _rest_pose(examples, values, motion.space), np.ones((3, len(scale)))
+    rest, unknown = _rest_pose(examples, values, recorded, motion.space), np.ones((3, len(scale)))
     model = SelectionModel(motion, inventory, scale, rest, unknown, guide, recogniser)
     costs, errors = model.costs(config), []
     numbers = np.unique(np.linspace(0, len(examples) - 1, LEFT_OUT_RECORDINGS).astype(int)).tolist()
@@ -130,17 +131,13 @@ def build_inventory(examples: Sequence[Example], values: Sequence[Array], guide:
     spoken = ~np.array([is_silent(span.label.phone) for units in timelines for span in units], bool)
     usable &= np.isin(windows.recording, windows.recording[spoken])  # of others, no motion is stored
     if not (usable & spoken).any():
-        raise CorpusError(
-            f"no phone in {len(examples)} recordings has its motion measured throughout; record more speech"
-        )
+        raise CorpusError(f"no phone in {len(examples)} recordings is measured throughout; record more speech")
     predicted = None
     if guide is not None:
-        predicted = np.concatenate(
-            [
-                interpolate_at(guide.predictor.predict(example.speech)[0], windows.times_s[windows.recording == number])
-                for number, example in enumerate(examples)
-            ]
-        ).astype(np.float16)
+        motions = (guide.predictor.predict(example.speech)[0] for example in examples)
+        times_s = (windows.times_s[windows.recording == number] for number in range(len(examples)))
+        points = [interpolate_at(*pair) for pair in zip(motions, times_s, strict=True)]
+        predicted = np.concatenate(points).astype(np.float16)
     names = tuple(example.name for example in examples)
     stored = list[list[int]]()  # ranges of rows: not the middle of long silences, nor what was not measured
     for example, begin in zip(examples, first[:-1].tolist(), strict=True):
@@ -151,16 +148,12 @@ def build_inventory(examples: Sequence[Example], values: Sequence[Array], guide:
     return RecordedUnits(names, windows, usable, first, np.array(stored, np.intp), motion, predicted)
 
 
-def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: MotionSpace) -> Array:
+def _rest_pose(examples: Sequence[Example], values: Sequence[Array], recorded: Array, space: MotionSpace) -> Array:
     """Return the mean pose in silence away from speech, or that of the least open frames [shape=(Q,)]."""
-    poses = np.concatenate(
-        [
-            x[example.valid & mark_distant(example.speech.units, len(x), REST_AWAY_S)]
-            for example, x in zip(examples, values, strict=True)
-        ]
-    )
+    away = (example.valid & mark_distant(example.speech.units, len(example.valid), REST_AWAY_S) for example in examples)
+    poses = np.concatenate([x[frames] for x, frames in zip(values, away, strict=True)])
     if len(poses) < MIN_REST_FRAMES:
-        poses = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
+        poses = recorded
         if OPENING in space.direct_names:
             opening = poses[:, space.direct_names.index(OPENING)]
             poses = poses[opening <= np.percentile(opening, 10)]

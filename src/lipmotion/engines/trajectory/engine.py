@@ -79,12 +79,10 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
 
     def generate(self, model: TrajectoryModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         frames = len(speech.features.values)
-        layout = self.config.layout(model.units)
-        states = label_full_context(speech.units, frames, layout)
+        states = label_full_context(speech.units, frames, model.emission.layout)
         distinct = {state: number for number, state in enumerate(dict.fromkeys(states))}
         path = np.array([distinct[state] for state in states], np.intp)
-        rows = np.array([model.emission.row(state, layout) for state in distinct], np.intp)
-        densities = rows[path]
+        densities = model.emission.rows(states)
         silent = find_digital_silence(np.asarray(speech.features.values), speech.units)
         densities[silent] = len(model.emission.means) - 1
         experts = Experts(model.emission, densities, speech, model.network, model.prior, model.network_share, silent)
@@ -104,7 +102,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
             motion,
             variance,
             with_unit_names(speech.units, model.units),
-            StateTrace(tuple(model.emission.source(state, layout) for state in distinct), path),
+            StateTrace(tuple(model.emission.source(state) for state in distinct), path),
         )
 
     def describe(self, model: TrajectoryModel) -> str:  # noqa: D102

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -46,22 +46,18 @@ class TrajectoryConfig(Configuration):
     shrinkage, variance_shrinkage : weights, in frames, of the mean and of the variance of the parent node
     acoustic_regression : regress the means on the acoustic features around the frame (False: plain Gaussians)
     acoustic_components : principal components that the acoustic features around a frame are reduced to
-    ridge, shared_ridge : ridge parameters: of a regression towards that of the parent node, and of the regression that
-                 all nodes share towards zero
+    ridge, shared_ridge : ridge parameters: of a node's regression towards its parent's, of the one of all towards zero
     ridge_frames : smallest number of frames of a node with a regression of its own
     variance_scaling : scale generated movements to the variance of recorded ones
     closures   : make the lips meet in every p, b and m, whatever their units are
-    joint_recogniser : train the joint model as well, where there is enough speech: it recognises the phones of
-                 speakers that it was trained on
-    conditions : acoustic conditions in which each recording is used in the training of the acoustic network; 0: no
-                 network
+    joint_recogniser : train the joint model as well, where there is enough speech: it recognises phones of its speakers
+    conditions : acoustic conditions in which the acoustic network is trained on each recording; 0: no network
     epochs     : how often the training of the network uses each recording
     predictor  : name of the predictor beside the states (docs/extend/predictor.md); ``auto``: an acoustic network, or,
                  where the model stands on another one, a regression on what that makes of the speech
     articulation : lean on the table of English articulation in contexts that training saw little of
     units      : name of a unit set, or path of a table of units (docs/unit-sets.md), which training reads
-    modulation_filter : how far generated motion is given the modulation spectrum of recorded motion: 0 not at all, 1
-                 wholly; more goes beyond it (docs/results/jerk.md)
+    modulation_filter : how far motion gets the modulation spectrum of recordings, 0 to 1 or more (docs/results/jerk.md)
     """
 
     states: int = option(5, ODD)
@@ -106,11 +102,6 @@ class TrajectoryConfig(Configuration):
         """Return the states of phones and silences, for a unit set."""
         return StateLayout(self.states, self.silent_states, self.edge_s, units)
 
-    @property
-    def training_layout(self) -> StateLayout:
-        """The states of the unit set that training reads. Raises InputError: no such unit set, or errors in a table."""
-        return self.layout(load_unit_set(self.units))
-
 
 Array = NDArray[np.float64]
 
@@ -133,11 +124,13 @@ class AcousticRegression:
 class Emission:
     """Densities of static value, Δ and Δ² (Q dimensions each) of all tied states.
 
+    layout     : the states of phones and silences
     forest     : a decision tree for every state of speech and of silence (``StateLayout.names``)
     means, variances : float32 arrays [shape=(L, 3, Q)], leaf by leaf, tree by tree; the last row is the rest pose
     regression : regression of the means on acoustic features (None: the means are constant)
     """
 
+    layout: StateLayout
     forest: Mapping[str, Tree]
     means: NDArray[np.float32]
     variances: NDArray[np.float32]
@@ -152,18 +145,23 @@ class Emission:
     def _names(self) -> dict[tuple[str, int], str]:
         return {}
 
-    def row(self, state: FullContextState, layout: StateLayout) -> int:
+    def row(self, state: FullContextState) -> int:
         """Return the number of the density of a full-context state: its row in ``means``."""
-        if state == layout.rest:
+        if state == self.layout.rest:
             return len(self.means) - 1
-        name = layout.name(state)
+        name = self.layout.name(state)
         return self._first_rows[name] + self.forest[name].rank(state.context)
 
-    def source(self, state: FullContextState, layout: StateLayout) -> str:
+    def rows(self, states: Sequence[FullContextState]) -> NDArray[np.intp]:
+        """Return the number of the density of each state [shape=(len(states),)]."""
+        distinct = {state: self.row(state) for state in dict.fromkeys(states)}
+        return np.array([distinct[state] for state in states], np.intp)
+
+    def source(self, state: FullContextState) -> str:
         """Return the origin of the density of a state, in words: its tree, its leaf, and the frames of the leaf."""
-        if state == layout.rest:
+        if state == self.layout.rest:
             return "rest"
-        name = layout.name(state)
+        name = self.layout.name(state)
         tree = self.forest[name]
         rank = tree.rank(state.context)
         if (name, rank) not in self._names:
@@ -172,22 +170,17 @@ class Emission:
         left, unit, right = state.context
         return f"{left}-{unit}+{right} {name}: {self._names[name, rank]}"
 
-    def statistics(self, rows: NDArray[np.intp], features: NDArray[np.float32], frames: slice) -> tuple[Array, Array]:
-        """Return means and precisions [each shape=(N, 3, Q)] of N successive frames of densities [shape=(N,)]."""
+    def statistics(
+        self, rows: NDArray[np.intp], features: NDArray[np.float32], frames: slice | NDArray[np.intp]
+    ) -> tuple[Array, Array]:
+        """Return means and precisions [each shape=(N, 3, Q)] of N of the frames, of densities [shape=(N,)]."""
         means, precisions = self.means[rows].astype(float), 1 / self.variances[rows].astype(float)
         if self.regression is not None:
-            add_acoustic_regression(means, self.regression, rows, self.regression.context(features, frames))
+            z, used = self.regression.context(features, frames), self.regression.rows[rows]
+            for row in np.unique(used[used >= 0]):
+                places = np.nonzero(used == row)[0]
+                means[places] += (z[places] @ self.regression.coefficients[row]).reshape(len(places), *means.shape[1:])
         return means, precisions
-
-
-def add_acoustic_regression(
-    means: Array, regression: AcousticRegression, rows: NDArray[np.intp], z: NDArray[np.float32]
-) -> None:
-    """Add the regressions on reduced features [shape=(N, F)] to constant means [shape=(N, 3, Q)], in place."""
-    used = regression.rows[rows]
-    for row in np.unique(used[used >= 0]):
-        frames = np.nonzero(used == row)[0]
-        means[frames] += (z[frames] @ regression.coefficients[row]).reshape(len(frames), *means.shape[1:])
 
 
 def emission_from_arrays(arrays: Arrays, layout: StateLayout, dimensions: int) -> Emission:
@@ -199,9 +192,7 @@ def emission_from_arrays(arrays: Arrays, layout: StateLayout, dimensions: int) -
     """
     forest = trees_from_arrays(arrays)
     if len(forest) != layout.speech + layout.silence or list(forest) != layout.names:
-        raise ValueError(
-            f"trees for {len(forest)} states, required {layout.speech} of speech and {layout.silence} of silence"
-        )
+        raise ValueError(f"trees for {len(forest)} states, required {layout.speech} and {layout.silence} of silence")
     leaves = sum(len(tree.leaves) for tree in forest.values()) + 1
     densities = check_arrays(arrays, DENSITIES, L=leaves, Q=dimensions)
     check_spread(densities["means"][:, 0], densities["variances"][:, 0])
@@ -212,7 +203,7 @@ def emission_from_arrays(arrays: Arrays, layout: StateLayout, dimensions: int) -
         if rows.max() >= stored.sizes["C"]:
             raise ValueError(f"a density that uses regression {rows.max()} of {stored.sizes['C']}")
         regression = AcousticRegression(acoustic_context_from_arrays(stored), stored["coefficients"], rows)
-    return Emission(forest, densities["means"], densities["variances"], regression)
+    return Emission(layout, forest, densities["means"], densities["variances"], regression)
 
 
 DENSITIES = {"means": ArraySpec(np.float32, "L 3 Q"), "variances": ArraySpec(np.float32, "L 3 Q", POSITIVE)}
@@ -321,19 +312,14 @@ class TrajectoryModel:
         return f"TrajectoryModel({self.units.name} units, {states}, {self.space.dimensions} dimensions)"
 
     @cached_property
-    def limits(self) -> MotionLimits:
-        """Limits of plausible motion."""
-        return self.poses.extend(np.sqrt(self.emission.variances[:, 0].max(axis=0)))
-
-    @cached_property
     def motion(self) -> LearnedMotion:
         """Motion space, closure, limits and variance scaling, which turn predicted means into motion."""
         scaling = VarianceScaling(self.variance_factors, self.emission.means[-1, 0])
-        prior = self.prior
+        limits, prior = self.poses.extend(np.sqrt(self.emission.variances[:, 0].max(axis=0))), self.prior
         if prior is not None and self.network is not None:
             weaker = replace(prior, weight=TABLE_WEIGHT_WITH_PREDICTOR, known_voice_share=KNOWN_VOICE_SHARE)
             prior = None if self.network.uses_articulation else weaker
-        return LearnedMotion(self.space, self.closure, self.limits, scaling, prior, self.modulation)
+        return LearnedMotion(self.space, self.closure, limits, scaling, prior, self.modulation)
 
     @property
     def poses(self) -> MotionLimits:

@@ -15,18 +15,17 @@ from lipmotion.engines.trajectory.model import (
     Experts,
     TrajectoryConfig,
     TrajectoryModel,
-    add_acoustic_regression,
 )
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.kernels.banded import solve_mlpg
-from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
+from lipmotion.motion.articulation import fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.context_window import fit_acoustic_context
 from lipmotion.motion.frame_labels import FullContextState, StateLayout, label_full_context
 from lipmotion.motion.generation import fit_scaling_factors
 from lipmotion.motion.modulation_filter import learn_filter
-from lipmotion.motion.predictors import Predictor, PredictorTraining, choose_predictor, split_folds
+from lipmotion.motion.predictors import PredictorTraining, choose_predictor, split_folds
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 from lipmotion.stats.trees import (
@@ -40,6 +39,7 @@ from lipmotion.stats.trees import (
 )
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Example, Monitor, Progress, Speech, sub_monitor
+from lipmotion.units import load_unit_set
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,20 +57,9 @@ class TrainingClip:
     rows: NDArray[np.float32]
 
     @property
-    def features(self) -> NDArray[np.float32]:
-        """Acoustic features [shape=(T, D)]."""
-        return np.asarray(self.speech.features.values)
-
-    @property
     def training_states(self) -> list[FullContextState]:
         """Full-context state of each frame of ``frames`` [length N]."""
         return [self.states[frame] for frame in self.frames]
-
-
-def find_density_rows(emission: Emission, states: Sequence[FullContextState], layout: StateLayout) -> NDArray[np.intp]:
-    """Return the number of the density of each state [shape=(len(states),)]."""
-    distinct = {state: emission.row(state, layout) for state in dict.fromkeys(states)}
-    return np.array([distinct[state] for state in states], np.intp)
 
 
 Array = NDArray[np.float64]
@@ -81,18 +70,15 @@ CLIPS_PER_BLOCK = 64
 """Examples of a block; the frames of a block are sorted by the node whose regression they belong to."""
 
 
-def fit_acoustic_regression(
-    emission: Emission, clips: Sequence[TrainingClip], options: TrajectoryConfig, layout: StateLayout
-) -> Emission:
+def fit_acoustic_regression(emission: Emission, clips: Sequence[TrainingClip], options: TrajectoryConfig) -> Emission:
     """Return the densities with means that are regressed on acoustic features, and variances around these means.
 
     Every node of the trees with enough frames has a linear regression on the features around the frame, shrunk towards
     that of its parent node, so that states with few frames share the regression of their relatives.
     """
-    context = fit_acoustic_context((clip.features for clip in clips), options.acoustic_components)
-    min_frames = max(
-        options.ridge_frames, sum(float(tree.frames[0]) for tree in emission.forest.values()) / SHARE_DIVISOR
-    )
+    context = fit_acoustic_context((clip.speech.features.values for clip in clips), options.acoustic_components)
+    frames = sum(float(tree.frames[0]) for tree in emission.forest.values())
+    min_frames = max(options.ridge_frames, frames / SHARE_DIVISOR)
     owners: list[_Node | None] = []  # of each density, the last node on its path with enough frames; or the root
     for name, tree in emission.forest.items():
         for leaf in tree.leaves.tolist():
@@ -105,8 +91,8 @@ def fit_acoustic_regression(
     number_of_row = np.array([nodes.index(node) if node is not None else len(nodes) for node in owners])
     for start in range(0, len(clips), CLIPS_PER_BLOCK):
         block = clips[start : start + CLIPS_PER_BLOCK]
-        rows = np.concatenate([find_density_rows(emission, clip.training_states, layout) for clip in block])
-        z = np.concatenate([context(clip.features, clip.frames) for clip in block])
+        rows = np.concatenate([emission.rows(clip.training_states) for clip in block])
+        z = np.concatenate([context(clip.speech.features.values, clip.frames) for clip in block])
         error = np.concatenate([clip.rows for clip in block]) - emission.means[rows]
         order = np.argsort(number_of_row[rows], kind="stable")
         z, error = z[order], error[order].reshape(len(order), -1).astype(np.float32)
@@ -124,25 +110,19 @@ def fit_acoustic_regression(
     index = {node: number for number, node in enumerate(matrices)}
     rows = np.array([-1 if node is None else index[node] for node in owners], np.int32)
     regression = AcousticRegression(context, np.array(list(matrices.values()), np.float32), rows)
-    return replace(emission, regression=regression, variances=_variances(emission, regression, clips, options, layout))
+    emission = replace(emission, regression=regression)
+    return replace(emission, variances=_variances(emission, clips, options))
 
 
 _Node = tuple[str, int]  # a node of a tree: name of the tree, number of the node
 
 
-def _variances(
-    emission: Emission,
-    regression: AcousticRegression,
-    clips: Sequence[TrainingClip],
-    options: TrajectoryConfig,
-    layout: StateLayout,
-) -> NDArray[np.float32]:
+def _variances(emission: Emission, clips: Sequence[TrainingClip], options: TrajectoryConfig) -> NDArray[np.float32]:
     """Return the variances around the regressed means, shrunk towards those of all frames together."""
     squares, counts = np.zeros(emission.means.shape), np.zeros(len(emission.means))
     for clip in clips:
-        rows = find_density_rows(emission, clip.training_states, layout)
-        means = emission.means[rows].astype(float)
-        add_acoustic_regression(means, regression, rows, regression.context(clip.features, clip.frames))
+        rows = emission.rows(clip.training_states)
+        means, _ = emission.statistics(rows, clip.speech.features.values, clip.frames)
         np.add.at(squares, rows, np.square(clip.rows - means))
         np.add.at(counts, rows, 1)
     strength = options.variance_shrinkage
@@ -170,36 +150,37 @@ def fit_trajectory(
     if options.joint_recogniser:
         phone_recogniser = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.3), checkpoint)
     monitor = sub_monitor(monitor, 0.3, 1)
-    layout = options.training_layout
+    layout = options.layout(load_unit_set(options.units))
     clips = []
     for example, x in zip(examples, values, strict=True):
         frames = np.nonzero(mark_known_dynamics(example.valid))[0]
         rows = with_dynamics(x)[frames].astype(np.float32)
-        clips.append(
-            TrainingClip(example.speech, label_full_context(example.speech.units, len(x), layout), frames, rows)
-        )
+        labels = label_full_context(example.speech.units, len(x), layout)
+        clips.append(TrainingClip(example.speech, labels, frames, rows))
     states = (state for clip in clips for state in clip.training_states)
     covered = {layout.name(state) for state in states if state.unit not in layout.units.silence}
     if len(covered) < layout.speech:
-        raise CorpusError(
-            f"motion was seen in {len(covered)} of {layout.speech} states of a phone; learn from more speech"
-        )
+        raise CorpusError(f"{len(covered)} of {layout.speech} states of a phone have motion; learn from more speech")
     monitor(Progress(_STAGE, 1, 3, 0.1))
     emission = _fit_emission(clips, options, layout)
     if options.acoustic_regression:
         monitor(Progress(_STAGE, 2, 3, 0.3))
-        emission = fit_acoustic_regression(emission, clips, options, layout)
+        emission = fit_acoustic_regression(emission, clips, options)
     prior = fit_articulation_prior(space, values, examples) if options.articulation else None
     network, share, direct = None, NETWORK_SHARE, len(space.direct)
     kind = choose_predictor(options.predictor, examples)
     if kind is not None:
         predictor_monitor = sub_monitor(monitor, 0.4, 0.99)
-        network, held_out = kind.fit(
-            PredictorTraining(examples, values, direct, options.epochs, predictor_monitor, checkpoint)
-        )
+        training = PredictorTraining(examples, values, direct, options.epochs, predictor_monitor, checkpoint)
+        network, held_out = kind.fit(training)
         if held_out is not None:
             share = _weigh_predictor(held_out, clips, options, layout, direct)
-    recorded, generated = _generate_pairs(emission, network, prior, share, clips, layout)
+    recorded, generated = list[NDArray[np.float32]](), list[Array]()
+    for clip in clips:
+        if len(clip.frames) >= 2:
+            experts = Experts(emission, emission.rows(clip.states), clip.speech, network, prior, share)
+            recorded.append(clip.rows[:, 0])
+            generated.append(solve_mlpg(*experts.statistics(slice(None)))[0][clip.frames])
     factors = fit_scaling_factors(recorded, generated) if recorded else np.ones(emission.means.shape[2])
     scaled = ((original, factors * made) for original, made in zip(recorded, generated, strict=True))
     modulation = learn_filter(options.modulation_filter, scaled, examples, values)
@@ -228,11 +209,11 @@ def _weigh_predictor(
         learned = [clips[number] for number in inside]
         emission = _fit_emission(learned, options, layout)
         if options.acoustic_regression:
-            emission = fit_acoustic_regression(emission, learned, options, layout)
+            emission = fit_acoustic_regression(emission, learned, options)
         for number in outside:
-            clip = clips[number]
-            rows = find_density_rows(emission, clip.states, layout)
-            states = solve_mlpg(*emission.statistics(rows, clip.features, slice(None)))[0][clip.frames, :direct]
+            clip, features = clips[number], clips[number].speech.features.values
+            means, precisions = emission.statistics(emission.rows(clip.states), features, slice(None))
+            states = solve_mlpg(means, precisions)[0][clip.frames, :direct]
             recorded, predicted = clip.rows[:, 0, :direct], predictions[number][clip.frames, :direct]
             spread = np.maximum(recorded.std(axis=0), 1e-6)
             change = (predicted - states) / spread
@@ -241,31 +222,11 @@ def _weigh_predictor(
     return float(np.clip(products / max(squares, 1e-12), 0, 1))
 
 
-def _generate_pairs(
-    emission: Emission,
-    network: Predictor | None,
-    prior: ArticulationPrior | None,
-    share: float,
-    clips: Sequence[TrainingClip],
-    layout: StateLayout,
-) -> tuple[list[NDArray[np.float32]], list[Array]]:
-    """Return recorded and generated motion in the valid frames of every clip that has two [each shape=(N, Q)]."""
-    recorded, generated = list[NDArray[np.float32]](), list[Array]()
-    for clip in clips:
-        if len(clip.frames) < 2:
-            continue
-        rows = find_density_rows(emission, clip.states, layout)
-        means, precisions = Experts(emission, rows, clip.speech, network, prior, share).statistics(slice(None))
-        recorded.append(clip.rows[:, 0])
-        generated.append(solve_mlpg(means, precisions)[0][clip.frames])
-    return recorded, generated
-
-
 def _fit_emission(clips: Sequence[TrainingClip], options: TrajectoryConfig, layout: StateLayout) -> Emission:
     """Return the Gaussians of all leaves; each mean and variance is shrunk towards that of its parent node."""
-    moving = np.concatenate(
-        [clip.rows[[state != layout.rest for state in clip.training_states]] for clip in clips], dtype=np.float64
-    )
+    moves = ([state != layout.rest for state in clip.training_states] for clip in clips)
+    rows = [clip.rows[inside] for clip, inside in zip(clips, moves, strict=True)]
+    moving = np.concatenate(rows, dtype=np.float64)
     centre, overall = moving.mean(axis=0), moving.var(axis=0)
     floor = np.maximum(MIN_VARIANCE_SHARE * overall, MIN_VARIANCE)
     scale = np.sqrt(np.maximum(overall, floor))
@@ -284,11 +245,8 @@ def _fit_emission(clips: Sequence[TrainingClip], options: TrajectoryConfig, layo
         )
         for name, contexts in grouped.items()
     }
-    leaves = [
-        gaussian
-        for name, tree in forest.items()
-        for gaussian in _fit_leaves(tree, grouped[name], overall.size, options)
-    ]
+    fitted = (_fit_leaves(tree, grouped[name], overall.size, options) for name, tree in forest.items())
+    leaves = [gaussian for of_tree in fitted for gaussian in of_tree]
     means, variances = (np.array(rows).reshape(-1, *overall.shape) for rows in zip(*leaves, strict=True))
     poses = [
         clip.rows[number, 0]
@@ -303,7 +261,7 @@ def _fit_emission(clips: Sequence[TrainingClip], options: TrajectoryConfig, layo
         rest_variance = options.variance_shrinkage * overall / (len(poses) + options.variance_shrinkage)
     means = np.concatenate([means * scale + centre, rest_mean[None]])
     variances = np.concatenate([variances * scale * scale, rest_variance[None]])
-    return Emission(forest, means.astype(np.float32), np.maximum(variances, floor).astype(np.float32), None)
+    return Emission(layout, forest, means.astype(np.float32), np.maximum(variances, floor).astype(np.float32), None)
 
 
 _Contexts = dict[tuple[str, str, str], Array]

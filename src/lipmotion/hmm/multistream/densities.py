@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -30,13 +30,10 @@ class StreamWeights:
     f0_curvature: float = 1.0
     motion: float = 1.0
 
-    def __iter__(self) -> Iterator[tuple[str, float]]:
-        return ((field.name, getattr(self, field.name)) for field in fields(self))
-
     @property
     def active(self) -> dict[str, float]:
         """The streams whose weight is not 0, and their weights."""
-        return {name: weight for name, weight in self if weight}
+        return {name: weight for name, weight in vars(self).items() if weight}
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,8 +143,7 @@ class GaussianStatistics:
     """Sufficient statistics of frames for G densities of M Gaussians each.
 
     frames  : [shape=(G,)], sums of posteriors over all frames
-    moments : [shape=(G, M, 1 + 2·D)], over the frames with a value, sums of posteriors, and of values and of squared
-              values weighted by them
+    moments : [shape=(G, M, 1 + 2·D)], over frames with a value, sums of posteriors, and of values and squares by them
     """
 
     frames: Array
@@ -177,8 +173,7 @@ class TiedDensities:
 
     mixtures : of standardised values
     voiced   : [shape=(G,)], the probability that a frame has a value; None: a frame without one has log density 0
-    Source: Tokuda, Masuko, Miyazaki & Kobayashi 1999 (multi-space distributions), with one space of D dimensions and
-    one of none.
+    Source: Tokuda, Masuko, Miyazaki & Kobayashi 1999 (multi-space distributions): spaces of D dimensions and of none.
     """
 
     mixtures: Mixtures

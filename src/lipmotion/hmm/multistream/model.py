@@ -216,12 +216,9 @@ def grow_forest(
         positions = choose_positions(stream, inventory, unit, state, both_neighbours=config.both_neighbours)
         in_tree = np.flatnonzero(names == name)
         index: dict[Context, int] = {}  # contexts reduced to the positions asked about
-        groups = [
-            index.setdefault(
-                tuple(part if place in positions else "" for place, part in enumerate(triphones[i][0])), len(index)
-            )
-            for i in in_tree.tolist()
-        ]
+        contexts = (enumerate(triphones[i][0]) for i in in_tree.tolist())
+        keys = (tuple(part if place in positions else "" for place, part in context) for context in contexts)
+        groups = [index.setdefault(key, len(index)) for key in keys]
         pooled = np.zeros((max(len(index), 1), values.shape[1]))
         np.add.at(pooled, np.array(groups, np.intp), values[in_tree])
         trees[name] = grow_tree(
@@ -296,10 +293,8 @@ class JointHmm:
 
     def text(self) -> str:
         """Return the trees of all streams as readable text."""
-        forests = {name: model.forest for name, model in self.models.items()}
-        return "\n\n".join(
-            f"{printable(name)}: {forest.size} leaves\n{forest.text()}" for name, forest in forests.items()
-        )
+        forests = ((printable(name), model.forest) for name, model in self.models.items())
+        return "\n\n".join(f"{name}: {forest.size} leaves\n{forest.text()}" for name, forest in forests)
 
 
 NAMES = {

@@ -258,10 +258,13 @@ def grow_joint(
     yield hmm
     for name, count, of_stream in zip((SPEECH, MOTION), splits, mixed, strict=True):
         for part in _split_monitor(of_stream, [1] * count) if name in hmm.models else ():
-            split = _split(hmm, prepared, name, part, work)
-            if split is None:
+            model, statistics = hmm.models[name], accumulate_statistics(hmm, prepared, work).densities[name]
+            if not (statistics.moments[:, :, 0] >= SPLIT_FRAMES).any():
                 break
-            hmm = split
+            halves = model.tied.split(statistics)
+            hmm = replace(hmm, models={**hmm.models, name: replace(model, tied=halves)})
+            stage = f"{halves.mixtures.size[1]} Gaussians for {name}"
+            hmm = _run_em(hmm, prepared, stage, config.iterations, part, work)
             yield hmm
     last(Progress("lengths of states", 1, 1, 1.0))
 
@@ -275,12 +278,23 @@ def _start(
     streams = [name for name in STREAMS if any(name in utterance.observed.streams for utterance in utterances)]
     if not set(streams) & set(config.training.active):
         raise InputError(f"switched on are {', '.join(config.training.active)}; observed were {', '.join(streams)}")
-    hmm = _make_equal_models(utterances, inventory, config, streams)
+    occurring = {unit for utterance in utterances for unit in utterance.units} | {inventory.silence}
+    spoken = tuple(unit for unit in inventory.names if unit in occurring)
+    models = {}
+    for name in streams:
+        scale, known = fit_scale([u.observed.streams[name] for u in utterances if name in u.observed.streams])
+        forest = build_unit_forest(inventory, spoken)
+        tied = make_standard_normals(forest.size, len(scale.mean), name in F0_STREAMS, known)
+        models[name] = StreamModel(scale, forest, tied)
+    free, silence = inventory.free, inventory.silence
+    sequences = [tuple(silence if unit in free else unit for unit in utterance.units) for utterance in utterances]
+    log_stay = np.log(limit_stay((unit for unit, _ in inventory.monophones), free))
+    bigram = estimate_bigram(inventory.names, sequences)
+    hmm = JointHmm(config, inventory, models, log_stay, spoken, bigram)
     prepared = prepare_utterances(hmm, [(each.observed, each.units) for each in utterances])
     if not any(item.fits for item in prepared.items):
         raise CorpusError(
-            f"none of {len(utterances)} utterances has room for the states of its units; "
-            "check that units and recordings belong together, or give units fewer states"
+            f"none of {len(utterances)} utterances has room for the states of its units; check them, or use fewer"
         )
 
     def posteriors() -> Iterator[tuple[PreparedUtterance, StatePosteriors]]:
@@ -298,24 +312,6 @@ def _start(
 
     sums = _add_up(_Accounts(hmm, hmm.leaves(prepared.triphones), by_triphone=False), posteriors())
     return reestimate_hmm(hmm, _statistics(hmm, sums)), prepared
-
-
-def _make_equal_models(
-    utterances: Sequence[TrainingUtterance], inventory: Inventory, config: JointConfig, streams: Sequence[str]
-) -> JointHmm:
-    occurring = {unit for utterance in utterances for unit in utterance.units} | {inventory.silence}
-    spoken = tuple(unit for unit in inventory.names if unit in occurring)
-    models = {}
-    for name in streams:
-        scale, known = fit_scale([u.observed.streams[name] for u in utterances if name in u.observed.streams])
-        forest = build_unit_forest(inventory, spoken)
-        tied = make_standard_normals(forest.size, len(scale.mean), name in F0_STREAMS, known)
-        models[name] = StreamModel(scale, forest, tied)
-    free, silence = inventory.free, inventory.silence
-    sequences = [tuple(silence if unit in free else unit for unit in utterance.units) for utterance in utterances]
-    log_stay = np.log(limit_stay((unit for unit, _ in inventory.monophones), inventory.free))
-    bigram = estimate_bigram(inventory.names, sequences)
-    return JointHmm(config, inventory, models, log_stay, spoken, bigram)
 
 
 def _split_monitor(monitor: Monitor, widths: Sequence[int]) -> list[Monitor]:
@@ -351,15 +347,3 @@ def _tie_states(
         models[name] = StreamModel(model.scale, forest, untrained.reestimate(of_leaves, config.variance_floor))
         monitor(Progress("trees", step, len(hmm.models), step / len(hmm.models), float(forest.size)))
     return replace(hmm, models=models)
-
-
-def _split(
-    hmm: JointHmm, prepared: PreparedUtterances, name: str, monitor: Monitor, work: Checkpoint
-) -> JointHmm | None:
-    """Return the models with a stream's Gaussians split, and trained; None: too little data."""
-    model, statistics = hmm.models[name], accumulate_statistics(hmm, prepared, work).densities[name]
-    if not (statistics.moments[:, :, 0] >= SPLIT_FRAMES).any():
-        return None
-    tied = model.tied.split(statistics)
-    new = replace(hmm, models={**hmm.models, name: replace(model, tied=tied)})
-    return _run_em(new, prepared, f"{tied.mixtures.size[1]} Gaussians for {name}", hmm.config.iterations, monitor, work)

@@ -45,7 +45,7 @@ class OwnPhoneRecogniser:
         None: the speaker is not one of the training, the recording is too long, or it is shorter than any phone. The
         boundaries are those of this model; they differ from those of the recogniser that aligns transcripts.
         """
-        observations = _observations(speech)
+        observations = stream_observations(speech.features.values, speech.log_f0)
         if observations.frames > LONGEST_S * FRAME_RATE_HZ or not speech.features.values.any():
             return None
         if _score_similarity(self.hmm, observations) < self.training_score + SIMILARITY_MARGIN:
@@ -78,7 +78,7 @@ def fit_phone_recogniser(
         utterances = []
         for example, x in zip(examples, values, strict=True):
             speech = example.speech
-            observed = stream_observations(np.asarray(speech.features.values), speech.log_f0, x, example.valid)
+            observed = stream_observations(speech.features.values, speech.log_f0, x, example.valid)
             units, bounds = units_to_frames(speech.units, observed.frames, PHONES.silence[0], PHONES.unit_of)
             utterances.append(TrainingUtterance(observed, units, bounds))
         inventory = Inventory(PHONES.units, PHONES.silence, CONFIG.states)
@@ -86,7 +86,8 @@ def fit_phone_recogniser(
         arrays = joint_to_arrays(hmm, np.float32)
         checkpoint.save("joint", arrays)
     hmm = joint_from_arrays(arrays, CONFIG)
-    scores = [_score_similarity(hmm, _observations(example.speech)) for example in examples]
+    observations = (stream_observations(example.speech.features.values, example.speech.log_f0) for example in examples)
+    scores = [_score_similarity(hmm, each) for each in observations]
     return OwnPhoneRecogniser(hmm, float(np.mean(scores)))
 
 
@@ -106,10 +107,6 @@ def recogniser_from_arrays(arrays: Arrays) -> OwnPhoneRecogniser | None:
     if set(hmm.inventory.names) != set(PHONES.units):
         raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(PHONES.units)}")
     return OwnPhoneRecogniser(hmm, score)
-
-
-def _observations(speech: Speech) -> StreamObservations:
-    return stream_observations(np.asarray(speech.features.values), speech.log_f0)
 
 
 def _score_similarity(hmm: JointHmm, observations: StreamObservations) -> float:

@@ -62,8 +62,7 @@ def align(
         chosen = np.concatenate(fitting)
     if len(chosen) > observed.frames:
         raise AlignmentError(
-            f"{len(units)} units take at least {len(chosen)} frames of 10 ms, found {observed.frames}: the recording "
-            "is too short for what should be said in it; give its own units"
+            f"{len(units)} units take at least {len(chosen)} frames of 10 ms, found {observed.frames}; give its units"
         )
     monophones = states.monophones[chosen]
     network = build_chain(range(len(chosen)), hmm.log_stay[monophones], hmm.log_move[monophones])
@@ -76,8 +75,7 @@ def align(
 def build_context_loop(hmm: JointHmm) -> tuple[UnitLoop, dict[str, NDArray[np.intp]]]:
     """Return the loop of the units spoken in training with the back-off bigram (Hofer 2008, Eq. 5), in context.
 
-    Beside it, by acoustic stream, the leaves of each of its distinct densities [shape=(C,)]. The loops of the last few
-    models are cached.
+    Beside it, by acoustic stream, the leaves of each of its distinct densities [shape=(C,)]. A few loops are cached.
     """
     inventory, config = hmm.inventory, hmm.config
     units = [unit for unit in hmm.spoken if unit not in inventory.free[1:]]
@@ -105,8 +103,7 @@ def recognise_units(hmm: JointHmm, observed: StreamObservations) -> tuple[tuple[
     """Return the likeliest of all sequences of units that occurred in training, in context, with the back-off bigram.
 
     With it the first frame of each unit, and the frame count at the end.
-    The search is exact, whether trees of acoustic streams ask about one neighbour or both. Where units have one state,
-    a unit spoken twice in a row is recognised once.
+    The search is exact, however many neighbours trees ask about. A unit of one state, spoken twice, is recognised once.
     Raises InputError: no active stream. Raises AlignmentError: too few frames.
     Source: Hofer 2008, Eq. 5.
     """

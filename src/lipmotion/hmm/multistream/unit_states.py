@@ -90,9 +90,8 @@ def expand_triphones(inventory: Inventory, units: Sequence[str]) -> TriphoneStat
     neighbours = [silence, *(silence if unit in free else unit for unit in units), silence]
     contexts = zip(neighbours, units, neighbours[2:], strict=False)
     counts = [inventory.count(unit) for unit in units]
-    triphones = tuple(
-        (context, state) for context, count in zip(contexts, counts, strict=True) for state in range(count)
-    )
+    pairs = zip(contexts, counts, strict=True)
+    triphones = tuple((context, state) for context, count in pairs for state in range(count))
     monophones = np.array([inventory.monophones[context[1], state] for context, state in triphones], np.intp)
     return TriphoneStates(triphones, np.repeat(np.arange(len(units)), counts), monophones)
 

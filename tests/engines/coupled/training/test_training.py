@@ -426,8 +426,9 @@ def lead_shares(chains: Chains, lag: int) -> np.ndarray:
     """Return the shares of frames in which the lips are a state behind, in step and a state ahead, by both streams."""
     shares = np.zeros(3)
     for one in lagged(20, lag, 0):
-        joint = chains.infer(one.observations, build_lattice_utterance(chains, one).lattice).posteriors.joint
-        shares += np.bincount(chains.transitions.product.lead[1][joint.states] + 1, joint.probability.sum(axis=0), 3)
+        inference = chains.infer(one.observations, build_lattice_utterance(chains, one).lattice)
+        states, probability = inference.posteriors.joint
+        shares += np.bincount(chains.transitions.product.lead[1][states] + 1, probability.sum(axis=0), 3)
     return shares / shares.sum()
 
 

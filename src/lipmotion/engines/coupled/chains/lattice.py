@@ -26,8 +26,7 @@ class Lattice(ABC):
 
     transition_index : where the C' transition statistics of the lattice stand among those of all chains [shape=(C',)]
     densities        : for each stream group, the densities that the lattice needs [each shape=(G',)]
-    ties             : for each stream group, the density of each joint state, as a position in ``densities``
-                       [each shape=(S',)]
+    ties             : for each stream group, the place in ``densities`` of each joint state [each shape=(S',)]
     density_units    : the unit of the first chain to which each density of the first group belongs [shape=(G',)]
     allowed_units    : the units of the first chain that each frame may belong to [shape=(T, U)]; None: all
     """
@@ -54,14 +53,6 @@ class Lattice(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class JointPosteriors:
-    """Joint states [shape=(S',)] and their posteriors in every frame [shape=(T, S')]."""
-
-    states: Index
-    probability: Single
-
-
-@dataclass(frozen=True, eq=False)
 class LatticePosteriors:
     """Posteriors of the hidden states of an utterance, and the expected counts of transitions.
 
@@ -70,7 +61,7 @@ class LatticePosteriors:
     most_probable     : the most probable joint state of every frame [shape=(T,)]
     transition_counts : sufficient statistics of the transitions [shape=(C',)]
     log_likelihood    : of the utterance; -inf where there is no path, and then all other numbers are 0
-    joint             : posteriors of joint states; None where these are too many to list
+    joint             : joint states [shape=(S',)] and their posteriors [shape=(T, S')]; None: they are too many to list
     """
 
     chains: tuple[Single, ...]
@@ -78,7 +69,7 @@ class LatticePosteriors:
     most_probable: Index
     transition_counts: NDArray[np.float64]
     log_likelihood: float
-    joint: JointPosteriors | None = None
+    joint: tuple[Index, Single] | None = None
 
 
 def tie_posteriors(posterior: Single, tie: Index, count: int) -> Single:
@@ -117,8 +108,7 @@ class FactorialTransitions:
     """Transitions of two independent chains.
 
     advance            : probability of moving on in each state [shapes=(N_0,), (N_1,)]
-    own_density_states : the P joint states with emission densities of their own, as the states of both chains
-                         [shape=(P, 2)]
+    own_density_states : the states of both chains in the P joint states with densities of their own [shape=(P, 2)]
     Source: Xie & Liu 2007, Fig. 3 c and Eq. 18.
     """
 
@@ -156,13 +146,11 @@ class FactorialTransitions:
 class FactorialLattice(Lattice):
     """Some units of both chains.
 
-    ``densities`` are those of the states of the group's chain, then those of the P' joint states inside the lattice
-    that have densities of their own.
+    ``densities`` are those of the states of the group's chain, then the P' joint states' inside that have their own.
 
     units                 : of each chain
     states                : of each chain, in the order of the kernel
-    own_density_positions : the joint states inside with densities of their own, as positions in ``states`` of both
-                            chains [shape=(P', 2)]
+    own_density_positions : places in ``states`` of both chains of the joint states with their own [shape=(P', 2)]
     visible_units         : the units of the second chain that each frame may belong to [shape=(T, V)]; None: all
     unseen_loss           : what joint states without densities of their own lose, nats
     """
@@ -242,12 +230,8 @@ def build_factorial_lattice(
         np.arange(len(units)) if allowed is None else np.flatnonzero(allowed.any(axis=0))
         for units, allowed in zip(structure.units, (allowed_units, visible_units), strict=True)
     )
-    # the kernel's order: the first state of every unit, then the second
-    of_first, of_second = (
-        np.concatenate([units * structure.states + state for state in range(structure.states)])
-        for units in (first, second)
-    )
-    states = of_first, of_second
+    offsets = np.arange(structure.states)[:, None]  # the kernel's order: the first state of every unit, then the second
+    states = (first * structure.states + offsets).ravel(), (second * structure.states + offsets).ravel()
     columns, index, start = [], [], 0
     for chain, (own, count) in enumerate(zip(states, structure.state_counts, strict=True)):
         position = np.full(count, -1)

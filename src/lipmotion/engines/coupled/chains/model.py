@@ -13,7 +13,6 @@ from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, 
 from lipmotion.engines.coupled.chains.lattice import (
     FactorialTransitions,
     Index,
-    JointPosteriors,
     Lattice,
     LatticePosteriors,
     build_factorial_lattice,
@@ -58,7 +57,7 @@ class NetworkLattice(Lattice):
             self.states[order[expected.posterior.argmax(axis=1)]],
             expected.counts,
             expected.log_likelihood,
-            JointPosteriors(self.states[order], expected.posterior),
+            (self.states[order], expected.posterior),
         )
 
     def best_path(self, transitions: Transitions, logs: Sequence[Single]) -> tuple[Index, float]:  # noqa: D102
@@ -240,9 +239,8 @@ def fit_visual_streams(
     streams = []
     for kind in dict.fromkeys(kinds.tolist()):
         columns = np.flatnonzero(kinds == kind)
-        rows = np.concatenate(
-            [stream_rows(x[:, columns], dynamic)[mask] for x, mask in zip(values, valid, strict=True)]
-        )
+        pairs = zip(values, valid, strict=True)
+        rows = np.concatenate([stream_rows(x[:, columns], dynamic)[mask] for x, mask in pairs])
         deviation = np.maximum(rows.std(axis=0), MIN_DEVIATION)
         name = EIGENLIPS if kind == GREY else GEOMETRY
         streams.append(VisualStream(name, columns, dynamic, rows.mean(axis=0), deviation))

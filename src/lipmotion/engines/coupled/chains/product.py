@@ -1,7 +1,4 @@
-"""Structures of chains, and their product: joint states that chains reach together, arcs between them, probabilities.
-
-The six systems of Xie & Liu 2007 are structures by name.
-"""
+"""Structures of chains, and their product: the joint states that chains reach, arcs between them, probabilities."""
 
 from __future__ import annotations
 
@@ -22,34 +19,6 @@ HMM, MULTISTREAM, FACTORIAL, COUPLED = "hmm", "multistream", "factorial", "coupl
 STRUCTURES = (HMM, MULTISTREAM, FACTORIAL, COUPLED)
 UNSEEN_LOSS = 10.0  # chosen on the validation list (docs/results/xieliu2007.md)
 
-AS_PRINTED: dict[str, Any] = {
-    "states": 5,
-    "mixtures": 1,
-    "conversion": "em",
-    "start": "viterbi",
-    "steps": 5,
-    "variance_scaling": False,
-    "closures": False,
-    "articulation": False,
-}
-"""What the paper's systems have in common: five states a unit, lips converted frame by frame, by EM that starts from
-the best path, and nothing done to them afterwards (§4.1, §7.1). Ours, as the print gives no number: one Gaussian a
-state, five steps of EM ("a very few").
-"""
-FREE: dict[str, Any] = {"asynchrony": -1, "unseen_loss": 0.0, "start_asynchrony": 4}
-"""Factorial chains that nothing ties together: every density integrates to 1, and they may be apart from the start."""
-SYSTEMS: dict[str, dict[str, Any]] = {
-    "ph-HMM": AS_PRINTED | {"structure": HMM, "chains": "phone"},
-    "ph-MSHMM": AS_PRINTED | {"structure": MULTISTREAM, "chains": "phone"},
-    "ph-FHMM": AS_PRINTED | FREE | {"structure": FACTORIAL, "chains": "phone phone"},
-    "ph-vi-FHMM": AS_PRINTED | FREE | {"structure": FACTORIAL, "chains": "phone viseme"},
-    "ph-CHMM": AS_PRINTED | {"structure": COUPLED, "chains": "phone phone"},
-    "ph-vi-CHMM": AS_PRINTED | {"structure": COUPLED, "chains": "phone viseme"},
-}
-"""Options of the coupled engine for each system. Source: Xie & Liu 2007, Table 2."""
-PRESETS: dict[str, dict[str, Any]] = SYSTEMS | {"xieliu2007": AS_PRINTED}
-"""The systems by name, and what they share: alone it is the one that the paper proposes, ph-vi-CHMM."""
-
 
 @dataclass(frozen=True)
 class Structure:
@@ -57,8 +26,7 @@ class Structure:
 
     kind        : ``hmm`` (one chain, one mixture over all streams), ``multistream`` (one chain, one mixture for each
                   stream), ``factorial`` (chains with independent transitions, emission densities of joint states) or
-                  ``coupled`` (chains whose transitions depend on the states of all chains, emission densities of each
-                  chain's states)
+                  ``coupled`` (chains whose transitions depend on the states of all, densities of each chain's states)
     chains      : the unit set of each chain; the first chain emits speech, and its bigram decides which unit follows
     states      : states per unit, left to right, without skips
     limit       : the greatest asynchrony, in states; None: no limit
@@ -90,9 +58,7 @@ class Structure:
         if self.limit is None and (self.kind != FACTORIAL or len(self.chains) != 2):
             raise InputError("asynchrony is -1, no limit, which only two factorial chains have")
         if self.limit is not None and not 0 <= self.limit < self.states:
-            raise InputError(
-                f"asynchrony is {self.limit} states, required 0 to {self.states - 1} (fewer than a unit has), or -1"
-            )
+            raise InputError(f"asynchrony is {self.limit} states, required 0 to {self.states - 1}, or -1: no limit")
 
     @cached_property
     def units(self) -> tuple[tuple[str, ...], ...]:
@@ -180,8 +146,7 @@ class Product:
     moves            : whether each chain moves on along each arc [shape=(C, E)]
     unit_probability : of the units that each arc enters, among those that may be entered [shape=(E,)]
     initial          : probability of beginning in each joint state [shape=(S,)]
-    Source: Xie & Liu 2007, Eqs. 17–19. The mask of Eq. 19 removes entries from the rows of the transition tables; the
-    rest of each row is normalised to sum to 1 (``transitions``).
+    Source: Xie & Liu 2007, Eqs. 17–19. What the mask of Eq. 19 leaves of a row of the tables is normalised to sum to 1.
     """
 
     structure: Structure
@@ -280,9 +245,8 @@ def _enter_units(
         entered = {unit: float(row[unit] / total) for unit in candidates}
     probabilities: dict[tuple[int, ...], float] = defaultdict(float)
     for unit, probability in entered.items():
-        probabilities[tuple(corresponding[c][unit] if out else units[c] for c, out in enumerate(leaving))] += (
-            probability
-        )
+        after = tuple(corresponding[c][unit] if out else units[c] for c, out in enumerate(leaving))
+        probabilities[after] += probability
     return probabilities
 
 
@@ -304,8 +268,7 @@ class Transitions:
               move together, its table has such rows for every combination of the chains before it that move
 
     The weight of an arc is the product of its chains' probabilities of moving on or staying and of the probability of
-    the units entered. Its probability is this weight, divided by the sum over the arcs from the same joint state that
-    the mask leaves.
+    the units entered. Its probability is this weight by the sum over the arcs that the mask leaves to the same source.
     Source: Xie & Liu 2007, Eqs. 2, 17–19. Deviation: which unit follows is decided by the bigram, not by the tables.
     """
 
@@ -352,10 +315,8 @@ class Transitions:
                 share = (moved + old) / (np.bincount(rows, counts, len(old)) + 1)
                 shares.append(np.clip(share, MIN_ADVANCE, 1 - MIN_ADVANCE))
             return replace(self, advance=tuple(shares))
-        left: Array = np.bincount(self.product.arc_from, counts, len(self.product.joint_states)).astype(float)[
-            self.product.arc_from
-        ]
-        current = self
+        left: Array = np.bincount(self.product.arc_from, counts, len(self.product.joint_states)).astype(float)
+        left, current = left[self.product.arc_from], self
         for _ in range(MAX_SWEEPS):
             before = current.advance
             for chain in range(len(self.rows)):

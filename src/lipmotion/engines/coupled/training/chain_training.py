@@ -93,10 +93,8 @@ def split_evenly(product: Product, phones: Timeline[Unit], frames: int) -> Index
 
 def estimate_grammar(structure: Structure, data: Sequence[AlignedUtterance]) -> Grammar:
     """Return the bigrams, and the probabilities of the first unit, of every chain, from labels."""
-    sentences = [
-        [unit for unit, _, _ in list_unit_segments(structure, utterance.phones, utterance.observations.frames)]
-        for utterance in data
-    ]
+    segments = (list_unit_segments(structure, each.phones, each.observations.frames) for each in data)
+    sentences = [[unit for unit, _, _ in of_utterance] for of_utterance in segments]
     bigrams, initials = [], []
     for units, corresponding in zip(structure.units, structure.corresponding_units, strict=True):
         chain_sentences = [[units[corresponding[unit]] for unit in sentence] for sentence in sentences]
@@ -154,13 +152,11 @@ def e_step(chains: Chains, utterances: Sequence[LatticeUtterance], work: Checkpo
     sums = sum_statistics(_shard_sums, chains, shards, work)
     if not sums or not sums["frames"]:
         raise InputError(f"none of {len(utterances)} recordings has a path through the chains; check their labels")
-    emissions = tuple(
-        EmissionStatistics(
-            tuple(sums[f"products {number} {stream}"] for stream in group.streams), sums[f"occupancy {number}"]
-        )
-        for number, group in enumerate(chains.groups)
-    )
-    return ChainStatistics(emissions, sums["transitions"], float(sums["log likelihood"]), float(sums["frames"]))
+    emissions = []
+    for number, group in enumerate(chains.groups):
+        products = tuple(sums[f"products {number} {stream}"] for stream in group.streams)
+        emissions.append(EmissionStatistics(products, sums[f"occupancy {number}"]))
+    return ChainStatistics(tuple(emissions), sums["transitions"], float(sums["log likelihood"]), float(sums["frames"]))
 
 
 def m_step(
@@ -283,7 +279,16 @@ def create_chains(
     if structure.limit is None:
         limited = replace(structure, limit=min(structure.start_limit, structure.states - 1))
     transitions = create_transitions(find_reachable(limited, estimate_grammar(limited, data)))
-    chains = _create_untrained_chains(streams, transitions, data, weights)
+    groups, numbers = [], tuple(range(len(streams)))
+    dimensions = [stream.shape[1] for stream in data[0].observations.streams]
+    for members in [numbers] if structure.kind == HMM else [(stream,) for stream in numbers]:
+        edges = np.cumsum([0, *(dimensions[s] for s in members)]).tolist()
+        chain = structure.chain_of(members[0])
+        shape = (structure.state_counts[chain], 1, edges[-1])
+        normal = Mixtures(np.zeros(shape[:2], np.float32), np.zeros(shape, np.float32), np.ones(shape, np.float32))
+        columns, exponents = tuple(slice(a, b) for a, b in pairwise(edges)), tuple(weights[s] for s in members)
+        groups.append(StreamGroup(members, columns, normal, exponents, transitions.product.chain_states[chain]))
+    chains = Chains(streams, transitions, tuple(groups))
     utterances = [build_lattice_utterance(chains, utterance) for utterance in data]
     paths = [split_evenly(transitions.product, utterance.phones, utterance.observations.frames) for utterance in data]
     for _ in range(1 + VITERBI_STEPS):
@@ -295,30 +300,6 @@ def create_chains(
     if structure.kind == FACTORIAL and len(structure.chains) == 2:
         return with_joint_state_densities(chains, transitions, visits, structure)
     return chains
-
-
-def _create_untrained_chains(
-    streams: tuple[str, ...], transitions: Transitions, data: Sequence[AlignedUtterance], weights: Sequence[float]
-) -> Chains:
-    """Return chains whose densities are all standard normal."""
-    product, structure, groups = transitions.product, transitions.product.structure, []
-    numbers = tuple(range(len(streams)))
-    stream_groups = [numbers] if structure.kind == HMM else [(stream,) for stream in numbers]
-    dimensions = [stream.shape[1] for stream in data[0].observations.streams]
-    for members in stream_groups:
-        edges = np.cumsum([0, *(dimensions[s] for s in members)])
-        chain = structure.chain_of(members[0])
-        shape = (structure.state_counts[chain], 1, int(edges[-1]))
-        groups.append(
-            StreamGroup(
-                members,
-                tuple(slice(a, b) for a, b in pairwise(edges.tolist())),
-                Mixtures(np.zeros(shape[:2], np.float32), np.zeros(shape, np.float32), np.ones(shape, np.float32)),
-                tuple(weights[s] for s in members),
-                product.chain_states[chain],
-            )
-        )
-    return Chains(streams, transitions, tuple(groups))
 
 
 def _reestimate_along(
@@ -345,20 +326,15 @@ def _reestimate_along(
     statistics_of_paths = ChainStatistics(tuple(emission_statistics), arc_counts, 0.0, 1)
     chains = m_step(chains, statistics_of_paths, floors, streams=range(len(chains.streams)), transitions=False)
     transitions = transitions.reestimated(arc_counts)
-    structure = chains.structure
-    groups = tuple(
-        _with_borrowed_densities(
-            group, statistics.occupancy.sum(axis=0) > 0, structure, structure.chain_of(group.streams[0])
-        )
-        for group, statistics in zip(chains.groups, emission_statistics, strict=True)
-    )
-    return replace(chains, transitions=transitions, groups=groups), transitions
+    groups = []
+    for group, statistics in zip(chains.groups, emission_statistics, strict=True):
+        groups.append(_with_borrowed_densities(group, statistics.occupancy.sum(axis=0) > 0, chains.structure))
+    return replace(chains, transitions=transitions, groups=tuple(groups)), transitions
 
 
-def _with_borrowed_densities(
-    group: StreamGroup, learned: NDArray[np.bool_], structure: Structure, chain: int
-) -> StreamGroup:
+def _with_borrowed_densities(group: StreamGroup, learned: NDArray[np.bool_], structure: Structure) -> StreamGroup:
     """Return the group in which states that were not ``learned`` have the densities of the most similar unit."""
+    chain = structure.chain_of(group.streams[0])
     units, unit_set = structure.units[chain], structure.chains[chain]
     source = np.arange(len(learned))
     for state in np.flatnonzero(~learned):

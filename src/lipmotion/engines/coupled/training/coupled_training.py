@@ -29,6 +29,7 @@ from lipmotion.engines.coupled.training.chain_training import (
     MAX_STEPS,
     AlignedUtterance,
     ChainStatistics,
+    LatticeUtterance,
     Report,
     build_lattice_utterance,
     compute_variance_floors,
@@ -69,19 +70,14 @@ def train_on_speech(
     Where speech and motion share their components (``hmm``), these stay as many, but their weights are re-estimated.
     """
     floors = compute_variance_floors([utterance.observations for utterance in data])
-    utterances = [
-        build_lattice_utterance(
-            chains, replace(utterance, observations=utterance.observations.without_visual_streams()), weight
-        )
-        for group, weight in ((data, 1.0), (speech_only, config.speech_only_weight))
-        for utterance in group
-    ]
+    utterances, steps = list[LatticeUtterance](), config.speech_only_steps
+    for group, weight in ((data, 1.0), (speech_only, config.speech_only_weight)):
+        unseen = [replace(each, observations=each.observations.without_visual_streams()) for each in group]
+        utterances += [build_lattice_utterance(chains, each, weight) for each in unseen]
     present = count_components(chains)
     mixtures = present if chains.structure.kind == HMM else (max(config.speech_only_mixtures, present[0]), *present[1:])
     while True:
-        result = train_to_convergence(
-            chains, utterances, floors, config.speech_only_steps, report, work, speech_only=True
-        )
+        result = train_to_convergence(chains, utterances, floors, steps, report, work, speech_only=True)
         if count_components(result.model) == mixtures:
             return result.model
         chains = with_split_components(result.model, mixtures, result.statistics)
@@ -187,11 +183,8 @@ def _reporter(stage: str, max_steps: int, monitor: Monitor) -> Report:
 
 def _rest_pose(examples: Sequence[Example], values: Sequence[Array], valid: Sequence[NDArray[np.bool_]]) -> Array:
     """Return the median pose of silence away from speech, or that of all frames if there is none [shape=(Q,)]."""
-    silent_poses = [
-        x[mask & mark_distant(example.speech.units, len(x), AWAY_FROM_SPEECH_S)]
-        for example, x, mask in zip(examples, values, valid, strict=True)
-    ]
-    poses = np.concatenate(silent_poses)
+    away = (mark_distant(example.speech.units, len(example.valid), AWAY_FROM_SPEECH_S) for example in examples)
+    poses = np.concatenate([x[mask & silent] for x, mask, silent in zip(values, valid, away, strict=True)])
     if not len(poses):
         poses = np.concatenate([x[mask] for x, mask in zip(values, valid, strict=True)])
     return np.median(poses, axis=0)
