@@ -84,7 +84,7 @@ def test_some_words_have_no_time_some_share_one_and_an_end_just_before_its_start
 def test_captions_that_scroll_say_each_line_once(read: Read) -> None:
     without_times = SCROLLING.replace("<c>", "").replace("</c>", "").replace("<00:00:", "<").replace("<0", "<i 0")
     assert read(without_times).words == ("let", "us", "look", "look", "again")
-    rolling = "00:00:01,000 --> 00:00:01,990\nhi\n\n00:00:01,990 --> 00:00:02,000\nhi\n\n00:00:02,000 --> 00:00:03,000\nhi\nyou\n\n"
+    rolling = "00:01.0 --> 00:01.99\nhi\n\n00:01.99 --> 00:02.0\nhi\n\n00:02.0 --> 00:03.0\nhi\nyou\n\n"
     assert read(rolling).words == ("hi", "you")
     twice = "00:00:01,000 --> 00:00:02,000\nno\n\n00:00:02,000 --> 00:00:03,000\nno\nno\n\n"
     assert read(twice).words == ("no", "no", "no")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion.hmm.loudness import DECIBEL, MIN_FRAMES, average_power, find_spoken_frames
+from lipmotion.hmm.loudness import DECIBEL, DECIBEL, MIN_FRAMES, average_power, find_spoken_frames
 from lipmotion.speech.features import mfcc
 from lipmotion.speech.sound import analysed_audio, pauses, voice_activity
 from lipmotion.types import Audio
@@ -120,7 +120,7 @@ def test_a_voice_that_turns_away_is_heard_to_its_end() -> None:
     """Syllables of a quarter of a second that fall by 20 dB, from the middle on softer, before and after a room."""
     syllables = np.tile(np.linspace(0, -20, 25), 24) - np.repeat([0, 22], 300)
     decibels = np.pad(syllables, 200, constant_values=-55)
-    loud, soft = voice_activity.find_passages((decibels * voice_activity.DECIBEL).astype(np.float32))
+    loud, soft = voice_activity.find_passages((decibels * DECIBEL).astype(np.float32))
     assert 470 < loud.end < 530
     assert soft.end > 780
 
