@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion.hmm.loudness import DECIBEL, DECIBEL, MIN_FRAMES, average_power, find_spoken_frames
+from lipmotion.hmm.loudness import DECIBEL, MIN_FRAMES, average_power, find_spoken_frames
 from lipmotion.speech.features import mfcc
 from lipmotion.speech.sound import analysed_audio, pauses, voice_activity
 from lipmotion.types import Audio
