@@ -136,6 +136,7 @@ class Lexicon:
 
     def known(self, word: str) -> bool:
         """Return whether a word, or the usual reading of a written form, is in the user's file or the dictionary."""
+        word = self._find_name(word)
         are_known = (each in self.user or list_entries(each) for each in list_readings(word.removesuffix("'s"))[0])
         return word in self.user or all(are_known) or bool(expand_lengthened(word) or SOUNDED.fullmatch(word))
 
@@ -151,6 +152,7 @@ class Lexicon:
 
     def spoken_forms(self, word: str) -> tuple[SpokenForm, ...]:
         """Return every way to say a word or a written form, the usual one first. Raises as ``pronunciations``."""
+        word = self._find_name(word)
         readings = list_readings(word)
         if readings == ((word,),) and word not in self.user:
             readings = expand_lengthened(word) or readings
@@ -166,6 +168,10 @@ class Lexicon:
                     form += [(phone, each) for phone in variants[min(number, len(variants) - 1)]]
                 forms.append(tuple(form))
         return tuple(dict.fromkeys(forms))
+
+    def _find_name(self, word: str) -> str:
+        """Return a word, or a written form as the user's file has it: ``4k`` for ``4K``."""
+        return word.lower() if word.lower() in self.user else word
 
     def _pronounce(self, word: str) -> tuple[Pronunciation, ...]:
         if word in self.user:

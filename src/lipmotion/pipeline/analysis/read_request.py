@@ -5,17 +5,21 @@ Formats of labels and of motion are imported where such a file is read: most req
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 from dataclasses import replace
 from pathlib import Path
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shorten_list
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.sources import check_kind, is_folder
 from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon
+from lipmotion.units.text_normalisation import tokenise
+
+LOG = logging.getLogger("lipmotion")
 
 LABEL_SUFFIXES = (".textgrid", ".eaf", ".lab", ".phn", ".txt", ".json", ".jsonl", ".marks", ".csv", ".tsv")
 """Suffixes of label files; content decides which form they have. ``.json`` and ``.csv`` may also be motion."""
@@ -61,7 +65,14 @@ def read_lexicon(request: Request) -> Lexicon:
     Raises InputError: its file cannot be read.
     """
     lexicon = request.lexicon
-    return Lexicon.from_file(lexicon) if isinstance(lexicon, str | Path) else lexicon or Lexicon()
+    if not isinstance(lexicon, str | Path):
+        return lexicon or Lexicon()
+    read = Lexicon.from_file(lexicon)
+    odd = (word for word in read.user if not word.replace("'", "").isalpha())
+    if unused := [word for word in odd if len(tokenise(word)) != 1]:
+        what = "are read as several words, and not by this file: give the pronunciation of each word"
+        LOG.warning("%s: %s %s", lexicon, shorten_list(unused), what)
+    return read
 
 
 def read_recording(request: Request) -> Audio:
