@@ -31,7 +31,7 @@ PRESET = "hofer2008"
 PINS = {"as printed": False, "lips made to meet on p b m": True}
 """Whether motion is generated with pins in p, b and m, by the name of the block of the table."""
 TWICE_DOUBLED = 4
-"""Training stops once it has this many times the Gaussians of the best model: doubling them twice did not help."""
+"""Training stops at so many times the Gaussians of the best model: two doublings have not helped."""
 _ACC, _COUNTS = "table1/acc", "table1/gaussians"
 
 

@@ -1,4 +1,4 @@
-"""Edits of curves that exist already: of channels that no model generates by themselves, of blendshapes."""
+"""Edits applied after generation: pins, gains and drawn values of a curve; gains, holds and locks of the whole mouth."""
 
 from __future__ import annotations
 

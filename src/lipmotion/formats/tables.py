@@ -44,7 +44,7 @@ BEFORE_CURVES = ("Timecode", "BlendshapeCount")
 FIRST, COUNT = (name.lower() for name in BEFORE_CURVES)
 """Names of the first two columns of the app; capitals do not matter, for versions of the app differ."""
 NO_CURVES = re.compile(r"(?:|unnamed:?0|(?:frame|face)?(?:index|idx|id|number|no|num)?s?|blendshapecount|neutral)")
-"""The same of columns that are no curves: numbers of frames and faces, and what MediaPipe calls neutral."""
+"""Names of columns that are not curves: numbers of frames and faces, and what MediaPipe calls neutral."""
 SCORES = ("score", "value", "weight", "coefficient")
 TIMECODE_RATES = (24, 25, 30, 48, 50, 60, 120)
 APP_RATE = 60  # frames a second of the timecode where a take does not show it: what the app has by default

@@ -97,7 +97,7 @@ class HmmConfig(Configuration):
 class UnitHmm:
     """Models of all units: tied states, their densities, how long each lasts, and which unit follows which.
 
-    log_stay    : float32 array [shape=(G,)], log P(stay in the state), of the states without context
+    log_stay    : float32 array [shape=(R,)], log P(stay in the state), of the states without context
     typical_fit : mean ``fit`` of the recordings that the models were trained on
     speaker     : mean speaker vector of these recordings (``speech.sound.speaker_similarity``) [shape=(128,)];
                   None: a model of an earlier version

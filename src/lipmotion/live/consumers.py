@@ -38,7 +38,7 @@ class Listener(Protocol):
         """Take a frame."""
 
     def hear(self, samples: Any) -> None:
-        """Take sound as ``Stream.push`` does, before the frames that it makes known."""
+        """Take sound as ``Stream.push`` does, before the frames that it completes."""
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ def resample_to_model(
 
     seen : camera frames in which the face was measured [shape=(T,)]; a frame is valid if the nearest one was seen
     The spline is twice differentiable: with linear interpolation, Δ² would be zero nearly everywhere. After the last
-    camera frame the last value is repeated; half a camera frame later, frames are not valid.
+    camera frame the last value is repeated; frames more than half a camera frame after the last one are not valid.
     """
     from scipy.interpolate import CubicSpline
 

@@ -1,4 +1,4 @@
-"""Files and folders that are written whole or not at all, inside folders that may be confined.
+"""Files and folders that are written whole or not at all, and without following links in folders of strangers.
 
 Everything is written under a temporary name beside its target, and renamed at the end.
 """

@@ -44,7 +44,7 @@ class Scene:
     original : the file that the mesh is from; a ``.glb`` of it keeps all that is in that file; None: no file
     stepped : names of weights that change at once from one held value to the next
     thinning : which keys of weights may be left out; the head's turn has all
-    split   : whether vertices at one place may be one: files split them along seams, which should not be seen
+    split   : whether vertices at one place share a normal, so that the seams along which files split them do not show
     Raises ExportError: a channel that is no blendshape. Raises InputError: a turn that does not fit the mesh.
     """
 

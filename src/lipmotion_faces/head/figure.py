@@ -1,4 +1,4 @@
-"""The whole character: hair and other parts put together, and places and light of all vertices in a pose."""
+"""The 3D head (``--face head``): hair and other parts put together, places and light of all vertices in a pose."""
 
 from __future__ import annotations
 

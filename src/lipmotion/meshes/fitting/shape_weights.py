@@ -105,8 +105,8 @@ EXPRESSIONS: Mapping[str, tuple[tuple[str, float], ...]] = {
 """The expressions of VRM that stand for a mood, with their weights, on characters without finer shapes."""
 ROUNDING = {"mouthPucker": 0.5, "mouthFunnel": 0.3}  # least weights in a phone of roundness 1
 NARROWING = 0.11
-"""Both together make the mouth narrower by this, in eye distances; there is less, or more, of them for it."""
-SHARES = (0.6, 1.4)  # the least and the largest share of them that there is then
+"""Both together make the mouth narrower by this, in eye distances: they are scaled for it, within ``SHARES``."""
+SHARES = (0.6, 1.4)
 SPREADING = tuple(f"{name}{side}" for name in ("mouthSmile", "mouthStretch", "mouthDimple") for side in SIDES)
 """Shapes that draw the corners apart: they vanish in round phones."""
 DEPTH_WEIGHT, JAW_WEIGHT, CORNER_WEIGHT, GAP_WEIGHT = 0.4, 0.5, 4.0, 2.0

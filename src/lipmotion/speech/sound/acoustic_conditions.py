@@ -46,7 +46,7 @@ def make_babble(voices: Sequence[Audio], samples: int, seed: int = 0) -> NDArray
     """Return the sum of several talkers, each with the same power [shape=(samples,)].
 
     voices : at least ``MIN_TALKERS`` recordings at 16 kHz, none of them of the speaker to whom they are added
-    Every recording begins at a random sample, and again at its end. All have mean power 1 over their speech.
+    Every recording starts at a random sample and loops. All have mean power 1 over their speech.
     Raises InputError: too few recordings, another rate, or a recording too short or silent.
     """
     if len(voices) < MIN_TALKERS:
