@@ -1,4 +1,4 @@
-"""Edits applied after generation: pins, gains and drawn values of a curve; gains, holds and locks of the whole mouth."""
+"""Edits applied after generation: pins, gains, drawn values of a curve; gains, holds and locks of the whole mouth."""
 
 from __future__ import annotations
 

@@ -116,7 +116,7 @@ OPPOSED = (
     (("mouthRollUpper",), ("mouthUpperUpLeft", "mouthUpperUpRight")),
     (("mouthRollLower", "mouthShrugLower"), ("mouthLowerDownLeft", "mouthLowerDownRight")),
 )
-"""Shapes of which each on one side undoes those on the other: a face has one side at a time."""
+"""Pairs of groups that undo each other: a face has one group of a pair at a time."""
 OPPOSITION = 1.5
 """Cost of the product of two such weights, where that of the square of either is 1: both at once are never best."""
 NEARNESS = 0.1  # weight of the distance from the weights that are separated
