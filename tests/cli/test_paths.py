@@ -15,33 +15,6 @@ from lipmotion.errors import ExportError
 from lipmotion.pipeline.model import find_shipped
 
 TALKING = "a.wav --transcript t.txt --lexicon l.txt --units u.json --model m.lipmotion"
-FIGURES = "c --lexicon l.txt"
-REFUSED = [
-    # the input that has the name of the output, and the command line
-    ("the recording itself", f"animate {TALKING} -o a.wav"),
-    ("the transcript itself", f"animate {TALKING} -o b.json t.txt"),
-    ("the lexicon itself", f"animate {TALKING} -o b.json -o l.txt"),
-    ("the units file itself", f"animate {TALKING} -o b.json u.json"),
-    ("the model itself", f"animate {TALKING} -o m.lipmotion"),
-    ("the transcript itself", f"cues {TALKING} -f tsv -o t.txt"),
-    ("the recording itself", "adapt b.wav a.wav --model m.lipmotion -o a.wav"),
-    ("the model itself", "speak papa --model m.lipmotion -o m.lipmotion"),
-    ("the corpus itself", "train c -o c"),
-    ("the corpus c", "train c -o c/m.lipmotion"),
-    ("the table of units itself", "train c --units t.txt -o t.txt"),
-    ("the folder of recordings r", "train c --recordings r -o r/a.wav"),
-    ("the corpus itself", "train d.unfinished -o d"),
-    ("the folder of recordings d.unfinished/r", "train c --recordings d.unfinished/r -o d"),
-    ("the model itself", f"evaluate m.lipmotion {FIGURES} -o m.lipmotion"),
-    ("the lexicon itself", f"evaluate m.lipmotion {FIGURES} -o l.txt"),
-    ("the recording itself", "compare a.wav b.wav -o b.wav"),
-    ("the corpus c", f"experiment hofer2008 {FIGURES} -o c/corpus.json"),
-    ("the list itself", f"experiment learning-curve {FIGURES} --order t.txt -o t.txt"),
-    ("the corpus c", f"experiment xieliu2007 {FIGURES} --plots c/pictures"),
-    ("the folder of recordings itself", "corpus prepare r -o r"),
-    ("the footage itself", "face build a.wav -o a.wav"),
-    ("the folder of recordings d.unfinished/r", "corpus prepare d.unfinished/r -o d.unfinished"),
-]
 
 
 @pytest.fixture
@@ -64,7 +37,8 @@ def content(folder: Path) -> dict[str, bytes]:
 @pytest.mark.long
 def test_an_output_that_is_an_input(run, laid):
     before = content(laid)
-    for what, line in REFUSED:
+    rows = Path(__file__).with_name("refused_paths.tsv").read_text("utf-8").splitlines()[1:]
+    for what, line in (row.split("\t") for row in rows):
         check_refused(run(*line.split()), 7, f" {what}; give another name")
         assert content(laid) == before
 

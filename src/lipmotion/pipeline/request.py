@@ -85,7 +85,7 @@ class Request(Configuration):
                  only one
     pauses     : ``rest``: lips close softly in pauses from 0.25 s, and part no earlier than 0.12 s before a phrase;
                  ``natural``: the mouth does in pauses what the model learned
-    manner     : ``detected``: the mouth opens for laughter and breaths (docs/expression.md); ``asked``: for none of them
+    manner     : ``detected``: the mouth opens for laughter and breaths (docs/expression.md); ``asked``: for neither
     asymmetry  : 0 to 1: the share that is left of the difference between both sides of the speaker's own mouth, in the
                  lip and jaw points; the mouth of another person (``onto``) stays as it is
     model      : the model file, where no other model is given beside the request; None: the shipped one

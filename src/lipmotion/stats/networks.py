@@ -1,4 +1,4 @@
-"""Networks from sequences of vectors to sequences of vectors, for motion from sound: convolutional, bidirectional LSTM."""
+"""Networks from sequences of vectors to sequences of vectors, for motion from sound: convolutional, and BLSTM."""
 
 from __future__ import annotations
 

@@ -186,7 +186,8 @@ class LayeredFace(Face):
 def choose_mouths(poses: Sequence[MouthPose], mouths: Sequence[str], fps: float) -> list[str]:
     """Return the mouth to show in every frame: near the poses, and changing no more often than pays.
 
-    The cheapest sequence is found by dynamic programming; a closed mouth is shown whenever the lips are closed, even for a single frame.
+    The cheapest sequence is found by dynamic programming; a closed mouth is shown whenever the lips are closed, even
+    for a single frame.
     """
     keys, values = (
         np.array([[getattr(pose, name) for name in _WEIGHTS] for pose in some])
