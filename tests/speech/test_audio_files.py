@@ -168,6 +168,9 @@ def test_what_is_missing_of_other_files_is_said(tmp_path: Path, caplog: pytest.L
             path.write_bytes(path.read_bytes()[: round(share * path.stat().st_size)])
             read_audio(path)
             assert ("cut short" in caplog.text, said in caplog.text) == (share < 1, share < 1)
+    caplog.clear()  # a length that FFmpeg guesses is none that the file states
+    read_audio(write_sound(tmp_path / "a.aac", np.pad(babble(16_000, 2), ((0, 0), (160_000, 0))), 16_000, "aac"))
+    assert not caplog.text
 
 
 def test_what_is_missing_of_a_wave_file_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -96,10 +96,14 @@ class _TrackDecoder:
         while self._pieces:  # each is freed when it is copied
             first, piece = self._pieces.pop()
             samples[first : first + len(piece) // 4] = np.frombuffer(piece, np.float32)
-        is_stated = self._stream.duration or not self._container.streams.video
+        kind, starts = self._container.format.name, self._stream.start_time
+        is_stated = (self._stream.duration or not self._container.streams.video) and kind not in GUESSED
+        is_stated = is_stated and (kind != "mp3" or starts)  # a header that states the length begins after the delay
         stated_s = read_duration(self._container, self._stream) if is_stated else 0.0
-        rounded_s = ROUNDED_S if self._container.format.name in STATED else (1 - CUT_SHORT_SHARE) * stated_s
-        if self._container.format.name == "caf" and self._stream.codec_context.name.startswith("pcm"):
+        if kind == "matroska,webm" and starts and not list_video(self._container):  # it states its end
+            stated_s -= float(starts * self._stream.time_base)
+        rounded_s = ROUNDED_S if kind in STATED else (1 - CUT_SHORT_SHARE) * stated_s
+        if kind == "caf" and self._stream.codec_context.name.startswith("pcm"):
             stated_s, rounded_s = self._stream.frames / self._stream.rate, 0.0  # its duration is that of the file
         missing_s = stated_s - len(samples) / self.rate_hz
         self.samples = samples[self._cut :]
@@ -180,6 +184,7 @@ MIN_HOLES_S = 0.005  # holes that last less together are not mentioned: they wou
 CUT_SHORT_SHARE, ROUNDED_S, STATED = 0.9, 0.5, ("flac", "aiff", "mov,mp4,m4a,3gp,3g2,mj2")
 """A recording is called cut short when it holds less than this share of the duration that it states, or so many seconds
 less in a format that states it exactly."""
+GUESSED = ("aac", "ac3", "amr", "dts", "eac3")  # formats without a length, at which FFmpeg guesses by the first packets
 PCM, FLOAT, EXTENSIBLE = 1, 3, 0xFFFE
 """Forms of samples in a WAVE file; the last one says its form, and how many bits are valid, in a longer header."""
 UNKNOWN_SIZES = range(0x7FFF0000, 0x1_0000_0000)
