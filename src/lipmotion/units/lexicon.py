@@ -106,7 +106,7 @@ class Lexicon:
 
     @classmethod
     def from_file(cls, path: str | Path) -> Lexicon:
-        """Return the lexicon of a file: a pronunciation ``word PHONE PHONE ...`` a line; ``#`` starts a comment.
+        """Return the lexicon of a file: a pronunciation ``word PHONE PHONE ...`` a line; ``#`` or ``;;;`` starts a comment.
 
         Phones are ARPAbet in either case, with or without stress digits, or names of the inventory.
         Raises InputError: no such file, not UTF-8, larger than allowed (``LARGEST_LEXICON_BYTES``), or with its line:
@@ -116,7 +116,7 @@ class Lexicon:
         user: dict[str, list[Pronunciation]] = {}
         for number, line in enumerate(StringIO(text), start=1):
             where = f"{path}, line {number}"
-            word, *labels = line.split("#", maxsplit=1)[0].split() or [""]
+            word, *labels = re.split("#|;;;", line, maxsplit=1)[0].split() or [""]
             if not word:
                 continue
             if not 0 < len(labels) <= LONGEST_PRONUNCIATION:
