@@ -100,7 +100,7 @@ def test_a_level_of_detail_is_behind_the_command_line():
     job = parsed("animate", "a.wav", "-o", "a.json", "--detail", "mobile")
     mobile = DETAILS["mobile"]
     assert (job.outputs.rate_hz, job.delivery, job.staging) == (30, mobile.delivery, mobile.staging)
-    job = parsed("animate", "a.wav", "--rate", "60", "--detail", "game", "-o", "a.json", "--still", "head")
+    job = parsed("animate", "a.wav", "--rate", "60", "--detail", "game", "-o", "a.json", "--still", " head")
     assert (job.outputs.rate_hz, job.delivery, job.staging.head) == (60, DETAILS["game"].delivery, False)
     assert parsed("animate", "a.wav", "-o", "a.json", "--detail", "film") == parsed("animate", "a.wav", "-o", "a.json")
 

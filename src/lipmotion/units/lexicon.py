@@ -106,7 +106,7 @@ class Lexicon:
 
     @classmethod
     def from_file(cls, path: str | Path) -> Lexicon:
-        """Return the lexicon of a file: a pronunciation ``word PHONE PHONE ...`` a line; ``#`` or ``;;;`` starts a comment.
+        """Return the lexicon of a file: ``word PHONE PHONE ...`` a line; comments begin with ``#``, ``;;;``.
 
         Phones are ARPAbet in either case, with or without stress digits, or names of the inventory.
         Raises InputError: no such file, not UTF-8, larger than allowed (``LARGEST_LEXICON_BYTES``), or with its line:

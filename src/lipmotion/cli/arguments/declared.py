@@ -236,7 +236,7 @@ def pick_part(options: argparse.Namespace, start: PartT, **values: Any) -> PartT
 def _moves(each: Field[Any], still: str) -> bool:
     """Return whether something moves. Raises InputError: the list of what is still names something else."""
     names = [other.name for other in fields(Staging) if "still" in other.metadata]
-    listed = [name for name in still.split(",") if name]
+    listed = [name for name in map(str.strip, still.split(",")) if name]
     unknown = [name for name in listed if name not in names]
     if unknown:
         raise InputError(f"{each.metadata['still']} names {unknown[0]!r}, required some of: {', '.join(names)}")
