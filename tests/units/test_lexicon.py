@@ -73,8 +73,8 @@ def test_a_form_is_said_in_the_words_of_its_readings() -> None:
 
 def test_a_users_file(lexicon_file: Path) -> None:
     lexicon_file.write_text(
-        "# my words\n;;; as\n\nLipmotion L IH1 P M OW1 SH AH0 N   # our name\nlipmotion(2) l ih p m ow sh en\n"
-        "map M AE0 P\nnaïve  n aa iy v\ndon’t d ow n t\n'em ax m\n4K f ao k\nCAFE\u0301 k ae f ey\none AH0 ER0 IH0 AH1 ER2 IH IY0\n",
+        "# my words\n;;; and\n\nLipmotion L IH1 P M OW1 SH AH0 N # name\nlipmotion(2) l ih p m ow sh en\nmap M AE0 P\n"
+        "naïve n aa iy v\ndon’t d ow n t\n'em ax m\n4K f ao k\nCAFE\u0301 k ae f ey\none AH0 ER0 IH0 AH1 ER2 IH IY0\n",
         encoding="utf-8",
     )
     mine = Lexicon.from_file(lexicon_file)
