@@ -288,4 +288,4 @@ def test_the_outlook_says_how_much_of_the_speech_a_transcript_fits(toy_model, to
     assert (part.confidence, part.advice) == (pytest.approx(0.25), (WHOLE_TRANSCRIPT,))
     assert part.text.startswith("words: transcript, which fits 25% of the speech; levels 30 dB apart; would help most")
     wrong = predict_outlook(request, replace(understood, fit=TranscriptFit(-7.0, (), 4.0)))
-    assert wrong.confidence == pytest.approx(0)
+    assert (wrong.words, wrong.confidence) == ("transcript", pytest.approx(0))  # used all the same

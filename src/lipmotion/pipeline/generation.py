@@ -242,8 +242,7 @@ def predict_outlook(request: Request, analysis: SpeechAnalysis) -> Outlook:
         words = "words" if recognition.word_s > recognition.phone_s else "phones"
         voice = weigh_own_model(similarity) if similarity is not None else None
         return Outlook(words, weigh_words(recognition), voice, analysis.range_db, advice)
-    is_used = speech.units_known if fit is None else not fit.is_doubtful
-    words = "given units" if request.units is not None else "transcript" if is_used else "own model"
+    words = "given units" if request.units is not None else "transcript" if speech.units_known else "own model"
     share, known = fit.share if fit else 1.0, 1.0
     if words == "transcript" and request.language != ENGLISH:
         known = MAPPED_CONFIDENCE

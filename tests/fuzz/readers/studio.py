@@ -123,11 +123,15 @@ def seed_settings(_: Good) -> list[Files]:
     phones = Timeline((Span(0.0, 0.3, Unit("sil")), Span(0.3, 0.45, Unit("m", "m", "mama", 0.5))))
     outlook = Outlook("words", 0.66, 0.0, 31.2, ("the words that are spoken",))
     edits = EditFile(
-        Edits().then(*SENTENCES), Request(Path("a.wav")), phones, outlook, Edits().then("hold from 1 to 2").steps
+        Edits().then(*SENTENCES["sentences"]),
+        Request(Path("a.wav")),
+        phones,
+        outlook,
+        Edits().then("hold from 1 to 2").steps,
     )
     exported = ExportRecord("film", {"exports/a.mp4": DIGEST}, "exports/a.edits.json", DIGEST, DIGEST, "1.0")
     recording = ProjectRecording(1, "a", "sounds/a.wav", DIGEST, "hi", 1.5, 0.25, "approved", DIGEST, (exported,))
-    recording = replace(recording, versions=(EditVersion(1, SENTENCES),))
+    recording = replace(recording, versions=(EditVersion(1, tuple(SENTENCES["sentences"])),))
     project = Project(model="voices/a.lipmotion", characters={"a": "b.glb"}, recordings="r")
     project = project.with_recordings([recording])
     answers = "r1,mos,0,hi,natural,a,,4,3.5,1,0,\n"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -51,6 +52,12 @@ def _find_words(recording: Path) -> list[Source]:
         return [] if SHEET.match(file.read(64)) else [Source(beside, "transcript", replaceable=True)]
 
 
+def _name_file(text: str) -> Path:
+    if text.endswith(("/", os.sep)):
+        raise argparse.ArgumentTypeError(f"{text} is a folder; give the name of a file in it")
+    return Path(text)
+
+
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser(
@@ -58,7 +65,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     add_options(parser, Request)
     add = parser.add_argument
-    outputs: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
+    outputs: dict[str, Any] = {"nargs": "+", "action": "extend", "default": [], "type": _name_file}
     files = "FILE.tsv .xml .json .dat .pgo .spine.json, or several"
     add_output(parser, "-o", "--output", force=True, help=files, **outputs)
     kinds = ("tsv", "xml", "json", "dat", "pgo", "spine.json")

@@ -51,7 +51,7 @@ def cues(
     """
     check_cue_options(fps, hold_frames, shapes)
     if len(generation.motion.values) and not len(generation.units):
-        raise ExportError("the generation has no phones, and cues need them; use one of lipmotion.animate")
+        raise ExportError("the motion has no phones, which cues need; give them by --units, or animate the recording")
     if not np.isfinite(generation.motion.values).all():
         raise ExportError("the motion has values that are not finite; interpolate them first")
     chosen = delivery or Delivery()
