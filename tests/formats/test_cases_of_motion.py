@@ -117,6 +117,11 @@ def test_faces_that_come_late_leave_and_are_lost_between(tmp_path: Path, caplog:
     assert "1.33–1.48 s" in caplog.text
 
 
+def test_a_take_under_a_second_says_what_rate_is_assumed(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    motion = read(tmp_path / "a.csv", take([f"{code(n, 30)},2,0.5,0" for n in range(27)]))
+    assert (motion.rate_hz, "60 frames a second are assumed" in caplog.text) == (60, True)
+
+
 @pytest.mark.parametrize(("rate", "mark"), [(30, ";"), (30, ":"), (60, ";"), (60, ":")])
 def test_drop_frame_over_minutes_and_midnight(tmp_path: Path, rate: int, mark: str) -> None:
     """Numbers 0 and 1 (0 to 3 of 60) are left out in every minute but each tenth; a colon does not say so."""

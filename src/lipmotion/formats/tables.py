@@ -273,6 +273,8 @@ def _read_timecodes(codes: list[tuple[int, float, str]]) -> Array:
             raise InputError(f"a timecode has frame {last}, required less than {TIMECODE_RATES[-1]}")
         counted = next(rate for rate in TIMECODE_RATES if rate > last)
         rate = counted if len(passed) else max(counted, APP_RATE)
+        if rate > counted:
+            LOG.warning("the timecodes pass no whole second: %d frames a second are assumed", rate)
         time_s = seconds + frames / rate
         # every full minute but each tenth follows the last frame of a second with frame 2 (4 of 60)
         first = np.flatnonzero((np.diff(seconds) == 1) & (seconds[1:] % 60 == 0) & (seconds[1:] % 600 != 0)) + 1
