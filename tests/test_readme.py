@@ -72,7 +72,7 @@ def test_python_example(page: str, checkout: Path) -> None:
     (checkout / "example.py").write_text(example)
     printed = run([sys.executable, "example.py"], checkout)
     assert re.search(r"widest 0\.\d\d at \d\.\d\d s", printed)
-    assert ("the state at 1.00 s is" in printed) == (page is START)
+    assert ("the model state at 1.00 s is" in printed) == (page is START)
     assert (checkout / "edited.mp4").stat().st_size > 10_000
     assert (checkout / "edited.json").stat().st_size > 10_000
 

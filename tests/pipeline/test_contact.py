@@ -301,7 +301,7 @@ def test_what_is_held_or_locked_stays_on_all_faces(session: Session, spoken: Edi
     lock = spoken.then("gain jawOpen 0.5 from 0.9 to 1", "lock from 0.8 to 1.4")
     later = lock.then("hold from 1.3 to 1.7", "gain jawOpen 3 from 0.2 to 1.9", f"phone {last} is w")
     before, after = (show(session.generate(each), character) for each in (lock, later))
-    for name in {*before} - {"cues", "layers"}:  # shapes are chosen for a line as a whole
+    for name in {*before} - {"cues"}:  # shapes are chosen for a line as a whole
         assert np.abs(after[name] - before[name])[LASTS].max() < 0.03, name
 
 

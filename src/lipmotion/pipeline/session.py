@@ -308,16 +308,17 @@ class Session:
         def add_gestures(generation: Generation, names: Sequence[str]) -> Generation:
             return generation.with_motion(with_gestures(generation.motion, generation.units, names))
 
-        def cut(before: tuple[Step, ...], lock: LockStep) -> MotionStretch:
-            return cut_locked_stretch(add_gestures(self._after(before), SAID), lock.start_s, lock.end_s)
+        def cut(before: tuple[Step, ...], lock: LockStep, names: tuple[str, ...]) -> MotionStretch:
+            return cut_locked_stretch(add_gestures(self._after(before), names), lock.start_s, lock.end_s)
 
         generation = add_gestures(generation, SAID)  # what phones beside a lock ask must not reach into it
         for place, lock in locks.items():
             for later in steps[place + 1 :]:
                 if lock.holds(later):
                     raise InputError(f"{str(later)!r} lies in what is locked ({str(lock)!r}); take the lock out first")
-            key = (steps[:place], lock, self.is_sketching)
-            stretch = self._cache.cached("locked", key, partial(cut, steps[:place], lock))
+            names = generation.motion.names  # also of later edits: in the lock they did nothing
+            key = (steps[:place], lock, names, self.is_sketching)
+            stretch = self._cache.cached("locked", key, partial(cut, steps[:place], lock, names))
             generation = add_gestures(generation, stretch.names)  # also of edits that were taken back since
             generation = apply_stretch(generation, stretch)
             earlier = [edit for step in steps[:place] if isinstance(step, CurveStep) for edit in step.parts]
