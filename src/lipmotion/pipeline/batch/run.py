@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.errors import CorpusError, ExportError, LipMotionError, shorten
+from lipmotion.errors import CorpusError, ExportError, LipMotionError, shorten_list
 from lipmotion.extensions import describe_failed_extension, load_provided
 from lipmotion.formats.base import find_suffix
 from lipmotion.measures.closures import CLOSED_SHARE
@@ -353,7 +353,8 @@ def batch(
     later = read_marks(Path(marks)) if marks is not None else {}
     names = {line.name for line in lines}
     if unknown := [name for name in later if name not in names]:
-        LOG.warning("%s: %d marks of lines that are not in this batch: %s", marks, len(unknown), _some(unknown))
+        some = shorten_list(unknown, MAX_NAMED_LINES)
+        LOG.warning("%s: %d marks of lines that are not in this batch: %s", marks, len(unknown), some)
     chosen = {name: mark for name, mark in (earlier | later).items() if mark.kind}  # the others were taken back
     check_line_job(job, place.run)
     of_settings = fingerprint_job(job)
@@ -403,12 +404,9 @@ def _find_finished(
             outdated.append(line.name)
     if outdated:
         changed = "another recording or other words now, and are kept"
-        LOG.warning("%d approved lines have %s: %s; mark them redo", len(outdated), changed, _some(outdated))
+        some = shorten_list(outdated, MAX_NAMED_LINES)
+        LOG.warning("%d approved lines have %s: %s; mark them redo", len(outdated), changed, some)
     return finished
-
-
-def _some(names: Sequence[str]) -> str:
-    return ", ".join(map(shorten, names[:MAX_NAMED_LINES])) + ", ..." * (len(names) > MAX_NAMED_LINES)
 
 
 def _finish_lines(each: ParallelMap, waiting: Sequence[LineWork]) -> Generator[Record, None, None]:
