@@ -66,11 +66,10 @@ class Camera:
 
     def find_box(self, screen: Real) -> tuple[int, int, int, int] | None:
         """Return first column and row, and those behind the last, around what ``project`` returned; None: outside."""
-        size = self.width, self.height
-        left, top = (max(0, int(edge - 2)) for edge in screen[:, :2].min(axis=0))
-        right, bottom = (
-            min(limit, int(np.ceil(edge + 2))) for edge, limit in zip(screen[:, :2].max(axis=0), size, strict=True)
-        )
+        columns, rows = np.ascontiguousarray(screen[:, :2].T)  # numpy is slow along short rows
+        left, top = (max(0, int(each.min() - 2)) for each in (columns, rows))
+        right = min(self.width, int(np.ceil(columns.max() + 2)))
+        bottom = min(self.height, int(np.ceil(rows.max() + 2)))
         return (left, top, right, bottom) if left < right and top < bottom else None
 
 
