@@ -25,7 +25,6 @@ from lipmotion_faces.film import filmed_video
 from lipmotion_faces.film.background import open_background, steady_face
 from lipmotion_faces.film.filmed_video import FILM, make_film
 from lipmotion_faces.filmed.face import FilmedFace
-from lipmotion_faces.filmed.renderer import AS_PRINTED, STITCHING
 from lipmotion_faces.registry import make_face
 from lipmotion_faces.tracking.track import decode_footage, track_footage
 from lipmotion_faces.tracking.trackers import LIP_POINTS
@@ -302,10 +301,7 @@ def filmed_ways(face: FilmedFace, mouths: RecordedMouths, engines: Sequence[str]
     options = {
         "no jaw": Outputs(jaw="none"),
         "jaw by energy": Outputs(jaw="energy"),
-        "no refinement": Outputs(stitching=replace(STITCHING, mouth=None)),
-        "refinement of the paper": Outputs(stitching=AS_PRINTED),
-        "refinement of the paper, no mean": Outputs(stitching=replace(AS_PRINTED, average=1)),
-        "no noise": Outputs(stitching=replace(STITCHING, noise=False)),
+        "refinement of the paper": Outputs(refinement="paper"),
     }
     ways += [
         way(f"{source}, {name}", source, option)

@@ -12,11 +12,12 @@ from lipmotion.stats.pca import fit_pca
 from lipmotion_faces.appearance.candidates import (
     MIXTURE_SHARE,
     PAPER,
+    Candidates,
     RefinementOptions,
     Refiner,
     choose_candidates,
     draw_to_recorded,
-    make_candidates,
+    measure_details,
     sharpen,
 )
 from oracles.statistics import components, share
@@ -28,6 +29,11 @@ def pictures(seed: int = 0, count: int = 40, height: int = 9, width: int = 12) -
     blobs = draw.normal(0, 1, (6, height, width, 3)) * 0.6 ** np.arange(6)[:, None, None, None]
     values = 120 + 25 * np.einsum("tk,khwc->thwc", draw.normal(0, 1, (count, 6)), blobs)
     return np.clip(values + draw.normal(0, 1, values.shape), 0, 255).astype(np.uint8)
+
+
+def make_candidates(space: Eigenlips, images: np.ndarray) -> Candidates:
+    coefficients = space.project(images)
+    return Candidates(coefficients, measure_details(space, images, coefficients)[0])
 
 
 TRAINING, HELD_OUT = np.split(pictures(count=160), [120])
@@ -81,9 +87,8 @@ def test_what_nothing_can_be_chosen_from() -> None:
             choose_candidates(values, count)
 
 
-def test_a_candidate_is_its_eigenlips_and_its_detail_and_a_damaged_picture_is_none(space: Eigenlips) -> None:
-    images = HELD_OUT[:20].copy()
-    candidates = make_candidates(space, images)
+def test_a_candidate_is_its_eigenlips_and_its_detail(space: Eigenlips) -> None:
+    candidates, images = make_candidates(space, HELD_OUT[:20]), HELD_OUT[:20]
     assert (len(candidates), candidates.size) == (20, (9, 12))
     again = np.rint(space.expand(candidates.coefficients) + candidates.details)
     assert np.abs(again - images).max() <= 1
@@ -91,13 +96,6 @@ def test_a_candidate_is_its_eigenlips_and_its_detail_and_a_damaged_picture_is_no
         [candidates.details[..., c].reshape(20, -1).astype(float) @ space.basis[c].T for c in range(3)]
     )
     assert np.abs(detail_coefficients).max() < 3  # of rounding alone: detail has no part in the space of the eigenlips
-    images[7, :3, :3] = 255, 0, 255
-    candidates = make_candidates(space, images)
-    assert len(candidates) == 19
-    others = make_candidates(space, np.delete(images, 7, axis=0))
-    assert candidates.coefficients == pytest.approx(others.coefficients, abs=1e-2)
-    with pytest.raises(InputError, match=r"1 pictures, all of which differ .* more than 100 grey levels"):
-        make_candidates(space, images[7:8])
 
 
 def test_recorded_mouths_stay_where_they_are() -> None:
@@ -203,15 +201,11 @@ def test_what_cannot_be_refined(refiner: Refiner) -> None:
 def test_edges_become_steeper_in_lightness_alone() -> None:
     edge = np.zeros((2, 20, 20, 3), np.uint8)
     edge[:, :, :10], edge[:, :, 10:] = (60, 80, 100), (110, 130, 150)
-    sharp = sharpen(edge, 0.5, 1).astype(int)
+    sharp = sharpen(edge, 0.5).astype(int)
     assert (sharp[:, :, 10] - sharp[:, :, 9] > 55).all()  # 50 before
     assert (np.ptp(sharp - edge, axis=3) <= 1).all()  # no colour gets more than another
     assert np.abs(sharp - edge)[:, :, [0, -1]].max() == 0
-    assert np.abs(sharpen(edge, 0.5, 2).astype(int) - edge)[:, :, 6].max() > np.abs(sharp - edge)[:, :, 6].max()
-    assert sharpen(edge, 0, 1) is edge
-    lips = np.repeat(np.repeat(edge[:, :1], 56, axis=1), 3, axis=2)
-    gained = np.abs(sharpen(lips, 0.5, 1).astype(int) - lips).max(axis=(0, 2, 3))
-    assert gained[28] > 1.2 * gained[0]  # the lips are in the middle
+    assert sharpen(edge, 0) is edge
 
 
 @pytest.fixture(scope="module")

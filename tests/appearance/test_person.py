@@ -52,6 +52,16 @@ def test_its_parts(appearance: Appearance, footage: FootagePictures) -> None:
     assert appearance.light == pytest.approx(light)
 
 
+def test_damaged_pictures_are_no_candidates(footage: FootagePictures) -> None:
+    """Each has a black spot, all of them elsewhere: eigenlips can learn few of these."""
+    pictures, (rows, columns) = np.concatenate(footage.clips), lower_face.find_mouth_part(1)
+    for number in range(140):
+        pictures[number, rows.start + 1 + number % 6, columns.start + 1 + number // 6] = 0
+    found = learn_appearance(replace(footage, clips=(pictures,))).mouths
+    spotted = (found[:, 1:7, 1:25] < 60).any(axis=(1, 2, 3))
+    assert spotted.mean() < 0.15
+
+
 def test_motion_becomes_the_mouth_that_was_drawn(appearance: Appearance, unseen: types.Motion) -> None:
     codes, drawn = appearance.predict_codes(unseen), toy_lower_faces(unseen, noise=0)[MOUTH].astype(float)
     assert len(codes) == len(unseen.values)

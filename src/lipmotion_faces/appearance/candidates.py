@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -58,11 +58,9 @@ class Candidates:
     @cached_property
     def detail_distances(self) -> Values:
         """Squared distances between the details of any two candidates, in each colour [shape=(3, N, N)], grey²."""
-        distances = []
-        for number in range(len(COLOURS)):  # of a large face one colour of 500 details has 130 MB
-            colour = self.details[..., number].reshape(len(self), -1).astype(np.float32)
-            distances.append(square_distances(colour, colour))
-        return np.stack(distances)
+        rows = self.details.reshape(len(self), -1, len(COLOURS))  # of a large face one colour of 500 has 130 MB
+        colours = (rows[:, :, number].astype(np.float32) for number in range(len(COLOURS)))
+        return np.stack([square_distances(colour, colour) for colour in colours])
 
 
 def choose_candidates(coefficients: NDArray[np.floating[Any]], count: int = CANDIDATES) -> Index:
@@ -101,27 +99,6 @@ def choose_candidates(coefficients: NDArray[np.floating[Any]], count: int = CAND
         sums = np.add.reduceat(values[order].astype(np.float64), first, axis=0)
         centres[present] = sums / np.diff(np.append(first, len(values)))[:, None]
     return np.unique(_find_nearest(centres, values))
-
-
-def make_candidates(eigenlips: Eigenlips, pictures: Pictures, coefficients: Values | None = None) -> Candidates:
-    """Return recorded mouth pictures as candidates, without those that are damaged.
-
-    pictures     : those chosen [shape=(N, H, W, 3)], uint8
-    coefficients : of the same pictures [shape=(N, 3·K)], for eigenlips of ``enlarge``; None: their projections
-    A picture that differs from what its eigenlips restore by over ``LARGEST_DETAIL`` grey levels somewhere is left out.
-    Raises InputError: no pictures, none that is whole, or of another size than those of the eigenlips.
-    """
-    if coefficients is None:
-        coefficients = eigenlips.project(pictures)
-    details, deepest = measure_details(eigenlips, pictures, coefficients)
-    undamaged = deepest <= LARGEST_DETAIL
-    if not undamaged.any():
-        raise InputError(
-            f"{len(pictures)} pictures, all of which differ from their eigenlips by more than {LARGEST_DETAIL} grey "
-            "levels; required at least one that does not: are they pictures of the person whom the eigenlips were "
-            "trained on?"
-        )
-    return Candidates(coefficients[undamaged], details[undamaged])
 
 
 def measure_details(
@@ -209,11 +186,14 @@ class RefinementOptions:
     steadiness : weight of the change of detail between frames, beside the distance in the space of eigenlips; both
                  are squared grey levels. 0: the nearest candidate in every frame, as in the paper
     neighbours : number of nearest candidates of a frame that are considered, at most
+    blur_px    : what is finer than a Gaussian window of this standard deviation, px of the face, is wholly that of
+                 the candidate; 0: only what eigenlips leave out, as in the paper
     """
 
     together: bool = True
     steadiness: float = 1.0
     neighbours: int = 20
+    blur_px: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0 <= self.steadiness < np.inf:
@@ -222,43 +202,41 @@ class RefinementOptions:
             raise InputError(f"{self.neighbours} neighbours, required at least 1")
 
 
-STEADY = RefinementOptions()  # the default: one candidate for all colours, and steady detail
+STEADY = RefinementOptions(steadiness=0.3, blur_px=2.0)
+"""The default: one candidate for all colours, steady; the edges of lips are its own, as mixed ones are blurred."""
 PAPER = RefinementOptions(together=False, steadiness=0.0, neighbours=1)
 """The refinement of the paper: the nearest candidate of every colour and frame."""
 
 
-SHARPENING, RADIUS_PX = 0.5, 1.0
-"""Share of the difference from a blurred picture that is added, and the blur, px of the face: what the regression and
-resampling take away (docs/results/panel.md)."""
-LIPS_SHARPENING, LIPS_AXES_PX, LIPS_EDGE_PX = 1.4, (28.0, 16.0), 6.0
-"""How much more of it lips and teeth get, which mixing blurs most, in an ellipse in the middle of the mouth with these
-half axes and this edge, px of the face."""
+SHARPENING = 0.3
+"""Share of the difference from a picture blurred by one sample that is added: what resampling there and back takes away
+(docs/results/video.md)."""
 
 
-def sharpen(pictures: Pictures, share: float, scale: int) -> Pictures:
+def sharpen(pictures: Pictures, share: float) -> Pictures:
     """Return pictures [shape=(T, H, W, 3)] that are sharper in lightness; colours would have fringes.
 
-    share : of the difference between lightness and blurred lightness, added to all colours outside the lips
-    scale : samples a pixel of the face
+    share : of the difference between lightness and blurred lightness, added to all colours
     """
     from scipy.ndimage import gaussian_filter
 
     if not share:
         return pictures
-    lightness = pictures.mean(axis=3, dtype=np.float32)
-    detail = lightness - gaussian_filter(lightness, (0, RADIUS_PX * scale, RADIUS_PX * scale))
-    detail *= np.float32(share) * _weigh_lips(lightness.shape[1], lightness.shape[2], scale)
-    return round_levels(pictures + detail[..., None])
+    lightness = pictures.astype(np.float32) @ np.full(len(COLOURS), 1 / len(COLOURS), np.float32)
+    detail = lightness - gaussian_filter(lightness, 1.0, axes=(1, 2))
+    return round_levels(pictures + np.float32(share) * detail[..., None])
 
 
-@cache
-def _weigh_lips(height: int, width: int, scale: int) -> NDArray[np.float32]:
-    """Return 1, and ``LIPS_SHARPENING`` at the lips [shape=(H, W)]."""
-    rows, columns = np.mgrid[:height, :width]
-    x, y = (columns + 0.5 - width / 2) / scale, (rows + 0.5 - height / 2) / scale
-    inside = (1 - np.hypot(x / LIPS_AXES_PX[0], y / LIPS_AXES_PX[1])) * min(LIPS_AXES_PX) / LIPS_EDGE_PX
-    share = np.clip(inside, 0, 1)
-    return (1 + (LIPS_SHARPENING - 1) * share * share * (3 - 2 * share)).astype(np.float32)
+def widen(pictures: NDArray[Any], factors: Levels) -> Values:
+    """Return pictures [shape=(T, H, W, 3)] made wider about their middle by factors [shape=(T,)], of the same size."""
+    from lipmotion_faces.kernels import affine
+
+    height, width = pictures.shape[1:3]
+    middle, result = (width - 1) / 2, np.empty(pictures.shape, np.float32)
+    for frame, factor in enumerate(factors.tolist()):
+        to_source = np.array([[1 / factor, 0, middle - middle / factor], [0, 1, 0]])
+        result[frame] = affine.resample(pictures[frame : frame + 1], to_source, (height, width))[0]
+    return result
 
 
 def smooth_curves(coefficients: Levels, frames: int = 3) -> NDArray[np.float64]:
@@ -312,16 +290,18 @@ class Refiner:
             path = numbers[:, :, 0]
         return np.broadcast_to(path, (len(COLOURS), path.shape[1])).T.copy()
 
-    def refine(self, coefficients: Levels, chosen: Index) -> Pictures:
+    def refine(self, coefficients: Levels, chosen: Index, factors: Levels | None = None) -> Pictures:
         """Return the pictures [shape=(T, H, W, 3)] of eigenlips [shape=(T, 3·K)] with the detail of candidates.
 
-        chosen : of ``choose``, or a part of it: pictures of long speech are made a few frames at a time
+        chosen  : of ``choose``, or a part of it: pictures of long speech are made a few frames at a time
+        factors : how much wider the detail is made in each frame, where all colours have one [shape=(T,)]; None: 1
         Raises InputError: another number of coefficients.
         Source: Xie & Liu 2007, Eq. 16.
         """
         levels = self.eigenlips.expand(coefficients)
         if (chosen == chosen[:, :1]).all():
-            levels += self.candidates.details[chosen[:, 0]]
+            details = self.candidates.details[chosen[:, 0]]
+            levels += details if factors is None else widen(details, factors)
         else:
             for colour in range(len(COLOURS)):
                 levels[..., colour] += self.candidates.details[chosen[:, colour], :, :, colour]

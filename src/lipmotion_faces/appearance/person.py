@@ -6,7 +6,7 @@ It is stored as arrays.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -88,11 +88,15 @@ class FootagePictures:
 
 @dataclass(frozen=True, eq=False)
 class FaceCodes:
-    """The lower face in every frame: eigenlips, jaw [shape=(T, 3·K)], the chin below the eyes in px [shape=(T,)]."""
+    """The lower face in every frame: eigenlips, jaw [shape=(T, 3·K)], the chin below the eyes in px [shape=(T,)].
+
+    width : of the mouth, eye distances [shape=(T,)]; None: that of the recorded mouths
+    """
 
     mouth: Floats
     jaw: Floats
     chin_px: Floats
+    width: Array | None = None
 
     def __len__(self) -> int:
         return len(self.mouth)
@@ -136,15 +140,17 @@ class Appearance:
     noise: CameraNoise
 
     @cached_property
-    def mouth_candidates(self) -> candidates.Candidates:
-        """The recorded mouths as eigenlips and detail."""
-        return candidates.make_candidates(enlarge(self.mouth, self.scale), self.mouths, self.mouth_codes)
+    def _refiners(self) -> dict[tuple[str, candidates.RefinementOptions], candidates.Refiner]:
+        return {}
 
-    @cached_property
-    def jaw_candidates(self) -> candidates.Candidates:
-        """The recorded lower faces as components and detail."""
-        details, _ = candidates.measure_details(enlarge(self.jaw, self.scale), self.jaws, self.jaw_codes)
-        return candidates.Candidates(self.jaw_codes, details)
+    def make_refiner(self, part: str, options: candidates.RefinementOptions) -> candidates.Refiner:
+        """Return what draws the mouth or the jaw with the detail of recorded ones, cached."""
+        if (part, options) not in self._refiners:
+            pictures, codes = (self.mouths, self.mouth_codes) if part == "mouth" else (self.jaws, self.jaw_codes)
+            space = enlarge(self.mouth if part == "mouth" else self.jaw, self.scale, options.blur_px)
+            recorded = candidates.Candidates(codes, candidates.measure_details(space, pictures, codes)[0])
+            self._refiners[part, options] = candidates.Refiner(space, recorded, options)
+        return self._refiners[part, options]
 
     def predict_codes(self, motion: Motion, contact: Array | None = None) -> FaceCodes:
         """Return the lower face for motion of tracked points.
@@ -154,17 +160,20 @@ class Appearance:
         """
         values = self.from_motion.predict(motion)
         count = self.mouth_codes.shape[1]
-        mouth = self._mix_mouths(values[:, :count], motion, contact)
-        return FaceCodes(mouth, values[:, count:-1], values[:, -1])
-
-    def _mix_mouths(self, predicted: Floats, motion: Motion, contact: Array | None) -> Floats:
-        """Return recorded mouths, mixed to look as predicted and be as open and wide as the motion [shape=(T, 90)]."""
-        measured = self.mouth_distances
+        predicted, jaw, chin_px, measured = values[:, :count], values[:, count:-1], values[:, -1], self.mouth_distances
         if measured is None:
-            return candidates.draw_to_recorded(predicted, self.mouth_codes)
+            return FaceCodes(candidates.draw_to_recorded(predicted, self.mouth_codes), jaw, chin_px)
         middle = measured.mean(axis=0)
         wanted = middle + DISTANCE_GAINS * (motion_map.select_channels(motion, LIP_DISTANCES) - middle)
         wanted = np.clip(wanted, measured.min(axis=0), measured.max(axis=0))
+        mouth = self._mix_mouths(predicted, measured, wanted, motion.rate_hz, contact)
+        return FaceCodes(mouth, jaw, chin_px, wanted[:, 1])
+
+    def _mix_mouths(
+        self, predicted: Floats, measured: Array, wanted: Array, rate_hz: float, contact: Array | None
+    ) -> Floats:
+        """Return recorded mouths, mixed to look as predicted and be as open and wide as wanted [shape=(T, 90)]."""
+        middle = measured.mean(axis=0)
         weights = DISTANCE_WEIGHTS / np.maximum(measured.std(axis=0), motion_map.MIN_DEVIATION)
         sought, recorded = (
             np.concatenate([codes, ((distances - middle) * weights).astype(np.float32)], axis=1)
@@ -174,7 +183,7 @@ class Appearance:
         if contact is None:
             return mouths
         for first, stop in find_runs(contact >= 1).tolist():
-            if stop - first > max(1, LONGEST_CLOSURE_S * motion.rate_hz):
+            if stop - first > max(1, LONGEST_CLOSURE_S * rate_hz):
                 continue
             closed = measured[:, 0] <= max(wanted[first:stop, 0].max(), measured[:, 0].min())
             apart = candidates.square_distances(sought[first:stop], recorded).mean(axis=0)
@@ -197,7 +206,7 @@ class Appearance:
         Source: Xie & Liu 2007, §6.2: the jaw goes down about in proportion to the energy of the sound.
         """
         values = (levels_db[:, None] * self.from_sound[1] + self.from_sound[0]).astype(np.float32)
-        return FaceCodes(codes.mouth, values[:, :-1], values[:, -1])
+        return replace(codes, jaw=values[:, :-1], chin_px=values[:, -1])
 
 
 def learn_appearance(footage: FootagePictures) -> Appearance:
@@ -212,8 +221,10 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
     blocks = (pictures[start : start + PICTURES_PER_BLOCK] for start in range(0, len(pictures), PICTURES_PER_BLOCK))
     jaw_codes = np.concatenate([jaw.project(_isolate_jaw(block, around, footage.shape)) for block in blocks])
     chosen = candidates.choose_candidates(codes, candidates.CANDIDATES)
-    undamaged = candidates.measure_details(mouth, mouths[chosen], codes[chosen])[1] <= candidates.LARGEST_DETAIL
-    chosen = chosen[undamaged] if undamaged.any() else chosen
+    chosen = chosen[candidates.measure_details(mouth, mouths[chosen], codes[chosen])[1] <= candidates.LARGEST_DETAIL]
+    if not len(chosen):
+        limit = f"by more than {candidates.LARGEST_DETAIL} grey levels"
+        raise InputError(f"all pictures of the mouth differ from their eigenlips {limit}; give undamaged footage")
     chosen_jaws = candidates.choose_candidates(jaw_codes, JAW_CANDIDATES)
     names = [channel.name for channel in footage.channels]
 
@@ -285,15 +296,19 @@ def _fit_regression(inputs: Values, targets: Values) -> Floats:
     return np.concatenate([(middle - centre @ slopes)[None], slopes]).astype(np.float32)
 
 
-def enlarge(eigenlips: Eigenlips, scale: int) -> Eigenlips:
+def enlarge(eigenlips: Eigenlips, scale: int, blur_px: float = 0.0) -> Eigenlips:
     """Return eigenlips that restore larger pictures from the same coefficients, by cubic interpolation.
 
-    scale : pixels of the new pictures for each of the old ones, along each side; 1: the same eigenlips
-    Their basis is no longer orthonormal: ``project`` pictures of the old size, with the old eigenlips.
+    scale   : pixels of the new pictures for each of the old ones, along each side
+    blur_px : standard deviation of the Gaussian window that they are blurred with, px of the old ones
+    With 1 and 0 they stay as they are. Otherwise their basis is no longer orthonormal: ``project`` pictures of the old
+    size, with the old eigenlips.
     """
+    from scipy.ndimage import gaussian_filter
+
     from lipmotion_faces.kernels import affine
 
-    if scale == 1:
+    if scale == 1 and not blur_px:
         return eigenlips
     height, width = eigenlips.size
     middle = (0.5 / scale) - 0.5
@@ -301,6 +316,7 @@ def enlarge(eigenlips: Eigenlips, scale: int) -> Eigenlips:
 
     def enlarge(rows: NDArray[np.float32]) -> NDArray[np.float32]:
         pictures = np.moveaxis(rows, 0, -1).reshape(-1, height, width, len(COLOURS))
+        pictures = gaussian_filter(pictures, blur_px, mode="nearest", axes=(1, 2))
         pictures = affine.resample(pictures, to_source, (scale * height, scale * width))
         return np.ascontiguousarray(np.moveaxis(pictures, -1, 0)).reshape(*rows.shape[:-1], -1)
 

@@ -182,7 +182,7 @@ def predict_codes(
     if all(channel.unit == GREY for channel in shown.channels):
         jaw, chin_px = (np.concatenate([getattr(part, name) for part in parts]) for name in ("jaw", "chin_px"))
         return FaceCodes(mouth, jaw, chin_px)
-    return replace(face.appearance.predict_codes(shown), mouth=mouth)  # points tell the jaw better
+    return replace(face.appearance.predict_codes(shown), mouth=mouth, width=None)  # points tell the jaw better
 
 
 def find_other_person(model: Model, face: FilmedFace, speaker: str = "") -> FilmedFace | None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion_faces.appearance import candidates, lower_face
 from lipmotion_faces.appearance.camera_noise import NoiseSource
-from lipmotion_faces.appearance.person import JAW_OPTIONS, Appearance, FaceCodes, enlarge
+from lipmotion_faces.appearance.person import JAW_OPTIONS, Appearance, FaceCodes
 from lipmotion_faces.appearance.placing import cut, feather, place
 from lipmotion_faces.appearance.poisson import CloningSystem, build_cloning_system
 
@@ -26,6 +26,7 @@ BATCH = 16  # frames in memory at a time, at one sample a pixel; fewer of larger
 FEATHER_PX = 6.0  # width of the seam, px of the face
 
 LARGEST_DIFFERENCE = 20.0  # differences on the edge of the jaw above this are no difference of light, grey levels
+STRETCH = 0.88, 1.12  # how much narrower and wider than recorded a mouth is shown
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class StitchingOptions:
 
     jaw       : whether the jaw is replaced, too; False: the background's jaw stays, the mouth alone is replaced
     mouth     : how the detail of the mouth is chosen; None: eigenlips alone, blurred
-    sharpening : by how much the mouth is sharpened (``sharpen``); 0: not
+    sharpening : by how much what is stitched in is sharpened (``sharpen``); 0: not
     average   : number of pictures over which the mouth is averaged before, odd; 1: none
     jaw_detail : how the detail of the jaw is chosen
     noise     : whether the noise of the camera is added
@@ -74,7 +75,7 @@ class Stitcher:
     def stitch(self, codes: FaceCodes, backgrounds: Iterable[Background]) -> Iterator[Picture]:
         """Yield a frame for each of motion, a few at a time. Raises InputError: too few backgrounds."""
         codes = self._average(codes)
-        mouth_chosen = self._mouths.choose(codes.mouth)
+        mouth_chosen, factors = self._choose_mouths(codes)
         jaw_chosen = self._jaws.choose(codes.jaw)
         iterator = iter(backgrounds)
         scale = self.appearance.scale
@@ -85,7 +86,7 @@ class Stitcher:
             if len(batch) < len(codes.mouth[part]):
                 count = first + len(batch)
                 raise InputError(f"{count} frames of background, required {len(codes)}; give longer footage")
-            mouths = self._draw_mouths(codes.mouth[part], mouth_chosen[part], first)
+            mouths = self._draw_mouths(codes.mouth[part], mouth_chosen[part], factors[part], first)
             maps = lower_face.map_region(np.stack([each.face_to_frame for each in batch]), scale)
             aligned = [
                 cut(each.frame, to, (lower_face.HEIGHT * scale, lower_face.WIDTH * scale))
@@ -100,10 +101,8 @@ class Stitcher:
                     lower_face.relight(jaws, self._measure_gains(behind)), behind, LARGEST_DIFFERENCE
                 )
             source, mouth = behind.copy(), (slice(None), *lower_face.find_mouth_part(scale))
-            source[mouth] = candidates.sharpen(
-                lower_face.relight(mouths, self._measure_gains(behind)), self.options.sharpening, scale
-            )
-            patches = self._mouth_alone.clone(source, behind)
+            source[mouth] = lower_face.relight(mouths, self._measure_gains(behind))
+            patches = candidates.sharpen(self._mouth_alone.clone(source, behind), self.options.sharpening)
             for each, patch, to in zip(batch, patches, maps, strict=True):
                 frame = each.frame.copy()
                 if each.has_face:
@@ -113,10 +112,10 @@ class Stitcher:
     def draw_mouths(self, codes: FaceCodes) -> Iterator[Picture]:
         """Yield pictures of the mouth alone [shape=(56 · scale, 72 · scale, 3)], one for each frame of motion."""
         codes = self._average(codes)
-        chosen = self._mouths.choose(codes.mouth)
+        chosen, factors = self._choose_mouths(codes)
         for first in range(0, len(codes), BATCH):
             part = slice(first, first + BATCH)
-            yield from self._draw_mouths(codes.mouth[part], chosen[part], first)
+            yield from self._draw_mouths(codes.mouth[part], chosen[part], factors[part], first)
 
     def _average(self, codes: FaceCodes) -> FaceCodes:
         """Return codes whose mouth is the mean of some pictures."""
@@ -124,11 +123,18 @@ class Stitcher:
             return codes
         return replace(codes, mouth=candidates.smooth_curves(codes.mouth, self.options.average).astype(np.float32))
 
-    def _draw_mouths(self, codes: Floats, chosen: NDArray[np.intp], first: int) -> Pictures:
+    def _choose_mouths(self, codes: FaceCodes) -> tuple[NDArray[np.intp], Array]:
+        """Return the recorded mouth of every frame and colour, and how much wider it is shown [shape=(T,)]."""
+        chosen, recorded = self._mouths.choose(codes.mouth), self.appearance.mouth_distances
+        if codes.width is None or recorded is None or not self._mouths.options.blur_px:
+            return chosen, np.ones(len(codes))
+        return chosen, np.clip(codes.width / np.maximum(recorded[chosen[:, 0], 1], 1e-6), *STRETCH)
+
+    def _draw_mouths(self, codes: Floats, chosen: NDArray[np.intp], factors: Array, first: int) -> Pictures:
         if self.options.mouth is None:
             pictures = self._mouths.eigenlips.restore(codes)
         else:
-            pictures = self._mouths.refine(codes, chosen)
+            pictures = self._mouths.refine(codes, chosen, None if (factors == 1).all() else factors)
         return self._noise.add(pictures, first) if self.options.noise else pictures
 
     def _measure_gains(self, behind: Pictures) -> Array:
@@ -138,13 +144,11 @@ class Stitcher:
 
     @cached_property
     def _mouths(self) -> candidates.Refiner:
-        mouth = enlarge(self.appearance.mouth, self.appearance.scale)
-        return candidates.Refiner(mouth, self.appearance.mouth_candidates, self.options.mouth or candidates.STEADY)
+        return self.appearance.make_refiner("mouth", self.options.mouth or candidates.PAPER)
 
     @cached_property
     def _jaws(self) -> candidates.Refiner:
-        jaw = enlarge(self.appearance.jaw, self.appearance.scale)
-        return candidates.Refiner(jaw, self.appearance.jaw_candidates, self.options.jaw_detail)
+        return self.appearance.make_refiner("jaw", self.options.jaw_detail)
 
     @cached_property
     def _noise(self) -> NoiseSource:
