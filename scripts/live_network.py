@@ -45,7 +45,6 @@ from lipmotion.live.network import (
     SPEECH_RANGE,
     STEP_FRAMES,
     STEP_S,
-    WEIGHTS,
     BandMeans,
     SoundFeatures,
     silent_step,
@@ -66,7 +65,7 @@ from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit
 from lipmotion.stats.networks import ConvolutionalNetwork
 from lipmotion.types import SPECTRUM_BANDS, Audio, Motion, Timeline, Track, Unit
 
-OUTPUT = Path(__file__).parents[1] / "src" / "lipmotion" / "models" / WEIGHTS
+OUTPUT = Path(__file__).parents[1] / "src" / "lipmotion" / "models" / "live.npz"
 VOICES = [
     *(["flite", "-voice", name, "-o", "{file}", "-t", "{text}"] for name in ("kal", "awb", "rms", "slt", "kal16")),
     *(

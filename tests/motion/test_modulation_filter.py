@@ -34,9 +34,9 @@ def test_each_dimension_has_its_own_filter_without_delay() -> None:
     assert half.taps[REACH, 1] > 1.2
 
 
-def test_its_strength_is_between_nothing_and_all_of_it_for_each_dimension() -> None:
+def test_its_strength_is_between_nothing_and_all_of_it() -> None:
     plain, whole = GENERATED[0], FILTER.apply(GENERATED[0])
-    for strength in (0, 0.5, 2, np.array([0.0, 2.0])):
+    for strength in (0, 0.5, 2):
         assert FILTER.scale_to(strength).apply(plain) == pytest.approx(plain + strength * (whole - plain))
 
 

@@ -70,12 +70,10 @@ def network() -> PosteriorNetwork:
 
 @pytest.fixture(scope="module")
 def learned() -> PosteriorNetwork:
-    """Trained so long that it moves well."""
     return trained([example(number) for number in range(12)], 8.0)
 
 
 def likeness(network: PosteriorNetwork, spoken: Speech) -> tuple[float, float]:
-    """Return the correlation of opening and of width of a new recording, number 99."""
     made, wanted = network.predict(spoken)[0], motion_of(99)
     return tuple(float(np.corrcoef(made[:, each], wanted[:, each])[0, 1]) for each in range(2))  # type: ignore[return-value]
 

@@ -35,7 +35,6 @@ PREFIX = "predictor.frames."
 
 @pytest.fixture
 def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[type[predictors.Predictor]]:
-    """The class of the page, as an installed package adds it."""
     (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     (tmp_path / "predictor_of_the_page.py").write_text(code, encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
@@ -151,7 +150,6 @@ def fit(training: PredictorTraining, steps: int) -> Predictor:
 
 @pytest.fixture(scope="module")
 def trained() -> AcousticNetwork:
-    """A small network."""
     examples, values = zip(*(example_in_conditions(seed, (1.0, 0.8, 1.25)) for seed in range(6)), strict=True)
     return fit(PredictorTraining(examples, values, 2), 60)  # type: ignore[return-value]
 
@@ -222,7 +220,6 @@ def standing(seed: int, noise: float = 0.0) -> tuple[Example, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def fitted() -> PredictorFit:
-    """A regression, and its predictions in cross-validation."""
     examples, values = zip(*(standing(seed) for seed in range(4)), strict=True)
     return PriorRegression.fit(PredictorTraining(examples, values, 2))
 

@@ -64,7 +64,6 @@ def at_rest(examples: Sequence[Example]) -> np.ndarray:
 
 
 def least_openings(example: Example) -> list[float]:
-    """The least opening of each p, b and m."""
     values = example.motion.values
     return [values[frames, 0].min() for frames in find_closable_ranges(example.speech.units, len(values))]
 

@@ -25,7 +25,6 @@ CONFIDENCES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 @pytest.fixture(scope="module")
 def welcome() -> Speech:
-    """Recognised phones of a voice that the model does not know."""
     return analyse(load_model(), Request(WELCOME, recogniser="fast"))
 
 
@@ -36,13 +35,11 @@ def no_distortion_is_low(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def generated(speech: Speech, *pins: Pin) -> Generation:
-    """What the shipped model makes of some speech."""
     model = load_model()
     return model.engine.generate(model.learned, speech, Constraints(pins))
 
 
 def shut_share(generation: Generation) -> float:
-    """The share of the frames of vowels in which the lips are shut."""
     opening = generation.motion["opening"]
     vowels = [opening[int(s.start_s * 100) : int(s.end_s * 100)] for s in generation.units if s.label.phone in VOWELS]
     return float((np.concatenate(vowels) < SHUT_OPENING).mean())
@@ -72,17 +69,32 @@ def test_long_vowels_are_more_open_short_ones_and_consonants_less(voice: float, 
 
 
 @pytest.mark.parametrize(("voice", "share"), [(0.0, 0.5), (0.5, 0.5), (1.0, 0.0)])
-def test_voices_not_known_to_training_open_before_they_speak(voice: float, share: float) -> None:
+@pytest.mark.parametrize(("phone", "least", "most"), [("aa", 0.8, 1.3), ("b", -0.2, 0.1), ("m", -0.2, 0.1)])
+def test_voices_not_known_to_training_open_before_they_speak_but_for_closed_lips(voice, share, phone, least, most):
     prior = load_model().learned.motion.prior
-    units = Timeline((Span(0.0, 1.5, Unit("sil")), Span(1.5, 1.8, Unit("aa")), Span(1.8, 2.5, Unit("sil"))))
+    units = Timeline((Span(0.0, 1.5, Unit("sil")), Span(1.5, 1.8, Unit(phone)), Span(1.8, 2.5, Unit("sil"))))
     made = changed("open_before_speech", UnseenSpeaker(prior, units, 250, 0.5, voice), slice(10, 250))
-    assert made[130 - 10, 0] == pytest.approx(share * prior.centre, rel=1e-3)
+    wider = articulation.BREATH_RISE / 2 * prior.matrix[[0, 2]].sum(axis=0)
+    assert made[120 - 10, 0] == pytest.approx(share * (prior.centre + wider), rel=1e-2)
+    assert share * least <= made[145 - 10, 0, 0] / prior.centre[0] <= share * most
     assert np.abs(made[[10, 60, 170, 230], 0]).max() < 1e-3
-    assert not made[:, 1:].any()
+
+
+@pytest.mark.parametrize(("voice", "left"), [(0.0, 0.0), (0.75, 0.5), (1.0, 1.0)])
+def test_the_width_of_unknown_voices_moves_fast_where_lips_are_round_alone(voice: float, left: float) -> None:
+    prior = load_model().learned.motion.prior
+    units = Timeline((Span(0.0, 1.0, Unit("s")), Span(1.0, 2.0, Unit("w")), Span(2.0, 3.0, Unit("s"))))
+    means = np.zeros((300, 3, len(prior.centre)))
+    means[:, :, 1] = (np.arange(300) % 2)[:, None]
+    speaker = UnseenSpeaker(prior, units, 300, 1.0, voice)
+    made, _ = speaker.slow_width(lambda chosen: (means[chosen], means[chosen] + 1), 1)(slice(20, 280))
+    fast = np.abs(np.diff(made[:, :, 1], axis=0))
+    assert fast[[30, 230]] == pytest.approx(left, abs=0.01)
+    assert fast[130] == pytest.approx(1)
+    assert not made[:, :, [0, 2]].any()
 
 
 def test_a_model_of_few_phones_opens_no_mouth_before_speech() -> None:
-    """Such a model half knows its own speaker's voice."""
     prior, units = load_model().learned.prior, timeline(("p", "aa"), 0.2)
     few = replace(prior, contexts=dict.fromkeys(list(prior.contexts)[:10], 1))
     speakers = [UnseenSpeaker(each, units, 250, 1.0, 0.8) for each in (prior, few)]
@@ -190,7 +202,6 @@ OPENING, WIDTH = ARTICULATORS.index("opening"), ARTICULATORS.index("width")
 
 
 def middle(phone: str, articulator: int) -> float:
-    """The articulator in the middle of a long phone between others."""
     units = timeline(("t", phone, "t"), 0.3)
     frame = int((units[2].start_s + units[2].end_s) * 50)
     return float(articulation.trace_articulators(units, 230)[frame, articulator])
@@ -206,7 +217,6 @@ def test_open_vowels_are_open_closures_closed_and_rounded_sounds_narrow() -> Non
 
 @pytest.fixture(scope="module")
 def prior() -> articulation.ArticulationPrior:
-    """The table in the range of the synthetic speaker."""
     some = examples()
     space, values = fit_reduced_motion(some, 3)
     return articulation.fit_articulation_prior(space, values, some)  # type: ignore[return-value]

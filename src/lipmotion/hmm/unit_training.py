@@ -328,10 +328,8 @@ class _Training:
                 self._hmm = hmm
                 self._report(stage, statistics.mean_log_likelihood)
 
-            run_em(self._hmm, self._expect, stage.maximise, steps, after_step)
-
-    def _expect(self, hmm: UnitHmm) -> UnitStatistics:
-        return accumulate_statistics(hmm, self._data, self._sequences, self._checkpoint)
+            known = self._data, self._sequences, self._checkpoint
+            run_em(self._hmm, lambda hmm: accumulate_statistics(hmm, *known), stage.maximise, steps, after_step)
 
     def _report(self, stage: _Stage, figure: float | None) -> None:
         self._done += 1

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.motion.closure import OPENING, REACH_S
+from lipmotion.motion.closure import OPENING, REACH_S, find_closable_ranges
 from lipmotion.motion.frame_labels import mark_distant, with_neighbours
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.curves import with_dynamics
@@ -43,8 +43,7 @@ SMOOTHING_S = 0.048
 """Standard deviation of the Gaussian that joins the thirds of successive phones: 1.2 pictures at 25 Hz."""
 REST_S = 0.5  # silence further than this from speech is not in the table: the mouth rests
 GAIN = 2.0
-"""The means of the table are made so much larger. They were measured on recognised words, of which a fifth to a third
-are wrong, so that all are drawn towards 0; of 1.3, 1.8 and 2.2, the largest was best for strangers."""
+"""The means of the table are made so much larger: a fifth to a third of the words that it was measured on are wrong."""
 RIDGE = 1e-2  # ridge parameter of the map from articulators to the motion space, as a share of the number of frames
 MIN_DEVIATION = 1e-6
 TABLE_WEIGHT = 4.0  # weight of the table beside the means of states, in a context that training never saw
@@ -52,9 +51,8 @@ TABLE_WEIGHT_WITH_PREDICTOR = 1.0  # the same where a predictor that asks for no
 KNOWN_VOICE_SHARE = 0.3
 """Share of that weight for a voice that training knows: of its speaker the predictor knows more than the table."""
 POWER = 3
-"""The weight of the table grows with this power of the reliability, for phones that are wrong make contexts unknown,
-and of how unknown a context is: the table has a third of the weight where training saw the context once, an eighth
-where twice."""
+"""The weight of the table grows with this power of the reliability, for wrong phones make contexts unknown, and of how
+unknown a context is: it is an eighth where training saw the context once, a 27th where twice."""
 HALF_FAMILIAR_COUNT = 1.0  # occurrences in training after which a context counts as half familiar
 
 
@@ -181,14 +179,8 @@ def fit_articulation_prior(
     """
     if OPENING not in space.direct_names:
         return None
-    spoken_poses = []
-    for x, example in zip(values, examples, strict=True):
-        spoken = np.zeros(len(x), bool)
-        for span in example.speech.units:
-            if not is_silent(span.label.phone):
-                spoken[slice(*frames_of(span, len(x)))] = True
-        spoken_poses.append(x[spoken & example.valid])
-    poses = np.concatenate(spoken_poses)
+    pairs = zip(values, examples, strict=True)
+    poses = np.concatenate([x[each.valid & ~mark_distant(each.speech.units, len(x), 0.0)] for x, each in pairs])
     if not len(poses):
         return None
     measured = measure_articulators(space.restore(poses), [channel.name for channel in space.channels])
@@ -274,15 +266,16 @@ NOISY_SHARE = 0.3
 """The same of a voice that training knows, where noise makes its phones unreliable; none where they are reliable."""
 CONFIRMED = -0.5
 """An unreliable p, b or m closes the lips where the general network hears them less open than so many deviations."""
-NEAR_FRAMES = 20  # frames before and after speech in which that holds: elsewhere the mouth rests
+NEAR_S = 0.2  # seconds before and after speech in which that holds: elsewhere the mouth rests
 VOWEL_S, OPENING_BY_DURATION = 0.1, 0.5
 """A vowel of the first duration is as open as the table says; one that is e times as long is more open by so many
 standard deviations of the speaker, and a shorter one less (docs/results/voices.md)."""
 CONSONANT_CLOSING = 0.25
-"""Consonants are less open than the table says, by so many standard deviations of the speaker: a fifth to a third of
-the phones that it was measured on are wrong, so that it has vowels too closed and consonants too open."""
+"""Consonants are less open than the table says, by so many deviations: some phones of its recordings were wrong."""
 BREATH_S = 0.6
 """So long before the first phone such a mouth is as open as in speech: people part their lips and breathe in."""
+BREATH_RISE, LIP_CLOSING_S, SHUT = 0.2, 0.12, -1.5
+"""Then it is more open by so many deviations; p, b or m shuts lips so long before it is heard (s1: 0.13 s), so far."""
 SURE_PHONES = 5000
 """Models of so many phones in training, some twelve minutes, know their own speaker; those of 50 sentences take his
 voice for 0.85 of a known one (docs/results/jerk.md), no more than the large model some strangers of the same studio."""
@@ -309,18 +302,27 @@ class UnseenSpeaker:
 
     def follow_sound(self, statistics: Predict, articulators: Array) -> Predict:
         """Draw motion in and near speech towards articulators that the general network hears [shape=(T, 8)]."""
-        spoken = np.zeros((self.frames, 1))
-        for span in self.units:
-            if not is_silent(span.label.phone):
-                first, stop = frames_of(span, self.frames)
-                spoken[max(first - NEAR_FRAMES, 0) : stop + NEAR_FRAMES] = 1
+        spoken = ~mark_distant(self.units, self.frames, NEAR_S)[:, None]
         unsure, sure = SOUND_SHARES
         reliability = np.broadcast_to(self.reliability, self.frames)[:, None, None]
         strange = count_unseen(self.voice)
         share = strange * (unsure + reliability * (sure - unsure)) + (1 - strange) * NOISY_SHARE * (1 - reliability)
-        share = share * smooth_steps(spoken)[:, :, None]
-        heard = self.prior.centre + articulators @ self.prior.matrix
-        return draw_towards(heard, share, statistics)
+        share = share * smooth_steps(spoken.astype(float))[:, :, None]
+        return draw_towards(self.prior.centre + articulators @ self.prior.matrix, share, statistics)
+
+    def slow_width(self, statistics: Predict, column: int) -> Predict:
+        """Smooth the width, in a column, and what goes with it, but where lips are round: people differ in it."""
+        along = self.prior.matrix[1] / self.prior.matrix[1, column]
+        sure = min(sum(self.prior.contexts.values()) / SURE_PHONES, 1)
+        traced = trace_articulators(self.units, self.frames)[:, 1:2]
+        share = count_unseen(self.voice) * sure * np.clip(1 + GAIN * traced, 0, 1)
+
+        def predict(chosen: slice) -> Statistics:
+            means, precisions = statistics(chosen)
+            change = share[chosen] * (smooth_steps(means[:, :, column]) - means[:, :, column])
+            return means + change[:, :, None] * along, precisions
+
+        return predict
 
     def confirm_closures(self, ranges: Sequence[slice], articulators: Array) -> list[slice]:
         """Return the ranges of p, b, m that are reliable, or that heard articulators confirm [shape=(T, 8)]."""
@@ -346,19 +348,22 @@ class UnseenSpeaker:
         return predict
 
     def open_before_speech(self, statistics: Predict) -> Predict:
-        """Open the mouth before speech begins.
+        """Open the mouth before speech begins, more and more; before p, b or m the lips close again.
 
-        All dimensions are drawn towards their median in speech. A model of few phones half knows its own speaker's
-        voice, too: the fewer it was trained on, the less changes.
+        All else is drawn towards its median in speech. A model of few phones half knows its own speaker's voice, too.
         Source: Scobbie, Schaeffler & Mennen 2011 (lips part and breath is taken before the first sound).
         """
-        first_s = next((span.start_s for span in self.units if not is_silent(span.label.phone)), 0.0)
-        time_s = np.arange(self.frames) / FRAME_RATE_HZ
-        before = ((time_s >= first_s - BREATH_S) & (time_s < first_s))[:, None].astype(float)
+        first = next((span for span in self.units if not is_silent(span.label.phone)), Span(0.0, 1.0, Unit(SILENCE)))
+        time_s = np.arange(self.frames) / FRAME_RATE_HZ - first.start_s
+        before = ((time_s >= -BREATH_S) & (time_s < 0))[:, None].astype(float)
+        wider = BREATH_RISE * np.clip(1 + time_s / BREATH_S, 0, 1)
+        if find_closable_ranges(Timeline((first,)), self.frames):
+            wider[time_s >= -LIP_CLOSING_S] = SHUT
+        pose = self.prior.centre + smooth_steps(wider[:, None]) * self.prior.matrix[[0, 2]].sum(axis=0)
         sure = min(sum(self.prior.contexts.values()) / SURE_PHONES, 1)
         strange = max(2 * np.sqrt(self.voice), 1.0) * count_unseen(self.voice) * sure
         share = strange * np.broadcast_to(self.reliability, self.frames)[:, None] * smooth_steps(before)
-        return draw_towards(np.tile(self.prior.centre, (self.frames, 1)), share[:, :, None], statistics)
+        return draw_towards(pose, share[:, :, None], statistics)
 
 
 def choose_closing_reach(voice: float) -> float:
@@ -378,6 +383,5 @@ def widen_range(prior: ArticulationPrior, space: MotionSpace, voice: float, reli
     if space.channels[space.direct[column]].unit != EYE_DISTANCE:
         return 1.0
     typical = TYPICAL_DEVIATIONS[row]
-    speaker_deviation = prior.matrix[row, column] ** 2 / typical
-    generated = speaker_deviation * float(np.interp(reliability, (0, 1), RETAINED))
+    generated = prior.matrix[row, column] ** 2 / typical * float(np.interp(reliability, (0, 1), RETAINED))
     return float(max(typical / generated, 1.0) ** (1 - voice))

@@ -85,14 +85,11 @@ class LearnedMotion:
         """Return the same with a modulation filter that is weaker, the less training knows the voice.
 
         voice : how well training knows it, 0 to 1; without a filter, or at 1, nothing changes
-        Where much of the motion is wrong, fast movement makes it worse: of width, first of all (docs/results/jerk.md).
+        Where much of the motion is wrong, fast movement makes it worse (docs/results/jerk.md).
         """
         if self.modulation is None or voice == 1:
             return self
-        strength = np.full(self.space.dimensions, 1 - articulation.count_unseen(voice))
-        if "width" in self.space.direct_names:
-            strength[self.space.direct_names.index("width")] **= 2
-        return replace(self, modulation=self.modulation.scale_to(strength))
+        return replace(self, modulation=self.modulation.scale_to(1 - articulation.count_unseen(voice)))
 
     def generate(  # noqa: PLR0913
         self,
@@ -136,6 +133,8 @@ class LearnedMotion:
                 if articulators is not None:
                     statistics = speaker.follow_sound(statistics, articulators)
                     ranges = speaker.confirm_closures(ranges, articulators)
+                if "width" in self.space.direct_names:
+                    statistics = speaker.slow_width(statistics, self.space.direct_names.index("width"))
                 gain = articulation.widen_range(self.prior, self.space, voice, float(np.mean(reliability)))
                 scaling = scaling._replace(factors=scaling.factors * gain)
         ranges = ranges if close else []

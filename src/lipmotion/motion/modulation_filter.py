@@ -36,8 +36,8 @@ class ModulationFilter(NamedTuple):
 
     taps: Array
 
-    def scale_to(self, strength: float | Array) -> ModulationFilter:
-        """Return a filter between none (0) and this one (1), or beyond it; a strength, or one of each dimension."""
+    def scale_to(self, strength: float) -> ModulationFilter:
+        """Return a filter between none (0) and this one (1), or beyond it."""
         none = np.zeros_like(self.taps)
         none[REACH] = 1
         return ModulationFilter(none + strength * (self.taps - none))

@@ -194,7 +194,6 @@ def check_scale(scale: NDArray[FloatT], name: str) -> NDArray[FloatT]:
     return scale
 
 
-WEIGHTS = "general-motion.npz"
 GENERAL_SHAPE = shape_convolutional("general", "general network", 64, 128, (1, 2, 4, 8))
 """From the 64 values of ``Speech.encoding``, 0.6 s before and after a frame."""
 ENCODING_SCALE = np.float32(4)  # what the encoding is multiplied by, so that its values are about 1
@@ -211,4 +210,4 @@ def hear_articulators(speech: Speech) -> NDArray[np.float64] | None:
 @cache
 def load_shipped() -> ConvolutionalNetwork:
     """Return the network of the package."""
-    return GENERAL_SHAPE.from_arrays(read_shipped_arrays(WEIGHTS), len(ARTICULATORS))
+    return GENERAL_SHAPE.from_arrays(read_shipped_arrays("general-motion.npz"), len(ARTICULATORS))
