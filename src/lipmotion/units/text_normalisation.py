@@ -11,7 +11,7 @@ from functools import cache
 from lipmotion.errors import AlignmentError, InputError, shorten
 from lipmotion.units.lexicon import SOUNDED, expand_lengthened, list_entries
 from lipmotion.units.spelling import ACCENTS, convert_to_plain, normalise_text
-from lipmotion.units.written_forms import FORMS, NUMERIC, WORD, list_readings
+from lipmotion.units.written_forms import FORMS, NUMERIC, PIECES, WORD, list_readings
 
 CHINESE = "[\u3400-\u4dbf\u4e00-\u9fff]"
 INITIALS = re.compile("[A-Z]{2,5}s?")  # what may be letters that are said one by one
@@ -24,6 +24,7 @@ RANGE = re.compile(
 COMMA = re.compile(r"(?<![\d.,])(\d+(?:\.\d{3})*),(\d\d?)(?=\s?(?:[€%°]|(?:km|kg|cm|mm|m|g|l|h)\b))")
 EUROS = re.compile(r"(?<=€)\s?(\d+(?:\.\d{3})*),(\d\d)(?!\d)")
 """Numbers with a decimal comma, where their unit says so: ``1,5 km``, ``€1.234,56``."""
+QUOTED = re.compile(r"""(?<!\w)(["'])(?=\S)([^"'\n]*\S)\1(?!\w)""")  # what is not quoted may be feet and inches
 CURRENCY = re.compile(r"(?<=\d) ?(?:USD|EUR|GBP)\b|\b(?:USD|EUR|GBP) ?(?=\d)")
 GROUPED = re.compile(
     r"(?<![\w.,])(?<!\d )[1-9](?:\d{0,2}(?:(?:'\d{3})+|(?:\.\d{3}){2,}|(?: \d{3})* 000)|\d?(?: \d{3}){2,})"
@@ -69,6 +70,7 @@ def tokenise(text: str) -> tuple[str, ...]:
     text = re.sub(r"\bWW(?=II?\b)", "World War ", re.sub("№ ?", "No. ", text))
     plain = re.sub(r"\b(?:[AC]|US|CA|AU|NZ|HK)(?=\$)", "", RANGE.sub("–", ACCENTS.sub("", convert_to_plain(text))))
     plain = re.sub(r"([$£€])-(?=\d)", r"-\1", plain)
+    plain = QUOTED.sub(r"\2 ", plain)
     for form in (COMMA, EUROS):
         plain = form.sub(lambda number: f"{number[1].replace('.', '')}.{number[2]}", plain)
     plain = CURRENCY.sub(lambda match: {"U": "$", "E": "€", "G": "£"}[match[0].strip()[0]], plain)
@@ -77,21 +79,26 @@ def tokenise(text: str) -> tuple[str, ...]:
     tokens = []
     for token in (match[0] for match in _scanner().finditer(plain)):
         is_word = token.isalpha() or ("'" in token and token.replace("'", "").isalpha())
-        is_short = not shouted and INITIALS.fullmatch(token) and not list_entries(token.lower())
-        is_short = is_short and not (expand_lengthened(token.lower()) or SOUNDED.fullmatch(token.lower()))
-        tokens.append(token.lower() if is_word and not is_short else token)
+        name = token.lower()
+        is_short = not shouted and INITIALS.fullmatch(token) is not None
+        if is_short and not re.fullmatch(PIECES["LETTERS"], token):
+            is_short = not (list_entries(name) or expand_lengthened(name) or SOUNDED.fullmatch(name))
+        tokens.append(name if is_word and not is_short else token)
     return tuple(tokens)
 
 
 @cache
 def _scanner() -> re.Pattern[str]:
-    word = rf"{WORD}(?=[,;!?]|\s+(?-i:[a-z])|\s*\Z)"  # most are words and no more; the rest takes a tenfold time
+    # most are words and no more (but "XIX century"); the rest takes a tenfold time
+    word = rf"(?!(?-i:[IVX]+) c){WORD}(?=[,;!?]|\s+(?-i:[a-z])|\s*\Z)"
     forms = [rf"(?:{form})(?:'s)?(?![^\W_])" for form, _ in FORMS[:-1]]  # initials are words
     numeric, worded = ("|".join(part) for part in (forms[: len(NUMERIC)], forms[len(NUMERIC) :]))
-    signs = r"(?<!\w)w/o?(?=[\s.,;!?]|\Z)|[&@×÷≥≤≠]|[+=](?![+=])(?<![+=]{2})|#(?=\w)|[~≈±](?=\d)"
+    signs = r"(?<!\w)w/o?(?=[\s.,;!?]|\Z)|[&@×÷≥≤≠§]|[+=](?![+=])(?<![+=]{2})|#(?=\w)|[~≈±](?=\d)"
+    signs += r"|(?<![\w<>-])[<>](?=[$£€]?\d)|(?<=\d )[<>](?= \d)"
+    rates = r"(?:(?<=\d)|(?<=[\d ][a-z%])|(?<=[\d ][a-z]{2})|(?<=[a-z]{3}s))" + rf"/{PIECES['PER']}\b"
     dashes = r"(?<![^\s(])-(?=[.$£€]?\d)|−(?=\d)|(?<=[mdht\d%.])–(?=[$£€]?\d)"
     begun = rf"(?<![^\W_])(?:{word}|(?=[^\W\d_])(?:{worded})|(?![\s,;!?])(?:{numeric}))"
-    grouped = "|".join([begun, signs, dashes, WORD, r"\d+(?:\.\d+)*"])
+    grouped = "|".join([begun, rates, signs, dashes, WORD, r"\d+(?:\.\d+)*"])
     return re.compile(re.sub(r"(?<!\\)\((?!\?)", "(?:", grouped), re.IGNORECASE)
 
 
