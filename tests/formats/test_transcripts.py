@@ -43,7 +43,7 @@ def expected(row: list[Any]) -> list[Any]:
 @pytest.mark.parametrize("name", [name for name, case in LABEL_CASES.items() if "error" not in case])
 def test_every_form_of_labels(write: Any, name: str) -> None:
     case = LABEL_CASES[name]
-    path = write(case["content"])
+    path = write(case["content"], case.get("file", "a.json"))
     assert holds_timings(path) or isinstance(case["content"], str)
     if "lines" in case:
         assert [list(line) for line in lines(timed(path))] == list(map(expected, case["lines"]))

@@ -220,12 +220,16 @@ def _read_captions(root: Element, where: str) -> LabelTier:
             return
         place = f"line {len(labels) + 1}"
         parts: list[TimedLabel] = []
+        spans = [child for child in element.iter() if child is not element and {"begin", "t"} & child.attrib.keys()]
+        ends_s = [_read_times(child, start_s, math.inf, per_s, where)[1] for child in spans]
+        late = any(end_s + NEAR_S < each < math.inf for each in ends_s)
+        origin_s = 0.0 if late else start_s  # Apple's spans are absolute
         glued = False
         for child in element.iter():
             child.text = f"\n{child.text or ''}" if child.tag == "br" else child.text
-            if child is element or not {"begin", "t"} & child.attrib.keys():
+            if child not in spans:
                 continue
-            text, times_s = "".join(child.itertext()), _read_times(child, start_s, end_s, per_s, where)
+            text, times_s = "".join(child.itertext()), _read_times(child, origin_s, end_s, per_s, where)
             if glued and not text[:1].isspace():  # no blank between spans: syllables of one word
                 text, times_s = parts[-1].text + text, (parts.pop().start_s, times_s[1])
             parts.append(TimedLabel(*times_s, text, place))

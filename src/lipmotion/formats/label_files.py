@@ -31,7 +31,7 @@ from lipmotion.formats.label_tiers import (
     split_speakers,
     with_words,
 )
-from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, parse_subtitles, write_subtitles
+from lipmotion.formats.subtitles import MARKS, convert_timecodes, is_subtitles, parse_subtitles, write_subtitles
 from lipmotion.formats.timed_lines import parse_line_tiers
 from lipmotion.printable import is_line
 from lipmotion.storage.sources import read_text_file
@@ -52,8 +52,11 @@ LARGEST_LABELS = 1 << 24  # most bytes of a label file: labels of a day
 MOTION = re.compile(r'"lipmotion\.motion"|time_s,')  # how our own motion files begin: a quick answer for large ones
 MASTER = re.compile(r'^(?:#!MLF!#|\.)[ \t\r]*\n"(.*)"[ \t\r]*$', re.MULTILINE)
 """The line before each recording's labels in HTK's master label files, and that with its name."""
-MARKUP = re.compile(r'\{\\rtf|<(?:[!?]|(?:html|head|body|div|table|tt|svg)\b)|\{\s*"|\[\s*[\[{]', re.IGNORECASE)
+MARKUP = re.compile(
+    r'\{\\rtf|<(?:[!?]|(?:html|head|body|div|table|tt|svg|smil|phonemes)\b)|\{\s*"|\[\s*[\[{]', re.IGNORECASE
+)
 """The start of RTF, HTML, XML and JSON; tags of SSML and of game engines may stand in a text."""
+CUES = re.compile(r"MohoSwitch1\b|lipsync version \d|VERSION 1\.0\s+PLAINTEXT")  # of Moho, Papagayo, Source
 CHAPTER = ".trans.txt"
 """Ends the name of the transcripts of a chapter in LibriSpeech: in each line the name of a recording, and its words."""
 METADATA = "metadata.csv"
@@ -272,7 +275,7 @@ def _read_tiers(text: str, where: str) -> list[LabelTier] | None:
             tiers: list[LabelTier] | None = parse_seconds(parse_interval_tiers(text, where), where)
         elif ROOT.match(text):
             tiers = read_xml_tiers(text, where)
-        elif is_subtitles(text):
+        elif is_subtitles(text := convert_timecodes(text, where)):
             tiers = [parse_subtitles(text, where)]
         else:
             tiers = parse_service_tiers(text, where) if is_json(text) else parse_line_tiers(text, where)
@@ -366,7 +369,7 @@ def read_plain_text(path: Path) -> str:
 
 def _check_no_labels(text: str, where: str) -> None:
     """Raise InputError for labels, subtitles and documents in forms that are not read."""
-    start, match = text[:200].lstrip(), NO_ARROW.search(text)
+    start, match = text[:200].lstrip(), MARKS["NO_ARROW"].search(text)
     line = shorten(match[0].strip()) if match else ""
     lines = numbered = timed_lines = with_two = 0
     header = re.search(r"^#$", text[:2000], re.MULTILINE)  # of ESPS
@@ -382,6 +385,7 @@ def _check_no_labels(text: str, where: str) -> None:
     forms = {
         "holds NUL characters: is it UTF-16 without its mark? save it as UTF-8 text": "\0" in text,
         "is closed captions in Scenarist's code (SCC); save them as .srt": start.startswith("Scenarist_SCC"),
+        "is a file of mouth cues, which are motion and no words; render it": CUES.match(start),
         "is a master label file, required the words alone": start.startswith("#!MLF!#"),
         f"begins with {shorten(start[:20])!r}, required the words alone; save it as text": MARKUP.match(start),
         "is a file of subtitles, required the words alone; write them into a text file": is_subtitles(text),

@@ -42,7 +42,7 @@ from lipmotion.types.values import parse_clock, parse_number, require
 from lipmotion.units import SILENCE
 from lipmotion.units.spelling import parse_table
 from lipmotion.units.spoken_text import check_word_count, extract_spoken_text
-from lipmotion.units.text_normalisation import find_words
+from lipmotion.units.text_normalisation import CHINESE, find_words
 
 LOG = logging.getLogger("lipmotion")
 _TEXT = values.text(1 << 20)
@@ -77,25 +77,13 @@ KNOWN_TIMES = tuple(
     Times(row["start"], row["end"], row["duration"], int(row["per_s"]), int(row["usual"]), row["kind"])
     for row in read_shipped_table("lipmotion.formats", "label_times.csv")
 )
-TEXTS = (
-    "punctuatedword word alignedword text content value transcript sentence display lexical markname token lines "
-    "displaytext segs alternatives nbest label phone phoneme symbol char"
-).split()
-"""The names of what is said, in order; of alternatives it is the first one."""
-ALTERNATIVES = ("alternatives", "nbest")
-WORD_LISTS = ("words", "items", "elements", "tokens", "timestamps", "timepoints", "timestampedwords")
-PHONE_LISTS, CHARACTER_LISTS = ("phones", "phonemes"), ("characters", "charsegments")
-LISTS = (
-    *WORD_LISTS,
-    *"segments transcription utterances monologues events chunks fragments channels recognizedphrases".split(),
-    *"sentences phrases paragraphs result results transcript alternatives nbest data response output".split(),
-)
-"""Members that hold words, phones, or lines of them, the best ones first; those of other names are read after them."""
+NAMES = {row["kind"]: row["names"].split() for row in read_shipped_table("lipmotion.formats", "label_names.csv")}
+"""Names of members, the best ones first: of what is said (of alternatives it is the first one), of lists of words,
+phones or characters, of lists that are read ahead of those of other names, of kinds and speakers, and of all that a
+recogniser says without times."""
 MISSED, OMITTED = "not-found-in-audio", "Omission"  # Gentle's case, and Azure's error, of a word that is not said
-KINDS = ("type", "boundarytype", "kind", "category")
 NOT_SAID = re.compile(r"punct|spac|audio.?event|sentence|ssml|pause|silence|non.?speech|blank|laugh|noise|session")
 """Kinds of items that are no words."""
-SPEAKERS = "speaker speakerid speakerlabel speakertag channellabel channeltag channel".split()
 PHONE_OF_VISEME: dict[str | int, str] = {
     **{"sil": SILENCE, "p": "p", "t": "t", "S": "sh", "T": "th", "f": "f", "k": "k", "i": "iy", "r": "r", "s": "s"},
     **{"l": "l", "u": "uw", "@": "ax", "a": "aa", "e": "ey", "E": "eh", "o": "ow", "O": "ao"},
@@ -117,9 +105,9 @@ SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
 PARTIAL = "AddPartialTranscript"  # Speechmatics' message
 UNFINISHED = {"isfinal": False, "final": False, "endofturn": False, "ispartial": True, "message": PARTIAL}
 """Members of what a service heard while somebody spoke, and says again when it is sure."""
-TEXT_ALONE = {*"text partial result language duration task usage logprobs alternatives confidence".split()}
-"""Members of what a recogniser says without times."""
 KNOWN_SHAPES = "segments, words, results, utterances, monologues, alignment, tiers, fragments, ..."
+TOKEN = re.compile(rf"{CHINESE}|[^\W_]+(?:['’][^\W_]+)*")
+"""FunASR's lists of start and end of each word or Chinese character, and what these are in its text."""
 DURATION = re.compile(r"PT(?:(\d+)H)?(?:(\d+)M)?(?:([\d.]+)S)?", re.IGNORECASE)  # ISO 8601
 DIGITS = re.compile(r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d{1,3})?)\s*(s|ms)?", re.IGNORECASE)
 
@@ -208,6 +196,7 @@ def _decode_documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
 
 def _parse_number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
     """Return a time, NaN: it is missing, and how many such are a second, where its form says that, else ``per_s``."""
+    value = value.get("relative", value) if isinstance(value, dict) else value
     if isinstance(value, dict) and value.keys() <= {"seconds", "nanos"}:  # 0 is left out
         seconds, nanos = (_parse_number(value.get(name, 0), where)[0] for name in ("seconds", "nanos"))
         return seconds + nanos / 1e9, 1
@@ -223,7 +212,7 @@ def _parse_number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
         value, per_s = match[1].replace(",", "."), {"s": 1, "ms": 1000}.get((match[2] or "").lower(), per_s)
     if value.strip().lower() in ("", "nan", "null", "none", "n/a", "-1", "-1.0"):
         return math.nan, per_s
-    return parse_number(value, f"{where}: a time is", "a number of seconds"), per_s
+    return parse_number(value, f"{where}: a time is", "a number of seconds from the start of the recording"), per_s
 
 
 def _parse_time(value: Any, where: str, per_s: float = 1) -> float:
@@ -238,9 +227,11 @@ def _parse_time(value: Any, where: str, per_s: float = 1) -> float:
 
 def _read_row(item: dict[str, Any], place: str, where: str, name: str, owner: Row | None, who: str) -> Row | None:
     """Return an item with its text and the times that it has; None: it has no text."""
-    text = next((text for name in TEXTS if name in item and (text := _find_text(item[name])) is not None), None)
-    is_phone = name in PHONE_LISTS or ({"phone", "phoneme"} & {*item} and "word" not in item)
-    role = PHONE_LABELS if is_phone else WORDS if "word" in item or name in WORD_LISTS else ""
+    text = next(
+        (text for name in NAMES["texts"] if name in item and (text := _find_text(item[name])) is not None), None
+    )
+    is_phone = name in NAMES["phones"] or ({"phone", "phoneme"} & {*item} and "word" not in item)
+    role = PHONE_LABELS if is_phone else WORDS if "word" in item or name in NAMES["words"] else ""
     if text is None and any(item.get(name) for name in ("text", "word")):
         stored = shorten(repr(item.get("text") or item.get("word"))[:200])
         raise InputError(f"{where}: {place}: its text is {stored}, required a text")
@@ -263,6 +254,10 @@ def _find_times(item: dict[str, Any], where: str) -> tuple[float, float, Times]:
     stamp, members = item.get("timestamp"), item
     if isinstance(stamp, list) and len(stamp) == 2:
         members = {**members, "timestampstart": stamp[0], "timestampend": stamp[1]}
+    if isinstance(stamp, int | float):
+        members = {**members, "stamp": stamp}
+    if isinstance(each := item.get("instances"), list) and each and isinstance(each[0], dict):  # Azure's of videos
+        members = {**members, **each[0]}
     for name in ("time", "offsets"):  # an object of both
         if isinstance(item.get(name), dict):
             members = {**members, **{f"{name}{edge}": time for edge, time in item[name].items()}, name: None}
@@ -288,7 +283,7 @@ def _find_text(value: Any) -> str | None:
             return "".join(str(part["utf8"]) for part in value)
         value = value[0]
     if isinstance(value, dict):
-        return next((_find_text(value[name]) for name in TEXTS if name in value), None)
+        return next((_find_text(value[name]) for name in NAMES["texts"] if name in value), None)
     return value if isinstance(value, str) else None
 
 
@@ -298,7 +293,7 @@ def _collect_rows(
     """Add the items with a text in a value, and in all its members, to those of the same lists; of alternatives one."""
     name = path[-1]
     if isinstance(value, list):
-        for number, each in enumerate(value[:1] if name in ALTERNATIVES else value, 1):
+        for number, each in enumerate(value[:1] if name in NAMES["alternatives"] else value, 1):
             item = _read_stamp(each) or each
             if isinstance(item, dict):
                 at = f"{place}, {name or 'item'} {number}".strip(", ")
@@ -308,7 +303,7 @@ def _collect_rows(
     if not isinstance(value, dict) or len(path) > DEEPEST or not _is_said(value):
         return
     value = _list_items(value, ": ".join(filter(None, (where, f"{place}, {name}".strip(", ")))))
-    names = (str(value[name]) for name in SPEAKERS if isinstance(value.get(name), str | int))
+    names = (str(value[name]) for name in NAMES["speakers"] if isinstance(value.get(name), str | int))
     who = next(filter(None, names), who)
     row = _read_row(value, place, where, name, owner, who)
     if name == "words" and row is None:
@@ -335,6 +330,14 @@ def _list_items(item: dict[str, Any], where: str) -> dict[str, Any]:
         check_count(len(lists[0]), where)
         items = [dict(zip(members.values(), row, strict=True)) for row in zip(*lists, strict=True)]
         return {**{key: each for key, each in item.items() if key not in members}, name: items}
+    stamps: list[Any] = next((item[name] for name in NAMES["stamps"] if isinstance(item.get(name), list)), [])
+    if stamps and all(isinstance(stamp, list) and len(stamp) == 2 for stamp in stamps):
+        text, words = str(item.get("text") or item.get("textseg")), item.get("words")
+        words = words if isinstance(words, list) else TOKEN.findall(text)
+        if len(words) != len(stamps):
+            raise InputError(f"{where}: {len(stamps)} times of {len(words)} words; required a time of each")
+        items = [{"word": word, "start": start, "end": end} for word, (start, end) in zip(words, stamps, strict=True)]
+        return {**{name: each for name, each in item.items() if name not in NAMES["stamps"]}, "words": items}
     if isinstance(item.get("phonemealignments"), list):
         rate = require(values.number(1000, 1e6), item.get("samplerate"), f"{where}: the sample rate in hertz")
         phonemes = [each if isinstance(each, dict) else {} for each in item["phonemealignments"]]
@@ -365,7 +368,7 @@ def _join_characters(rows: list[Row]) -> list[Row]:
 
 def _is_said(item: dict[str, Any]) -> bool:
     """Return whether an item may hold speech: it is of such a kind, it is sure, and it is in the sound."""
-    kinds = () if "chunks" in item else (str(item.get(kind, "")).lower() for kind in KINDS)
+    kinds = () if {"chunks", "timeline"} & item.keys() else (str(item.get(kind, "")).lower() for kind in NAMES["kinds"])
     assessed = item.get("pronunciationassessment")
     missed = item.get("case") == MISSED or (isinstance(assessed, dict) and assessed.get("errortype") == OMITTED)
     is_sound = bool({"alignment", "normalizedalignment"} & item.keys())  # that is spoken, not heard
@@ -394,10 +397,10 @@ def _choose_rows(found: Found, *, phones: bool) -> list[Row]:
 
     def rank(path: Path) -> tuple[bool, int]:
         has_words = any(row.role == WORDS for row in kept[path])
-        return not has_words, LISTS.index(path[-1]) if path[-1] in LISTS else len(LISTS)
+        return not has_words, NAMES["lists"].index(path[-1]) if path[-1] in NAMES["lists"] else len(NAMES["lists"])
 
     kept = {path: rows for (path, kind), rows in found.items() if kind == phones}
-    kept |= {path: _join_characters(rows) for path, rows in kept.items() if path[-1] in CHARACTER_LISTS}
+    kept |= {path: _join_characters(rows) for path, rows in kept.items() if path[-1] in NAMES["characters"]}
     timed = [path for path in kept if any(row.times.end or not math.isnan(row.start) for row in kept[path])]
     rows = kept[min(timed, key=rank)] if timed else []
     parts: dict[int, list[Row]] = defaultdict(list)
@@ -433,8 +436,8 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
         LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
     spoken, phones = (_choose_rows(found, phones=kind) for kind in (False, True))
     if not (spoken or phones):
-        if not (any(found.values()) and all(item.keys() <= TEXT_ALONE for _, item in objects)):
-            lists = [item[name] for _, item in objects for name in LISTS if name in item]
+        if not (any(found.values()) and all(item.keys() <= {*NAMES["text_alone"]} for _, item in objects)):
+            lists = [item[name] for _, item in objects for name in NAMES["lists"] if name in item]
             return [] if lists and not any(lists) else None
         spoken = next(filter(None, found.values()))
     phones = _extend_to_next(phones, [])

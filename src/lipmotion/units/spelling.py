@@ -16,7 +16,19 @@ def parse_table(rows: str) -> dict[str, str]:
 
 def read_table(name: str) -> dict[str, str]:
     """Return a table of the package (``tables/NAME.tsv``): a key, a tab and a value a line; ``# `` begins a comment."""
-    text = Path(__file__).with_name("tables").joinpath(f"{name}.tsv").read_text(encoding="utf-8")
+    return _read_rows(Path(__file__).with_name("tables") / f"{name}.tsv")
+
+
+def read_patterns(path: Path) -> dict[str, re.Pattern[str]]:
+    """Return the regular expressions of a table as of ``read_table``; ``<NAME>`` in one is that of a row before."""
+    patterns: dict[str, str] = {}
+    for name, form in _read_rows(path).items():
+        patterns[name] = re.sub("<([A-Z_]{3,})>", lambda piece: patterns[piece[1]], form)
+    return {name: re.compile(pattern) for name, pattern in patterns.items()}
+
+
+def _read_rows(path: Path) -> dict[str, str]:
+    text = path.read_text(encoding="utf-8")
     rows = (line.partition("\t") for line in text.splitlines() if not line.startswith("# "))
     return {key: value for key, _, value in rows}
 
@@ -34,7 +46,7 @@ MAX_MARKS = 30  # largest number of accents on one letter; no language has so ma
 APOSTROPHES = re.compile("[’‘ʼʻ′´`‛ʹ＇]")
 UNSPOKEN = re.compile("\u00ad\\s*\n\\s*|[™®©]")
 """A soft hyphen at the end of a line, and signs that Unicode's NFKC makes letters of."""
-DASHES = str.maketrans({"‐": "-", "‒": "-", "²": " squared", "³": " cubed", "″": '"'})
+DASHES = str.maketrans({"‐": "-", "‒": "-", "²": " squared", "³": " cubed", "∞": " infinity ", "√": " root ", "″": '"'})
 POWERS = re.compile("(?<=\\d)[⁰¹²³⁴-⁹]+")
 NOTES = re.compile("(?:(?<=[^\\W\\d_]{4})|(?<=[.,;:!?”’)]))[¹²³⁴-⁹][⁰¹²³⁴-⁹]*")
 """What is raised: powers (``10⁵``), and the numbers of notes, which are not said."""

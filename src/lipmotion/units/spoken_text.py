@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from enum import Enum
 from itertools import pairwise
+from pathlib import Path
 from typing import NamedTuple
 
 from lipmotion.errors import InputError, shorten
@@ -19,19 +20,14 @@ from lipmotion.types import TimedWord, Timeline, Unit
 from lipmotion.types.delivery import MANNERS, MOODS, NEUTRAL, PLAIN, MoodKey, MoodTag, sort_moods
 from lipmotion.types.values import parse_clock
 from lipmotion.units.phone_timelines import group_words
-from lipmotion.units.spelling import read_table
+from lipmotion.units.spelling import read_patterns, read_table
 from lipmotion.units.text_normalisation import find_words, tokenise
 from lipmotion.units.written_forms import list_readings
 
-_PATTERNS: dict[str, str] = {}
-for _name, _form in read_table("spoken_forms").items():
-    _PATTERNS[_name] = re.sub("<([A-Z]{4,})>", lambda piece: _PATTERNS[piece[1]], _form)
-MARKS = {name: re.compile(pattern) for name, pattern in _PATTERNS.items()}
+MARKS = read_patterns(Path(__file__).with_name("tables") / "spoken_forms.tsv")
 """Patterns of what stands in texts and labels and is not spoken, by their names in the table."""
-NO_TAGS = frozenset("i he she we they you it and then but so or said says".split())
-"""Words that begin a sentence with quotes in it."""
-NO_NAMES = frozenset("note notes warning question answer step tip remember ps p.s example".split())
-SPEAKER_NAME_LINES = 3  # a name that begins this many lines is that of a speaker
+WORDS = {name: frozenset(words.split()) for name, words in read_table("spoken_words").items()}
+"""Words by what they are in texts and labels: of silence, of speech that is not known, no names, ..."""
 LONGEST_LINE = 1 << 18  # maximum characters of a line: a label may hold four hours of speech
 MAX_WORDS = 500_000  # maximum words of a transcript: twelve hours of the fastest speech on record
 
@@ -44,11 +40,7 @@ class SpokenAs(Enum):
     UNKNOWN = "unknown"
 
 
-SILENCES = frozenset(["", *"sil sp pau ssil nsn h# #h # ## _ - silence = vocnoise iver".split()])
-"""Labels of silence, pauses and noise that is not speech; so is anything in brackets that is not of speech."""
 LAUGHTER = "LAU"  # in capitals, as in lexicons of telephone speech; ``Lau`` is a name
-UNKNOWN_WORDS = frozenset("spn unk oov xxx yyy usb".split())
-"""Labels of speech of which nobody knows the words, also in brackets: of aligners, of CHAT, of WebMAUS (``<usb>``)."""
 
 
 def classify_label(label: str) -> SpokenAs:
@@ -60,9 +52,9 @@ def classify_label(label: str) -> SpokenAs:
     name = "sil" if label.strip() == LAUGHTER else label.strip().lower()
     bracketed = MARKS["IN_BRACKETS"].fullmatch(name) is not None
     inner = name.strip("<>[](){}+&=* ") if bracketed else name
-    if inner in UNKNOWN_WORDS or (bracketed and MARKS["UNKNOWN_SPEECH"].search(inner)):
+    if inner in WORDS["unknown"] or (bracketed and MARKS["UNKNOWN_SPEECH"].search(inner)):
         return SpokenAs.UNKNOWN
-    return SpokenAs.SILENCE if bracketed or name in SILENCES else SpokenAs.SPEECH
+    return SpokenAs.SILENCE if bracketed or name in WORDS["silences"] or not name else SpokenAs.SPEECH
 
 
 def extract_spoken_text(text: str, names: frozenset[str] = frozenset()) -> str:
@@ -88,11 +80,16 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
     def leave_out_name(match: re.Match[str]) -> str:
         name = match[1] or match[2]
         in_capitals = name == name.upper() != name.lower()
-        is_bold = match[0].lstrip()[:2] in ("**", "__") and name.lower() not in NO_NAMES
+        is_bold = match[0].lstrip()[:2] in ("**", "__") and name.lower() not in WORDS["no_names"]
         has_remark = match[1] or (name[0].isupper() and (match[3] or is_bold))
-        numbered = re.fullmatch(r"[Ss]peaker[ _]?\w{1,3}", name)
+        numbered = MARKS["NUMBERED"].fullmatch(name)
         return leave_out(match) if in_capitals or has_remark or numbered or name in speakers else match[0]
 
+    if text.lstrip("\ufeff").startswith("@"):
+        text = MARKS["CHAT"].sub(leave_out, text)
+    text = MARKS["CODE"].sub(leave_out, text)
+    if len(MARKS["RECORDING"].findall(text)) == sum(map(bool, text.split("\n"))):
+        text = MARKS["RECORDING"].sub(leave_out, text)
     dated = list(MARKS["DATED"].finditer(text))
     if len(dated) > 1 or any(each[1] or "T" in each[0] for each in dated):
         text = MARKS["DATED"].sub(leave_out, text)
@@ -116,18 +113,19 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
     text = MARKS["SPEAKER"].sub(leave_out_name, text)
     lines = [MARKS["SCRIPT"].fullmatch(line) for line in text.splitlines() if line.strip()]
     tags = [line[1] for line in lines if line and line[1]]
-    if tags and all(lines) and not NO_TAGS & {*tags} and (len(lines) > 1 or not (lines[0] and lines[0][2])):
+    if tags and all(lines) and not WORDS["no_tags"] & {*tags} and (len(lines) > 1 or not (lines[0] and lines[0][2])):
         text = re.sub(r'^[^"\n]+(?=")', leave_out, text, flags=re.MULTILINE)
     return text, [name for name in left_out if name]
 
 
 def find_speaker_names(texts: Iterable[str]) -> frozenset[str]:
-    """Return the names before a colon at the start of several lines, or of every one of two lines and more."""
+    """Return the names before a colon at the start of three lines, one twice, or of each of two lines and more."""
     lines = [line for text in texts for line in text.splitlines() if line.strip()]
     matched = [match[2] for match in map(MARKS["SPEAKER"].match, lines) if match and match[2] and match[2].istitle()]
-    names = {name: count for name, count in Counter(matched).items() if name.lower() not in NO_NAMES}
+    names = {name: count for name, count in Counter(matched).items() if name.lower() not in WORDS["no_names"]}
     in_all = len(matched) == len(lines) > 1
-    return frozenset(name for name, count in names.items() if in_all or count >= SPEAKER_NAME_LINES)
+    speak = in_all or (max(names.values(), default=0) > 1 and sum(names.values()) > 2)
+    return frozenset(names if speak else ())
 
 
 def read_line_words(text: str, where: str) -> tuple[str, ...]:
@@ -160,8 +158,6 @@ def check_word_count(count: int, where: str) -> None:
 
 
 LOG = logging.getLogger("lipmotion")
-INSIDE_WORDS = frozenset("a b i u s em strong mark sub sup font span color colour size wave shake".split())
-"""Tags of style, which may stand inside a word."""
 _NAME = re.compile(r"([a-z][a-z '-]*?)\s*(?::\s*(\d*\.?\d+))?")
 SYNONYMS: dict[str, tuple[str, float]] = {
     word: (mood, float(strength))
@@ -199,7 +195,7 @@ MoodTag(share=0.4, mood='happy', strength=0.6), MoodTag(share=0.6, mood='neutral
         if tag["did"] and meaning is None and not MARKS["DEED"].fullmatch(tag[0]):
             continue
         name = re.split(r"[\W_]", tag[2] or "", maxsplit=1)[0]
-        spoken += text[last : tag.start()] + " " * (meaning is not None or name.lower() not in INSIDE_WORDS)
+        spoken += text[last : tag.start()] + " " * (meaning is not None or name.lower() not in WORDS["inside_words"])
         last = tag.end()
         if meaning is None:
             unknown.append(tag[0])

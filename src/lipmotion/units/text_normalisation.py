@@ -17,7 +17,7 @@ CHINESE = "[\u3400-\u4dbf\u4e00-\u9fff]"
 INITIALS = re.compile("[A-Z]{2,5}s?")  # what may be letters that are said one by one
 RANGE = re.compile(
     r"(?:(?<=\d[ap]m)|(?<=\d [ap]m)|(?<=\d [ap]\.m\.)|(?<=:\d\d)|(?<=\d%)|(?<=\d(?:st|nd|rd|th)))\s?[-–]\s?(?=\d)"
-    r"|(?<=\d)-(?=\d{1,2}\s?[ap]m\b)|(?<=\d)(?:-|\s?–\s?)(?=[$£€]\d)",
+    r"|(?<=\d)-(?=\d{1,2}\s?[ap]m\b)|(?:(?<=\d)|(?<=\d[kmb]))(?:-|\s?–\s?)(?=[$£€]\d)",
     re.IGNORECASE,
 )
 """The dash of ``9am-5pm``, ``5:00-6:30``, ``5%-10%``, ``$5-$10`` and ``1st-3rd``."""
@@ -25,7 +25,7 @@ COMMA = re.compile(r"(?<![\d.,])(\d+(?:\.\d{3})*),(\d\d?)(?=\s?(?:[€%°]|(?:km
 EUROS = re.compile(r"(?<=€)\s?(\d+(?:\.\d{3})*),(\d\d)(?!\d)")
 """Numbers with a decimal comma, where their unit says so: ``1,5 km``, ``€1.234,56``."""
 QUOTED = re.compile(r"""(?<!\w)(["'])(?=\S)([^"'\n]*\S)\1(?!\w)""")  # what is not quoted may be feet and inches
-CURRENCY = re.compile(r"(?<=\d) ?(?:USD|EUR|GBP)\b|\b(?:USD|EUR|GBP) ?(?=\d)")
+CURRENCY = re.compile(r"(?<=\d) ?(?:USD|EUR|GBP|INR|JPY)\b|\b(?:USD|EUR|GBP|INR|JPY|Rs\.?) ?(?=\d)")
 GROUPED = re.compile(
     r"(?<![\w.,])(?<!\d )[1-9](?:\d{0,2}(?:(?:'\d{3})+|(?:\.\d{3}){2,}|(?: \d{3})* 000)|\d?(?: \d{3}){2,})"
     r"(?![\d']| \d|\.\d)"
@@ -68,12 +68,14 @@ def tokenise(text: str) -> tuple[str, ...]:
     """
     text = SMILEY.sub(" ", REFERENCE.sub(lambda match: html.unescape(match[0]), text))
     text = re.sub(r"\bWW(?=II?\b)", "World War ", re.sub("№ ?", "No. ", text))
-    plain = re.sub(r"\b(?:[AC]|US|CA|AU|NZ|HK)(?=\$)", "", RANGE.sub("–", ACCENTS.sub("", convert_to_plain(text))))
+    plain = re.sub(
+        r"\b(?:[ACS]|US|CA|AU|NZ|HK|NT|SG|MX)(?=\$)", "", RANGE.sub("–", ACCENTS.sub("", convert_to_plain(text)))
+    )
     plain = re.sub(r"([$£€])-(?=\d)", r"-\1", plain)
     plain = QUOTED.sub(r"\2 ", plain)
     for form in (COMMA, EUROS):
         plain = form.sub(lambda number: f"{number[1].replace('.', '')}.{number[2]}", plain)
-    plain = CURRENCY.sub(lambda match: {"U": "$", "E": "€", "G": "£"}[match[0].strip()[0]], plain)
+    plain = CURRENCY.sub(lambda match: dict(zip("UEGIRJ", "$€£₹₹¥", strict=True))[match[0].strip()[0]], plain)
     plain = GROUPED.sub(lambda match: re.sub(r"\D", ",", match[0]), plain)
     shouted = not any(letter.islower() for letter in plain)
     tokens = []
