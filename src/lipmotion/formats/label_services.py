@@ -78,9 +78,7 @@ KNOWN_TIMES = tuple(
     for row in read_shipped_table("lipmotion.formats", "label_times.csv")
 )
 NAMES = {row["kind"]: row["names"].split() for row in read_shipped_table("lipmotion.formats", "label_names.csv")}
-"""Names of members, the best ones first: of what is said (of alternatives it is the first one), of lists of words,
-phones or characters, of lists that are read ahead of those of other names, of kinds and speakers, and of all that a
-recogniser says without times."""
+"""Names of members by what they hold, the best ones first."""
 MISSED, OMITTED = "not-found-in-audio", "Omission"  # Gentle's case, and Azure's error, of a word that is not said
 NOT_SAID = re.compile(r"punct|spac|audio.?event|sentence|ssml|pause|silence|non.?speech|blank|laugh|noise|session")
 """Kinds of items that are no words."""
@@ -94,7 +92,6 @@ PHONE_OF_VISEME: dict[str | int, str] = {
 Azure by its number."""
 KOKORO_LETTERS = {"A": "eɪ", "I": "aɪ", "W": "aʊ", "Y": "ɔɪ", "O": "oʊ", "Q": "əʊ", "ᵊ": "ə", "T": "ɾ"}
 KOKORO_FRAMES_PER_S = 40  # durations are in frames of 600 samples at 24 kHz
-POLLY_KINDS = ("sentence", "word", "viseme", "ssml")
 MARK = re.compile(r"[^\W\d_]+(?:['’-][^\W\d_]+)*[.,;:!?]?")  # a name of one of Google's marks that is the word after it
 PARALLEL_LISTS = tuple(
     (row["items"], parse_table(row["members"])) for row in read_shipped_table("lipmotion.formats", "label_lists.csv")
@@ -102,8 +99,13 @@ PARALLEL_LISTS = tuple(
 """Parallel lists: the list of items that they become, and the member that each is of them."""
 SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
 """A word of characters, or a direction in brackets (``[whispers]``), which is not said."""
-PARTIAL = "AddPartialTranscript"  # Speechmatics' message
-UNFINISHED = {"isfinal": False, "final": False, "endofturn": False, "ispartial": True, "message": PARTIAL}
+UNFINISHED = {
+    "isfinal": False,
+    "final": False,
+    "endofturn": False,
+    "ispartial": True,
+    "message": "AddPartialTranscript",
+}
 """Members of what a service heard while somebody spoke, and says again when it is sure."""
 KNOWN_SHAPES = "segments, words, results, utterances, monologues, alignment, tiers, fragments, ..."
 TOKEN = re.compile(rf"{CHINESE}|[^\W_]+(?:['’][^\W_]+)*")
@@ -262,7 +264,7 @@ def _find_times(item: dict[str, Any], where: str) -> tuple[float, float, Times]:
         if isinstance(item.get(name), dict):
             members = {**members, **{f"{name}{edge}": time for edge, time in item[name].items()}, name: None}
     times = next((row for row in KNOWN_TIMES if (row.start or row.end) in members), UNTIMED)
-    if item.get("type") in POLLY_KINDS and not {"offsetsfrom", "timestampstart"} & members.keys():
+    if item.get("type") in NAMES["polly"] and not {"offsetsfrom", "timestampstart"} & members.keys():
         is_speechify = {"start", "starttime"} <= members.keys()
         times = POLLY if members.get("time") is not None else SPEECHIFY if is_speechify else times
     start, per_s = _parse_number(members.get(times.start), where, times.per_s)

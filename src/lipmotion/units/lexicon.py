@@ -294,6 +294,10 @@ def detect_language(words: Sequence[str]) -> str:
     (first, highest), (_, second) = counts.most_common(2)
     if highest >= max(MIN_COMMON, AHEAD * second):
         return first
+    if highest > counts[ENGLISH]:  # a few words: better none than a wrong one
+        return first if 1 < highest > second else ""
+    if not counts[ENGLISH] and 2 * sum(word != remove_accents(word) for word in words) >= len(words):
+        return ""
     return ENGLISH if sum(map(Lexicon().known, words)) >= MIN_KNOWN * len(words) else ""
 
 
