@@ -18,6 +18,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import accumulate
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from lipmotion.errors import InputError, shorten
@@ -40,9 +41,9 @@ from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import values
 from lipmotion.types.values import parse_clock, parse_number, require
 from lipmotion.units import SILENCE
-from lipmotion.units.spelling import parse_table
+from lipmotion.units.spelling import parse_table, read_patterns
 from lipmotion.units.spoken_text import check_word_count, extract_spoken_text
-from lipmotion.units.text_normalisation import CHINESE, find_words
+from lipmotion.units.text_normalisation import find_words
 
 LOG = logging.getLogger("lipmotion")
 _TEXT = values.text(1 << 20)
@@ -80,8 +81,8 @@ KNOWN_TIMES = tuple(
 NAMES = {row["kind"]: row["names"].split() for row in read_shipped_table("lipmotion.formats", "label_names.csv")}
 """Names of members by what they hold, the best ones first."""
 MISSED, OMITTED = "not-found-in-audio", "Omission"  # Gentle's case, and Azure's error, of a word that is not said
-NOT_SAID = re.compile(r"punct|spac|audio.?event|sentence|ssml|pause|silence|non.?speech|blank|laugh|noise|session")
-"""Kinds of items that are no words."""
+MARKS = read_patterns(Path(__file__).with_name("label_services.tsv"))
+"""Patterns of what services write, by their names in the table."""
 PHONE_OF_VISEME: dict[str | int, str] = {
     **{"sil": SILENCE, "p": "p", "t": "t", "S": "sh", "T": "th", "f": "f", "k": "k", "i": "iy", "r": "r", "s": "s"},
     **{"l": "l", "u": "uw", "@": "ax", "a": "aa", "e": "ey", "E": "eh", "o": "ow", "O": "ao"},
@@ -92,13 +93,10 @@ PHONE_OF_VISEME: dict[str | int, str] = {
 Azure by its number."""
 KOKORO_LETTERS = {"A": "eɪ", "I": "aɪ", "W": "aʊ", "Y": "ɔɪ", "O": "oʊ", "Q": "əʊ", "ᵊ": "ə", "T": "ɾ"}
 KOKORO_FRAMES_PER_S = 40  # durations are in frames of 600 samples at 24 kHz
-MARK = re.compile(r"[^\W\d_]+(?:['’-][^\W\d_]+)*[.,;:!?]?")  # a name of one of Google's marks that is the word after it
 PARALLEL_LISTS = tuple(
     (row["items"], parse_table(row["members"])) for row in read_shipped_table("lipmotion.formats", "label_lists.csv")
 )
 """Parallel lists: the list of items that they become, and the member that each is of them."""
-SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
-"""A word of characters, or a direction in brackets (``[whispers]``), which is not said."""
 UNFINISHED = {
     "isfinal": False,
     "final": False,
@@ -108,10 +106,6 @@ UNFINISHED = {
 }
 """Members of what a service heard while somebody spoke, and says again when it is sure."""
 KNOWN_SHAPES = "segments, words, results, utterances, monologues, alignment, tiers, fragments, ..."
-TOKEN = re.compile(rf"{CHINESE}|[^\W_]+(?:['’][^\W_]+)*")
-"""FunASR's lists of start and end of each word or Chinese character, and what these are in its text."""
-DURATION = re.compile(r"PT(?:(\d+)H)?(?:(\d+)M)?(?:([\d.]+)S)?", re.IGNORECASE)  # ISO 8601
-DIGITS = re.compile(r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d{1,3})?)\s*(s|ms)?", re.IGNORECASE)
 
 
 class DamagedJsonError(InputError):
@@ -134,8 +128,8 @@ class Row:
     owner: Row | None = None
 
 
-Path = tuple[str, ...]
-Found = dict[tuple[Path, bool], list[Row]]
+Place = tuple[str, ...]
+Found = dict[tuple[Place, bool], list[Row]]
 """Items by the names of the members that lead to their list, and whether they are phones."""
 
 
@@ -205,9 +199,9 @@ def _parse_number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
     if not isinstance(value, str):
         missing = value in (None, -1)  # some services write -1 where they have none
         return math.nan if missing else require(values.number(), value, f"{where}: a time"), per_s
-    if parts := DURATION.fullmatch(value):
+    if parts := MARKS["DURATION"].fullmatch(value):
         return sum(float(part or 0) * unit_s for part, unit_s in zip(parts.groups(), (3600, 60, 1), strict=True)), 1
-    match, clock_s = DIGITS.fullmatch(value.strip()), parse_clock(value)
+    match, clock_s = MARKS["DIGITS"].fullmatch(value.strip()), parse_clock(value)
     if match is None and not math.isnan(clock_s):
         return clock_s, 1
     if match is not None:
@@ -240,7 +234,7 @@ def _read_row(item: dict[str, Any], place: str, where: str, name: str, owner: Ro
     if "visemeid" in item or item.get("type") == "viseme":
         viseme, role = item.get("visemeid", item.get("value")), PHONE_LABELS
         text = PHONE_OF_VISEME[require(values.one_of(PHONE_OF_VISEME), viseme, f"{where}: {place}: the viseme")]
-    if text is not None and "markname" in item and not MARK.fullmatch(text):
+    if text is not None and "markname" in item and not MARKS["MARK"].fullmatch(text):
         raise InputError(
             f"{where}: {place} is the mark {shorten(text)!r}, which is no word; name every mark as the word that "
             'follows it, <mark name="hello"/>hello, or give the words as a transcript'
@@ -290,7 +284,7 @@ def _find_text(value: Any) -> str | None:
 
 
 def _collect_rows(
-    value: Any, found: Found, where: str, place: str = "", path: Path = ("",), owner: Row | None = None, who: str = ""
+    value: Any, found: Found, where: str, place: str = "", path: Place = ("",), owner: Row | None = None, who: str = ""
 ) -> None:
     """Add the items with a text in a value, and in all its members, to those of the same lists; of alternatives one."""
     name = path[-1]
@@ -335,7 +329,7 @@ def _list_items(item: dict[str, Any], where: str) -> dict[str, Any]:
     stamps: list[Any] = next((item[name] for name in NAMES["stamps"] if isinstance(item.get(name), list)), [])
     if stamps and all(isinstance(stamp, list) and len(stamp) == 2 for stamp in stamps):
         text, words = str(item.get("text") or item.get("textseg")), item.get("words")
-        words = words if isinstance(words, list) else TOKEN.findall(text)
+        words = words if isinstance(words, list) else MARKS["TOKEN"].findall(text)
         if len(words) != len(stamps):
             raise InputError(f"{where}: {len(stamps)} times of {len(words)} words; required a time of each")
         items = [{"word": word, "start": start, "end": end} for word, (start, end) in zip(words, stamps, strict=True)]
@@ -363,7 +357,7 @@ def _join_characters(rows: list[Row]) -> list[Row]:
     starts = [*(row.start for row in rows[1:]), math.inf]
     lasting = [replace(row, end=after) if math.isnan(row.end) else row for row, after in zip(rows, starts, strict=True)]
     owner_of = [row for row in lasting for _ in row.text]
-    found = SPOKEN_WORD.finditer("".join(row.text for row in rows).replace("▁", " "))
+    found = MARKS["SPOKEN_WORD"].finditer("".join(row.text for row in rows).replace("▁", " "))
     edges = ((match[0], owner_of[match.start()], owner_of[match.end() - 1]) for match in found)
     return [replace(first, end=last.end, text=text, role=WORDS) for text, first, last in edges]
 
@@ -375,7 +369,7 @@ def _is_said(item: dict[str, Any]) -> bool:
     missed = item.get("case") == MISSED or (isinstance(assessed, dict) and assessed.get("errortype") == OMITTED)
     is_sound = bool({"alignment", "normalizedalignment"} & item.keys())  # that is spoken, not heard
     unsure = not is_sound and any(item.get(name) == state for name, state in UNFINISHED.items())
-    return not (missed or unsure or any(map(NOT_SAID.search, kinds)))
+    return not (missed or unsure or any(map(MARKS["NOT_SAID"].search, kinds)))
 
 
 def _add_row(rows: list[Row], row: Row, item: dict[str, Any], where: str) -> None:
@@ -397,7 +391,7 @@ def _add_row(rows: list[Row], row: Row, item: dict[str, Any], where: str) -> Non
 def _choose_rows(found: Found, *, phones: bool) -> list[Row]:
     """Return the words, or else the lines, or the phones, of the lists that are known best; words in their lines."""
 
-    def rank(path: Path) -> tuple[bool, int]:
+    def rank(path: Place) -> tuple[bool, int]:
         has_words = any(row.role == WORDS for row in kept[path])
         return not has_words, NAMES["lists"].index(path[-1]) if path[-1] in NAMES["lists"] else len(NAMES["lists"])
 

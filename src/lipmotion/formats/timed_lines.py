@@ -36,14 +36,8 @@ MARKS = read_patterns(Path(__file__).with_name("timed_lines.tsv"))
 COMMENT = (";;", "#")
 COLUMNS = {row["column"]: {*row["names"].split()} for row in read_shipped_table(__package__, "label_columns.csv")}
 """Names of columns of tables: of the Montreal Forced Aligner, of Praat, of people."""
-ELAN_TIME = r"(?:\t[\d:]+[.,]\d+)"
-HEADLESS = (
-    (re.compile(rf"[^\t]+\t[^\t]*{ELAN_TIME}{{3}}\t[^\t]*"), "tier\tparticipant\tstart\tend\tduration\ttext"),
-    (re.compile(rf"[^\t]+\t[^\t]*{ELAN_TIME}{{6}}\t[^\t]*"), "tier\tparticipant\t\tstart\t\tend\t\tduration\ttext"),
-    (re.compile(r"[^,]*,\d*\.\d+,\d*\.\d+,.*"), "name,start,end,text"),
-    (re.compile(r"\d*\.\d+,\d*\.\d+,.*"), "start,end,text"),
-)
-"""The first line of tables without a header, and theirs: of ELAN, of aeneas, of people."""
+HEADLESS = {name.replace(" ", "\t"): form for name, form in MARKS.items() if "start" in name}
+"""The first line of tables without a header, by theirs: of ELAN, of aeneas, of people."""
 TIMIT_HZ, TIMIT_SUFFIXES, TIMIT_SILENCE = 16_000, (".phn", ".wrd"), "h#"
 LONGEST_SAMPLES, LAST_SAMPLE = 50_000, 1e7
 """Most samples that the middle label, and those that a whole file, lasts: more are ticks."""
@@ -69,7 +63,7 @@ def parse_line_tiers(text: str, where: str) -> list[LabelTier] | None:
         raise InputError(f"{where}: is RTTM, which says who speaks and no words; give a transcript or labels")
     if MARKS["SECONDS"].fullmatch(first):
         return parse_seconds(_read_form(lines, MARKS["SECONDS"], where), where)
-    header = next((header for form, header in HEADLESS if form.fullmatch(first)), "")
+    header = next((header for header, form in HEADLESS.items() if form.fullmatch(first)), "")
     if columns := _find_columns(header or first):
         return _read_table(lines, columns, where, header)
     if MARKS["LRS_TEXT"].match(text):
