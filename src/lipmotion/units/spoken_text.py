@@ -80,7 +80,7 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
     def leave_out_name(match: re.Match[str]) -> str:
         name = match[1] or match[2]
         in_capitals = name == name.upper() != name.lower()
-        is_bold = match[0].lstrip()[:2] in ("**", "__") and name.lower() not in WORDS["no_names"]
+        is_bold = match[0].endswith(("**", "__")) and name.lower() not in WORDS["no_names"]  # the colon, too
         has_remark = match[1] or (name[0].isupper() and (match[3] or is_bold))
         numbered = MARKS["NUMBERED"].fullmatch(name)
         return leave_out(match) if in_capitals or has_remark or numbered or name in speakers else match[0]

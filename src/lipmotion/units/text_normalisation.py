@@ -83,7 +83,8 @@ def _scanner() -> re.Pattern[str]:
     numeric, worded = ("|".join(part) for part in (forms[: len(NUMERIC)], forms[len(NUMERIC) :]))
     signs = r"(?<!\w)w/o?(?=[\s.,;!?]|\Z)|[&@×÷≥≤≠§]|[+=](?![+=])(?<![+=]{2})|#(?=\w)|[~≈±](?=\d)"
     signs += r"|(?<![\w<>-])[<>](?=[$£€]?\d)|(?<=\d )[<>](?= \d)"
-    rates = r"(?:(?<=\d)|(?<=[\d ][a-z%])|(?<=[\d ][a-z]{2})|(?<=[a-z]{3}s))" + rf"/{PIECES['PER']}\b"
+    after = r"(?:(?<=\d)|(?<=[\d ][a-z%])|(?<=[\d ][a-z]{2})|(?<=[a-z]{3}s)(?=/(?:min|sec|h|day|week|month|year)))"
+    rates = rf"{after}/{PIECES['PER']}\b"
     dashes = r"(?<![^\s(])-(?=[.$£€]?\d)|−(?=\d)|(?<=[mdht\d%.])–(?=[$£€]?\d)"
     begun = rf"(?<![^\W_])(?:{word}|(?=[^\W\d_])(?:{worded})|(?![\s,;!?])(?:{numeric}))"
     grouped = "|".join([begun, rates, signs, dashes, WORD, r"\d+(?:\.\d+)*"])
