@@ -212,9 +212,8 @@ def _read_captions(root: Element, where: str) -> LabelTier:
         place = f"line {len(labels) + 1}"
         parts: list[TimedLabel] = []
         spans = [child for child in element.iter() if child is not element and {"begin", "t"} & child.attrib.keys()]
-        ends_s = [_read_times(child, start_s, math.inf, per_s, where)[1] for child in spans]
-        late = any(end_s + NEAR_S < each < math.inf for each in ends_s)
-        origin_s = 0.0 if late else start_s  # Apple's spans are absolute
+        ends_s = (_read_times(child, start_s, math.inf, per_s, where)[1] for child in spans)
+        origin_s = 0.0 if any(end_s + NEAR_S < each < math.inf for each in ends_s) else start_s  # Apple's are absolute
         glued = False
         for child in element.iter():
             child.text = f"\n{child.text or ''}" if child.tag == "br" else child.text

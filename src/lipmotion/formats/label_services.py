@@ -41,7 +41,7 @@ from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import values
 from lipmotion.types.values import parse_clock, parse_number, require
 from lipmotion.units import SILENCE
-from lipmotion.units.spelling import parse_table, read_patterns
+from lipmotion.units.spelling import parse_table, read_patterns, read_table
 from lipmotion.units.spoken_text import check_word_count, extract_spoken_text
 from lipmotion.units.text_normalisation import find_words
 
@@ -83,14 +83,7 @@ NAMES = {row["kind"]: row["names"].split() for row in read_shipped_table("lipmot
 MISSED, OMITTED = "not-found-in-audio", "Omission"  # Gentle's case, and Azure's error, of a word that is not said
 MARKS = read_patterns(Path(__file__).with_name("label_services.tsv"))
 """Patterns of what services write, by their names in the table."""
-PHONE_OF_VISEME: dict[str | int, str] = {
-    **{"sil": SILENCE, "p": "p", "t": "t", "S": "sh", "T": "th", "f": "f", "k": "k", "i": "iy", "r": "r", "s": "s"},
-    **{"l": "l", "u": "uw", "@": "ax", "a": "aa", "e": "ey", "E": "eh", "o": "ow", "O": "ao"},
-    **{"B": "v", "D": "dh", "J": "n", "G": "g", "x": "k", "w": "w"},
-    **dict(enumerate("sil ah aa ao eh er ih uw ow aw oy ay hh r l s sh th f t k p".split())),
-}
-"""A phone with the mouth of each viseme: of Amazon Polly by its name, the third row of other languages than English; of
-Azure by its number."""
+PHONE_OF_VISEME = read_table("voice_visemes")
 KOKORO_LETTERS = {"A": "eɪ", "I": "aɪ", "W": "aʊ", "Y": "ɔɪ", "O": "oʊ", "Q": "əʊ", "ᵊ": "ə", "T": "ɾ"}
 KOKORO_FRAMES_PER_S = 40  # durations are in frames of 600 samples at 24 kHz
 PARALLEL_LISTS = tuple(
@@ -232,7 +225,7 @@ def _read_row(item: dict[str, Any], place: str, where: str, name: str, owner: Ro
         stored = shorten(repr(item.get("text") or item.get("word"))[:200])
         raise InputError(f"{where}: {place}: its text is {stored}, required a text")
     if "visemeid" in item or item.get("type") == "viseme":
-        viseme, role = item.get("visemeid", item.get("value")), PHONE_LABELS
+        viseme, role = str(item.get("visemeid", item.get("value"))), PHONE_LABELS
         text = PHONE_OF_VISEME[require(values.one_of(PHONE_OF_VISEME), viseme, f"{where}: {place}: the viseme")]
     if text is not None and "markname" in item and not MARKS["MARK"].fullmatch(text):
         raise InputError(
@@ -288,6 +281,8 @@ def _collect_rows(
 ) -> None:
     """Add the items with a text in a value, and in all its members, to those of the same lists; of alternatives one."""
     name = path[-1]
+    if isinstance(value, dict) and value and all(map(str.isdecimal, value)):  # a list as an object of numbers
+        value = list(value.values())
     if isinstance(value, list):
         for number, each in enumerate(value[:1] if name in NAMES["alternatives"] else value, 1):
             item = _read_stamp(each) or each

@@ -54,7 +54,7 @@ def parse_line_tiers(text: str, where: str) -> list[LabelTier] | None:
     One time a line is that of the end under the header of ESPS, or where the first label is silence and ends after 0.
     Raises InputError: a later line is of another form, or has a time that is none; or starts that may be ends.
     """
-    text = re.sub(r"\A\ufeff?sep=.[ \t\r]*\n", "\n", text)  # Excel's
+    text = re.sub(r"\A\t(?=\S)", "#\t", re.sub(r"\A\ufeff?sep=.[ \t\r]*\n", "\n", text))  # Excel's, pandas'
     if esps := MARKS["ESPS"].match(text):
         return _read_points(_lines("\n" * esps[0].count("\n") + text[esps.end() :]), where, ends=True)
     lines = _lines(text)
@@ -188,18 +188,20 @@ def _read_table(lines: Lines, columns: dict[str, int], where: str, given: str = 
     kinds: dict[tuple[str, str], list[TimedLabel]] = defaultdict(list)
     named = re.split(r"[,;\t]", header)[columns["text"]].strip(' "').lower()
     named = "" if named in ("text", "label") else named
+    if "frame" in re.split(r"[,;\t]", header)[columns["start"]].lower():
+        raise InputError(f"{where}: its times are frames, whose rate is not known; required seconds")
     check_count(len(lines), where)
     joined: Lines = []  # a text in quotes may have line ends
     for number, line in lines[0 if given else 1 :]:
-        if joined and joined[-1][1].count('"') % 2:
-            joined[-1] = (joined[-1][0], f"{joined[-1][1]} {line}")
-        else:
-            joined.append((number, line))
+        first, before = joined.pop() if joined and joined[-1][1].count('"') % 2 else (number, "")
+        joined.append((first, f"{before} {line}".strip()))
     for number, line in joined:
         place = f"line {number}"
         try:
             fields = next(csv.reader([line], delimiter=delimiter))
             fields += [""] if columns["text"] == len(fields) else []  # of a line that is empty
+            if columns["text"] == header.count(delimiter):  # in the last column, a text without quotes
+                fields[columns["text"] :] = [delimiter.join(fields[columns["text"] :])]
             known = {kind: at for kind, at in columns.items() if at < len(fields) or kind != "speaker"}
             row = {kind: fields[column] for kind, column in known.items()}
             times = (row["start"], row.get("end") or row["duration"])
