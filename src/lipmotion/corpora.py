@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import CorpusError, InputError, MissingDependencyError
+from lipmotion.errors import CorpusError, InputError, MissingDependencyError, shorten_list
 from lipmotion.extensions import install_command
 from lipmotion.storage.files import TEMPORARY, atomic_file, confine, make_folder, make_portable, replace_folder
 from lipmotion.storage.json_text import as_json, from_json
@@ -314,8 +314,7 @@ class Corpus:
         motions = set()
         for entry in sources:
             names = [channel["name"] for channel in entry["channels"]]
-            some = ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
-            motions.add(f"{len(names)} channels ({some}) at {entry['rate_hz']:g} Hz")
+            motions.add(f"{len(names)} channels ({shorten_list(names, 3)}) at {entry['rate_hz']:g} Hz")
         rights = sorted({entry["source"]["attribution"] for entry in sources if "attribution" in entry["source"]})
         return {
             "corpus": str(self.path),
@@ -341,8 +340,8 @@ class Corpus:
         Raises CorpusError: there is none of that name, or it is damaged.
         """
         if name not in self._index:
-            some = ", ".join(self.names()[:5])
-            raise CorpusError(f"{self.path}: no utterance {name!r} among {len(self)} ({some}, ...)")
+            some = shorten_list(self.names())
+            raise CorpusError(f"{self.path}: no utterance {name!r} among {len(self)} ({some})")
         folder = self.folder(name)
         entry = read_entry(folder)
         try:

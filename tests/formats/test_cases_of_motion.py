@@ -101,7 +101,7 @@ def spelled(separator: str, quote: bool, decimal: str, above: str = "", end: str
     ids=lambda content: repr(content[:12]),
 )
 def test_tables_as_spreadsheets_save_them(tmp_path: Path, content: str | bytes) -> None:
-    motion = read(tmp_path / "a.csv", content)
+    motion = read(tmp_path / ("a.tsv" if "\t" in str(content) else "a.csv"), content)
     assert motion.rate_hz == 60
     assert motion["jawOpen"] == pytest.approx(JAW)
 
@@ -187,9 +187,13 @@ def test_what_cannot_be_trusted_is_named(tmp_path: Path, caplog: pytest.LogCaptu
     assert "1 of 30 rows" in caplog.text
     read(path, take([f"{0.3 if n == 10 else n / 30},0" for n in range(30)], "time,a"))
     assert "1 of 30 rows are not later than those before, as row 11" in caplog.text
-    for head, row in (("time,jawOpen", "55"), ("Timecode,BlendshapeCount,JawOpen", "55")):
+    rows = [f"{n},{face},{n / 30},{int(n != 9)},{JAW[n] * (face == 0)}" for n in range(30) for face in (0, 1)]
+    motion = read(path, take(rows, "frame, face_id, timestamp, success, jawOpen"))
+    assert "30 rows are of other faces than the first one (0)" in caplog.text
+    assert (motion.names, motion["jawOpen"][9]) == (("jawOpen",), pytest.approx((JAW[8] + JAW[10]) / 2))
+    for head, row in (("time,jawOpen", "55"), ("Timecode,BlendshapeCount,JawOpen", "55"), ("time,opening", "55")):
         times = [f"{n / 30}" if head.startswith("time,") else f"{code(n)},1" for n in range(30)]
-        with pytest.raises(InputError, match="goes up to 55, required 0 to 1"):
+        with pytest.raises(InputError, match=r"goes up to 55, required 0|are 55 apart, required eye"):
             read(path, take([f"{time},{row}" for time in times], head))
 
 

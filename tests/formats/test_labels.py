@@ -271,7 +271,7 @@ def test_two_tiers_of_phones_and_binary_grids_are_refused(write):
         ("9\n0.0", "8\n0.0", "what follows the last tier is damaged: more is there than the counts say"),
         ("9\n0.0", "9" * 5000 + "\n0.0", "tier 'phones' is damaged: there stands number 999"),
         ("9\n0.0", "250001\n0.0", "more than 250000 labels; give those of one recording"),
-        ("0.6\n0.75", "0.6\n1e999", "tier 'phones', interval 3 has the time '1e999', required a finite one"),
+        ("0.6\n0.75", "0.6\n1e999", "tier 'phones', interval 3 has the time '1e999', required finite seconds"),
         ('"IntervalTier"', f'"{"x" * 9000}"', "its kind is 'xxx"),
         ('"phones"', f'"{"x" * 9000}"\n"', "is damaged: there stands text 0 2 9 0.0 0.4, required a number"),
     ],

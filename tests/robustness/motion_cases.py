@@ -43,7 +43,7 @@ def _npz(name: str, values: bytes, *messages: str, document: bytes | None = None
         return bench.animate(None, "--units", bench.file("units.npz", content.getvalue()))
 
 
-NO_MOTION = ("damaged, or no such file", "export it again")
+NO_MOTION = ("damaged, or of another program", "export it again")
 _npz("a trillion frames declared", declared("(1000000000000, 1)"), *NO_MOTION, "in 0 bytes, required 8000000000000")
 _npz("pickled objects", npy(np.array([{}], object)), *NO_MOTION)
 _npz("texts", npy(np.array([["a"], ["b"]])), "values of <U1, required numbers")

@@ -86,9 +86,11 @@ def test_a_users_file(lexicon_file: Path) -> None:
         assert said(word, mine) == [phones]
     assert mine.known("lipmotion")
     assert said("bin", mine) == said("bin")
-    for text in ("bim B IH M\r\nbam B AE M\r\n", "\ufeffbim B IH M\nbam B AE M"):  # as other systems write them
+    aligner = "<unk> SPN\n!SIL SIL\nbim\t0.9\t0.1\t1.0\t1.2\tB IH M\nbam 1.0 B AE M"
+    marked = 'bim: B IH M\n"bam" B AE M\nbim|B IH M\nbam, B AE M'
+    for text in ("bim B IH M\r\nbam B AE M\r\n", "\ufeffbim B IH M\nbam B AE M", aligner, marked):
         lexicon_file.write_bytes(text.encode())
-        assert set(Lexicon.from_file(lexicon_file).user) == {"bim", "bam"}
+        assert [each[0][1] for each in Lexicon.from_file(lexicon_file).user.values()] == ["ih", "ae"]
 
 
 @pytest.mark.parametrize(

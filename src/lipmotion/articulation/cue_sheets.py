@@ -302,6 +302,7 @@ PREFIX = "viseme_"
 CHARTS = (BLAIR, LETTERS, FLEMING_DOBBS, OCULUS, PHONES)
 LONGEST_S = 86_400.0
 MAX_CUES = 250_000
+LONGEST_SHAPE_S = 3.0  # longer ones than rest are told, as their times may be frames
 MILLISECONDS = 20.0  # shapes other than rest of which half seem to last so many whole seconds are in milliseconds
 
 
@@ -347,9 +348,12 @@ def build_cue_sheet(
     if not rows:
         raise InputError("there is no mouth shape in it; export the cues again")
     end_s = max(end_s, rows[-1][0])
-    lengths = [after[0] - row[0] for row, after in pairwise(rows) if row[1] != REST]
-    if lengths and median(lengths) >= MILLISECONDS and all(float(start_s).is_integer() for start_s, _ in rows):
-        LOG.warning("a mouth shape seems to last %g s: the times are taken for milliseconds", median(lengths))
+    lengths = [after[0] - row[0] for row, after in pairwise([*rows, (end_s, REST)]) if row[1] != REST]
+    typical_s = median(lengths or [0.0]) if all(float(start_s).is_integer() for start_s, _ in rows) else 0.0
+    if typical_s >= LONGEST_SHAPE_S:
+        guess = "the times are taken for milliseconds" if typical_s >= MILLISECONDS else "are its times frames?"
+        LOG.warning("a mouth shape seems to last %g s: %s", typical_s, guess)
+    if typical_s >= MILLISECONDS:
         rows, end_s = [(start_s / 1000, shape) for start_s, shape in rows], end_s / 1000
     if len(rows) > MAX_CUES or end_s > LONGEST_S:
         raise InputError(f"{len(rows)} mouth shapes in {end_s:g} s, required at most {MAX_CUES} in {LONGEST_S:g} s")

@@ -17,7 +17,7 @@ from lipmotion.articulation.expression import list_action_units
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER
 from lipmotion.articulation.phone_targets import GESTURES, OVAL, PURSED_PRESS, SAID, TIP_OUT, TIP_UP, gesture_curves
 from lipmotion.articulation.rest import find_rest_frames, measure_at_rest
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shorten_list
 from lipmotion.types import Motion, Timeline, Unit
 
 Curve = NDArray[np.float64]
@@ -195,7 +195,7 @@ def check_spoken(motion: Motion, fps: float) -> None:
     if not 0 < fps < np.inf:
         raise InputError(f"the frame rate is {fps}, required more than 0")
     if "opening" not in motion.names:
-        names = ", ".join(motion.names[:6]) + (", ..." if len(motion.names) > 6 else "") or "no channels"
+        names = shorten_list(motion.names, 6) or "no channels"
         raise InputError(f"no channel 'opening' to draw a face from; the motion has: {names}")
     if not len(motion.values):
         raise InputError("the motion has no frames; there is nothing to draw")

@@ -21,13 +21,10 @@ from lipmotion.storage.files import atomic_file
 from lipmotion.types import Timeline, Unit
 from lipmotion.types.values import parse_clock
 from lipmotion.units import RECOGNISED, group_words, list_recognised_phones
+from lipmotion.units.spelling import read_patterns
 
-TOKEN = re.compile(
-    r'"(?P<text>[^"]*)"|![^\n]*|<(?P<flag>\w+)>|(?<!\S)(?P<number>[-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)(?!\S)'
-)
-"""What Praat itself reads: texts in quotes, flags, and numbers between blanks. All else (``xmin =``) is ignored."""
-TEXTGRID = re.compile(r'\s*(?:![^\n]*\n\s*)*(?:(?:File type\s*=\s*)?"?oo(?:Text|Binary)File|"Praat chronological)')
-"""How Praat's files begin, perhaps after comments."""
+MARKS = read_patterns(Path(__file__).with_name("annotations.tsv"))
+"""Patterns of the forms that are read, by their names in the table."""
 INTERVALS, POINTS = "IntervalTier", "TextTier"
 
 
@@ -75,7 +72,7 @@ def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
 def _tokens(text: str) -> Iterator[tuple[str, str]]:
     """Yield kind (text, flag, number) and value of every token."""
     at = 0
-    while match := TOKEN.search(text, at):
+    while match := MARKS["TOKEN"].search(text, at):
         at = match.end()
         if match.lastgroup == "text":
             # a quote that is written twice is one in the text
@@ -137,12 +134,6 @@ def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
 
 
 LOG = logging.getLogger("lipmotion")
-ROOT = re.compile(
-    r"\s*(?:<\?xml[^>]{0,200}\?>\s*)?(?:<!--.{0,2000}?-->\s*)*<(?:\w+:)?(?:ANNOTATION_DOCUMENT|tt|transcript|timedtext)\b",
-    re.DOTALL,
-)
-"""How XML begins that holds labels in time."""
-OFFSET_TIME = re.compile(r"(\d+(?:\.\d+)?)(h|ms|m|s|f|t)?")
 NEAR_S, DEEPEST = 0.01, 20
 
 
@@ -220,12 +211,15 @@ def _read_captions(root: Element, where: str) -> LabelTier:
             return
         place = f"line {len(labels) + 1}"
         parts: list[TimedLabel] = []
+        spans = [child for child in element.iter() if child is not element and {"begin", "t"} & child.attrib.keys()]
+        ends_s = (_read_times(child, start_s, math.inf, per_s, where)[1] for child in spans)
+        origin_s = 0.0 if any(end_s + NEAR_S < each < math.inf for each in ends_s) else start_s  # Apple's are absolute
         glued = False
         for child in element.iter():
             child.text = f"\n{child.text or ''}" if child.tag == "br" else child.text
-            if child is element or not {"begin", "t"} & child.attrib.keys():
+            if child not in spans:
                 continue
-            text, times_s = "".join(child.itertext()), _read_times(child, start_s, end_s, per_s, where)
+            text, times_s = "".join(child.itertext()), _read_times(child, origin_s, end_s, per_s, where)
             if glued and not text[:1].isspace():  # no blank between spans: syllables of one word
                 text, times_s = parts[-1].text + text, (parts.pop().start_s, times_s[1])
             parts.append(TimedLabel(*times_s, text, place))
@@ -256,7 +250,7 @@ def _read_times(
 
 def _parse_seconds(value: str, per_s: dict[str, float], where: str) -> float:
     """Return a time of TTML: a clock, also with frames, or a number with its unit. Raises InputError: another text."""
-    clock_s, offset = parse_clock(value, per_s.get("f", 0)), OFFSET_TIME.fullmatch(value.strip())
+    clock_s, offset = parse_clock(value, per_s.get("f", 0)), MARKS["OFFSET_TIME"].fullmatch(value.strip())
     if not math.isnan(clock_s):
         return clock_s
     if offset is None:

@@ -209,6 +209,10 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
             first = f"the first is {motion.names[column]!r} in frame {frame}"
             raise InputError(f"{(~finite).sum()} values that are not finite, {first}; interpolate them first")
         beyond = []
+        lips = {"opening", "width", "outer"} & {*motion.names}
+        widest = max((float(motion[name].max(initial=0.0)) for name in lips), default=0.0)
+        if widest > LARGEST_WEIGHT:
+            raise InputError(f"the lips are {widest:g} apart, required eye distances; divide millimetres by 90")
         for channel, curve in zip(motion.channels, motion.values.T, strict=True):
             if channel.unit in {WEIGHT, EYE_DISTANCE} and is_known(channel.name):
                 low, high = float(curve.min(initial=0.0)), float(curve.max(initial=0.0))
@@ -234,7 +238,7 @@ def _name_errors(path: Path) -> Iterator[None]:
         text = str(error)
         raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from error
     except (*UNREADABLE, IndexError, OverflowError, RecursionError) as error:
-        raise InputError(f"{path}: damaged, or no such file ({str(error)[:300]}); export it again") from error
+        raise InputError(f"{path}: damaged, or of another program ({str(error)[:300]}); export it again") from error
 
 
 def read_units(path: Path) -> Timeline[Unit]:
@@ -250,19 +254,21 @@ def read_units(path: Path) -> Timeline[Unit]:
 
 def _name_by_content(path: Path) -> Path:
     """Return a path, or for ``.json`` of another program, and cues, the name that such a file would have otherwise."""
-    if find_suffix(path) not in (".json", ".csv") or not path.is_file():
+    if (find_suffix(path) or path.suffix.lower()) not in (".json", ".csv", ".tsv") or not path.is_file():
         return path
     try:
         with path.open("rb") as file:
             head = file.read(JSON_HEAD)
     except OSError:  # reported when it is read
         return path
-    if find_suffix(path) == ".csv":
+    if find_suffix(path) != ".json":
         from lipmotion.articulation.cue_sheets import is_shape
 
         names, *rows = [*head.splitlines()[:2], b""]
         cue = CUE_LINE.match(rows[0] if SHAPE_COLUMN.search(names) else names)
-        return Path("a.tsv") if cue and is_shape(cue[1].decode()) else path
+        if cue and is_shape(cue[1].decode()):
+            return Path("a.tsv")
+        return Path("a.csv") if names.count(b"\t") > 1 else path  # cues have two columns
     return next((Path(f"a{suffix}") for mark, suffix in OTHER_JSON.items() if mark in head), path)
 
 

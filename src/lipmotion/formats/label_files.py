@@ -11,7 +11,8 @@ from itertools import islice
 from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError, shorten
-from lipmotion.formats.annotations import ROOT, TEXTGRID, parse_interval_tiers, read_xml_tiers, write_textgrid
+from lipmotion.formats.annotations import MARKS as DOCUMENTS
+from lipmotion.formats.annotations import parse_interval_tiers, read_xml_tiers, write_textgrid
 from lipmotion.formats.label_services import DamagedJsonError, describe_json, is_json, parse_service_tiers
 from lipmotion.formats.label_tiers import (
     LINES,
@@ -31,12 +32,14 @@ from lipmotion.formats.label_tiers import (
     split_speakers,
     with_words,
 )
-from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, parse_subtitles, write_subtitles
+from lipmotion.formats.subtitles import MARKS as SUBTITLES
+from lipmotion.formats.subtitles import convert_timecodes, is_subtitles, parse_subtitles, write_subtitles
 from lipmotion.formats.timed_lines import parse_line_tiers
 from lipmotion.printable import is_line
 from lipmotion.storage.sources import read_text_file
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import UNKNOWN_PHONES, RecognisedPhone, find_phone, restore_confidences
+from lipmotion.units.spelling import read_patterns
 from lipmotion.units.spoken_text import parse_tagged_text, remove_known_tags
 from lipmotion.units.text_normalisation import LARGEST_TRANSCRIPT_BYTES, require_tokens
 from lipmotion.units.written_forms import list_readings
@@ -49,19 +52,13 @@ FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".eaf", ".lab", ".wrd", *RECOGNIS
 may be recognised last."""
 FOR_PHONES = (".TextGrid", ".textgrid", ".eaf", ".lab", ".phn", ".txt")  # the same for phones
 LARGEST_LABELS = 1 << 24  # most bytes of a label file: labels of a day
-MOTION = re.compile(r'"lipmotion\.motion"|time_s,')  # how our own motion files begin: a quick answer for large ones
-MASTER = re.compile(r'^(?:#!MLF!#|\.)[ \t\r]*\n"(.*)"[ \t\r]*$', re.MULTILINE)
-"""The line before each recording's labels in HTK's master label files, and that with its name."""
-MARKUP = re.compile(r'\{\\rtf|<(?:[!?]|(?:html|head|body|div|table|tt|svg)\b)|\{\s*"|\[\s*[\[{]', re.IGNORECASE)
-"""The start of RTF, HTML, XML and JSON; tags of SSML and of game engines may stand in a text."""
+MARKS = read_patterns(Path(__file__).with_name("label_files.tsv"))
+"""Patterns of the forms that are read, by their names in the table."""
 CHAPTER = ".trans.txt"
 """Ends the name of the transcripts of a chapter in LibriSpeech: in each line the name of a recording, and its words."""
 METADATA = "metadata.csv"
 """The transcripts of LJSpeech, beside its recordings or a folder above: ``name|…|words``, a line for each."""
 JUDGED_LINES = 1000  # lines of a text that are judged for whether they hold times
-NUMBERED = re.compile(r"[-+.]?\d|nan\b|[-+]?inf\b")
-TIME = re.compile(r"(?<![\w.])(?:\d*\.\d+|\d{5,})(?![\w.])")
-"""Seconds with decimals, or a number that counts parts of a second."""
 NAMED_TIERS = 12  # most names in a message
 _WRITERS = {".TextGrid": write_textgrid, ".vtt": write_subtitles, ".srt": write_subtitles}
 LABEL_SUFFIXES = tuple(_WRITERS)
@@ -221,7 +218,7 @@ def holds_timings(path: Path) -> bool:
         return False
     text = _read_text(path)
     try:
-        if MOTION.search(text[:64]):
+        if MARKS["MOTION"].search(text[:64]):
             return False
         return bool(parse_service_tiers(text, "")) if is_json(text) else parse_line_tiers(text, "") is not None
     except InputError as error:  # said by the reader, if it is damaged by that of motion
@@ -268,11 +265,11 @@ def _read_plain(text: str, path: Path) -> RecordingLabels:
 def _read_tiers(text: str, where: str) -> list[LabelTier] | None:
     """Return the tiers of a text whose form has times, in the phones of the inventory; None of any other text."""
     try:
-        if TEXTGRID.match(text):
+        if DOCUMENTS["TEXTGRID"].match(text):
             tiers: list[LabelTier] | None = parse_seconds(parse_interval_tiers(text, where), where)
-        elif ROOT.match(text):
+        elif DOCUMENTS["ROOT"].match(text):
             tiers = read_xml_tiers(text, where)
-        elif is_subtitles(text):
+        elif is_subtitles(text := convert_timecodes(text, where)):
             tiers = [parse_subtitles(text, where)]
         else:
             tiers = parse_service_tiers(text, where) if is_json(text) else parse_line_tiers(text, where)
@@ -358,7 +355,7 @@ def read_plain_text(path: Path) -> str:
     Raises InputError: no such file, larger than ``LARGEST_TRANSCRIPT_BYTES``, not UTF-8 text, or labels in time.
     """
     text = read_text_file(path, "transcript", LARGEST_TRANSCRIPT_BYTES)
-    if TEXTGRID.match(text) or parse_line_tiers(text, str(path)) is not None:
+    if DOCUMENTS["TEXTGRID"].match(text) or parse_line_tiers(text, str(path)) is not None:
         raise InputError(f"{path}: holds labels in time, required the words alone; write them into a text file")
     _check_no_labels(text, str(path))
     return text
@@ -366,24 +363,25 @@ def read_plain_text(path: Path) -> str:
 
 def _check_no_labels(text: str, where: str) -> None:
     """Raise InputError for labels, subtitles and documents in forms that are not read."""
-    start, match = text[:200].lstrip(), NO_ARROW.search(text)
+    start, match = text[:200].lstrip(), SUBTITLES["NO_ARROW"].search(text)
     line = shorten(match[0].strip()) if match else ""
     lines = numbered = timed_lines = with_two = 0
     header = re.search(r"^#$", text[:2000], re.MULTILINE)  # of ESPS
     body = (each.strip() for each in StringIO(text[header.end() if header else 0 :]))
     for each in islice(filter(None, body), JUDGED_LINES):
         lines += 1
-        numbered += NUMBERED.match(each) is not None
-        timed_lines += TIME.match(each) is not None
-        with_two += sum(1 for _, _ in zip(TIME.finditer(each), "12", strict=False)) > 1
+        numbered += MARKS["NUMBERED"].match(each) is not None
+        timed_lines += MARKS["TIME"].match(each) is not None
+        with_two += sum(1 for _, _ in zip(MARKS["TIME"].finditer(each), "12", strict=False)) > 1
     seems_timed = lines > 1 and ((2 * numbered > lines and timed_lines > 0) or 2 * with_two >= lines)
     clock = "00:00:01,000 --> 00:00:02,500"
     timed = "its lines hold times, but not as in a TextGrid, HTK's or Audacity's labels"
     forms = {
         "holds NUL characters: is it UTF-16 without its mark? save it as UTF-8 text": "\0" in text,
         "is closed captions in Scenarist's code (SCC); save them as .srt": start.startswith("Scenarist_SCC"),
+        "is a file of mouth cues, which are motion and no words; render it": MARKS["CUES"].match(start),
         "is a master label file, required the words alone": start.startswith("#!MLF!#"),
-        f"begins with {shorten(start[:20])!r}, required the words alone; save it as text": MARKUP.match(start),
+        f"begins with {shorten(start[:20])!r}, required the words alone; save it as text": MARKS["MARKUP"].match(start),
         "is a file of subtitles, required the words alone; write them into a text file": is_subtitles(text),
         f"has the line {line!r}, two times as in subtitles; required: times as in {clock}, or the words alone": match,
         f"{timed}; save it in one of these forms, or give the words alone": seems_timed,
@@ -408,11 +406,11 @@ def _read_text(path: Path, kind: str = "label") -> str:
     text = text if "\n" in text else text.replace("\r", "\n")
     if not text.startswith("#!MLF!#"):
         return text
-    names = MASTER.findall(text)
+    names = MARKS["MASTER"].findall(text)
     if len(names) != 1:
         held = f"is a master label file of {len(names)} recordings: {', '.join(map(shorten, names[:NAMED_TIERS]))}"
         raise InputError(f"{path}: {held}; required the labels of one; write a .lab beside each recording")
-    return re.sub(r"^\.[ \t\r]*$", "", MASTER.sub("\n", text), flags=re.MULTILINE)
+    return re.sub(r"^\.[ \t\r]*$", "", MARKS["MASTER"].sub("\n", text), flags=re.MULTILINE)
 
 
 def write_labels(path: Path, units: Timeline[Unit]) -> None:

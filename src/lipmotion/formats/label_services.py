@@ -18,6 +18,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import accumulate
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from lipmotion.errors import InputError, shorten
@@ -40,7 +41,7 @@ from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import values
 from lipmotion.types.values import parse_clock, parse_number, require
 from lipmotion.units import SILENCE
-from lipmotion.units.spelling import parse_table
+from lipmotion.units.spelling import parse_table, read_patterns, read_table
 from lipmotion.units.spoken_text import check_word_count, extract_spoken_text
 from lipmotion.units.text_normalisation import find_words
 
@@ -77,51 +78,27 @@ KNOWN_TIMES = tuple(
     Times(row["start"], row["end"], row["duration"], int(row["per_s"]), int(row["usual"]), row["kind"])
     for row in read_shipped_table("lipmotion.formats", "label_times.csv")
 )
-TEXTS = (
-    "punctuatedword word alignedword text content value transcript sentence display lexical markname token lines "
-    "displaytext segs alternatives nbest label phone phoneme symbol char"
-).split()
-"""The names of what is said, in order; of alternatives it is the first one."""
-ALTERNATIVES = ("alternatives", "nbest")
-WORD_LISTS = ("words", "items", "elements", "tokens", "timestamps", "timepoints", "timestampedwords")
-PHONE_LISTS, CHARACTER_LISTS = ("phones", "phonemes"), ("characters", "charsegments")
-LISTS = (
-    *WORD_LISTS,
-    *"segments transcription utterances monologues events chunks fragments channels recognizedphrases".split(),
-    *"sentences phrases paragraphs result results transcript alternatives nbest data response output".split(),
-)
-"""Members that hold words, phones, or lines of them, the best ones first; those of other names are read after them."""
+NAMES = {row["kind"]: row["names"].split() for row in read_shipped_table("lipmotion.formats", "label_names.csv")}
+"""Names of members by what they hold, the best ones first."""
 MISSED, OMITTED = "not-found-in-audio", "Omission"  # Gentle's case, and Azure's error, of a word that is not said
-KINDS = ("type", "boundarytype", "kind", "category")
-NOT_SAID = re.compile(r"punct|spac|audio.?event|sentence|ssml|pause|silence|non.?speech|blank|laugh|noise|session")
-"""Kinds of items that are no words."""
-SPEAKERS = "speaker speakerid speakerlabel speakertag channellabel channeltag channel".split()
-PHONE_OF_VISEME: dict[str | int, str] = {
-    **{"sil": SILENCE, "p": "p", "t": "t", "S": "sh", "T": "th", "f": "f", "k": "k", "i": "iy", "r": "r", "s": "s"},
-    **{"l": "l", "u": "uw", "@": "ax", "a": "aa", "e": "ey", "E": "eh", "o": "ow", "O": "ao"},
-    **{"B": "v", "D": "dh", "J": "n", "G": "g", "x": "k", "w": "w"},
-    **dict(enumerate("sil ah aa ao eh er ih uw ow aw oy ay hh r l s sh th f t k p".split())),
-}
-"""A phone with the mouth of each viseme: of Amazon Polly by its name, the third row of other languages than English; of
-Azure by its number."""
+MARKS = read_patterns(Path(__file__).with_name("label_services.tsv"))
+"""Patterns of what services write, by their names in the table."""
+PHONE_OF_VISEME = read_table("voice_visemes")
 KOKORO_LETTERS = {"A": "eɪ", "I": "aɪ", "W": "aʊ", "Y": "ɔɪ", "O": "oʊ", "Q": "əʊ", "ᵊ": "ə", "T": "ɾ"}
 KOKORO_FRAMES_PER_S = 40  # durations are in frames of 600 samples at 24 kHz
-POLLY_KINDS = ("sentence", "word", "viseme", "ssml")
-MARK = re.compile(r"[^\W\d_]+(?:['’-][^\W\d_]+)*[.,;:!?]?")  # a name of one of Google's marks that is the word after it
 PARALLEL_LISTS = tuple(
     (row["items"], parse_table(row["members"])) for row in read_shipped_table("lipmotion.formats", "label_lists.csv")
 )
 """Parallel lists: the list of items that they become, and the member that each is of them."""
-SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
-"""A word of characters, or a direction in brackets (``[whispers]``), which is not said."""
-PARTIAL = "AddPartialTranscript"  # Speechmatics' message
-UNFINISHED = {"isfinal": False, "final": False, "endofturn": False, "ispartial": True, "message": PARTIAL}
+UNFINISHED = {
+    "isfinal": False,
+    "final": False,
+    "endofturn": False,
+    "ispartial": True,
+    "message": "AddPartialTranscript",
+}
 """Members of what a service heard while somebody spoke, and says again when it is sure."""
-TEXT_ALONE = {*"text partial result language duration task usage logprobs alternatives confidence".split()}
-"""Members of what a recogniser says without times."""
 KNOWN_SHAPES = "segments, words, results, utterances, monologues, alignment, tiers, fragments, ..."
-DURATION = re.compile(r"PT(?:(\d+)H)?(?:(\d+)M)?(?:([\d.]+)S)?", re.IGNORECASE)  # ISO 8601
-DIGITS = re.compile(r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d{1,3})?)\s*(s|ms)?", re.IGNORECASE)
 
 
 class DamagedJsonError(InputError):
@@ -144,8 +121,8 @@ class Row:
     owner: Row | None = None
 
 
-Path = tuple[str, ...]
-Found = dict[tuple[Path, bool], list[Row]]
+Place = tuple[str, ...]
+Found = dict[tuple[Place, bool], list[Row]]
 """Items by the names of the members that lead to their list, and whether they are phones."""
 
 
@@ -208,22 +185,23 @@ def _decode_documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
 
 def _parse_number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
     """Return a time, NaN: it is missing, and how many such are a second, where its form says that, else ``per_s``."""
+    value = value.get("relative", value) if isinstance(value, dict) else value
     if isinstance(value, dict) and value.keys() <= {"seconds", "nanos"}:  # 0 is left out
         seconds, nanos = (_parse_number(value.get(name, 0), where)[0] for name in ("seconds", "nanos"))
         return seconds + nanos / 1e9, 1
     if not isinstance(value, str):
         missing = value in (None, -1)  # some services write -1 where they have none
         return math.nan if missing else require(values.number(), value, f"{where}: a time"), per_s
-    if parts := DURATION.fullmatch(value):
+    if parts := MARKS["DURATION"].fullmatch(value):
         return sum(float(part or 0) * unit_s for part, unit_s in zip(parts.groups(), (3600, 60, 1), strict=True)), 1
-    match, clock_s = DIGITS.fullmatch(value.strip()), parse_clock(value)
+    match, clock_s = MARKS["DIGITS"].fullmatch(value.strip()), parse_clock(value)
     if match is None and not math.isnan(clock_s):
         return clock_s, 1
     if match is not None:
         value, per_s = match[1].replace(",", "."), {"s": 1, "ms": 1000}.get((match[2] or "").lower(), per_s)
     if value.strip().lower() in ("", "nan", "null", "none", "n/a", "-1", "-1.0"):
         return math.nan, per_s
-    return parse_number(value, f"{where}: a time is", "a number of seconds"), per_s
+    return parse_number(value, f"{where}: a time is", "a number of seconds from the start of the recording"), per_s
 
 
 def _parse_time(value: Any, where: str, per_s: float = 1) -> float:
@@ -238,16 +216,18 @@ def _parse_time(value: Any, where: str, per_s: float = 1) -> float:
 
 def _read_row(item: dict[str, Any], place: str, where: str, name: str, owner: Row | None, who: str) -> Row | None:
     """Return an item with its text and the times that it has; None: it has no text."""
-    text = next((text for name in TEXTS if name in item and (text := _find_text(item[name])) is not None), None)
-    is_phone = name in PHONE_LISTS or ({"phone", "phoneme"} & {*item} and "word" not in item)
-    role = PHONE_LABELS if is_phone else WORDS if "word" in item or name in WORD_LISTS else ""
+    text = next(
+        (text for name in NAMES["texts"] if name in item and (text := _find_text(item[name])) is not None), None
+    )
+    is_phone = name in NAMES["phones"] or ({"phone", "phoneme"} & {*item} and "word" not in item)
+    role = PHONE_LABELS if is_phone else WORDS if "word" in item or name in NAMES["words"] else ""
     if text is None and any(item.get(name) for name in ("text", "word")):
         stored = shorten(repr(item.get("text") or item.get("word"))[:200])
         raise InputError(f"{where}: {place}: its text is {stored}, required a text")
     if "visemeid" in item or item.get("type") == "viseme":
-        viseme, role = item.get("visemeid", item.get("value")), PHONE_LABELS
+        viseme, role = str(item.get("visemeid", item.get("value"))), PHONE_LABELS
         text = PHONE_OF_VISEME[require(values.one_of(PHONE_OF_VISEME), viseme, f"{where}: {place}: the viseme")]
-    if text is not None and "markname" in item and not MARK.fullmatch(text):
+    if text is not None and "markname" in item and not MARKS["MARK"].fullmatch(text):
         raise InputError(
             f"{where}: {place} is the mark {shorten(text)!r}, which is no word; name every mark as the word that "
             'follows it, <mark name="hello"/>hello, or give the words as a transcript'
@@ -263,11 +243,15 @@ def _find_times(item: dict[str, Any], where: str) -> tuple[float, float, Times]:
     stamp, members = item.get("timestamp"), item
     if isinstance(stamp, list) and len(stamp) == 2:
         members = {**members, "timestampstart": stamp[0], "timestampend": stamp[1]}
+    if isinstance(stamp, int | float):
+        members = {**members, "stamp": stamp}
+    if isinstance(each := item.get("instances"), list) and each and isinstance(each[0], dict):  # Azure's of videos
+        members = {**members, **each[0]}
     for name in ("time", "offsets"):  # an object of both
         if isinstance(item.get(name), dict):
             members = {**members, **{f"{name}{edge}": time for edge, time in item[name].items()}, name: None}
     times = next((row for row in KNOWN_TIMES if (row.start or row.end) in members), UNTIMED)
-    if item.get("type") in POLLY_KINDS and not {"offsetsfrom", "timestampstart"} & members.keys():
+    if item.get("type") in NAMES["polly"] and not {"offsetsfrom", "timestampstart"} & members.keys():
         is_speechify = {"start", "starttime"} <= members.keys()
         times = POLLY if members.get("time") is not None else SPEECHIFY if is_speechify else times
     start, per_s = _parse_number(members.get(times.start), where, times.per_s)
@@ -288,17 +272,19 @@ def _find_text(value: Any) -> str | None:
             return "".join(str(part["utf8"]) for part in value)
         value = value[0]
     if isinstance(value, dict):
-        return next((_find_text(value[name]) for name in TEXTS if name in value), None)
+        return next((_find_text(value[name]) for name in NAMES["texts"] if name in value), None)
     return value if isinstance(value, str) else None
 
 
 def _collect_rows(
-    value: Any, found: Found, where: str, place: str = "", path: Path = ("",), owner: Row | None = None, who: str = ""
+    value: Any, found: Found, where: str, place: str = "", path: Place = ("",), owner: Row | None = None, who: str = ""
 ) -> None:
     """Add the items with a text in a value, and in all its members, to those of the same lists; of alternatives one."""
     name = path[-1]
+    if isinstance(value, dict) and value and all(map(str.isdecimal, value)):  # a list as an object of numbers
+        value = list(value.values())
     if isinstance(value, list):
-        for number, each in enumerate(value[:1] if name in ALTERNATIVES else value, 1):
+        for number, each in enumerate(value[:1] if name in NAMES["alternatives"] else value, 1):
             item = _read_stamp(each) or each
             if isinstance(item, dict):
                 at = f"{place}, {name or 'item'} {number}".strip(", ")
@@ -308,7 +294,7 @@ def _collect_rows(
     if not isinstance(value, dict) or len(path) > DEEPEST or not _is_said(value):
         return
     value = _list_items(value, ": ".join(filter(None, (where, f"{place}, {name}".strip(", ")))))
-    names = (str(value[name]) for name in SPEAKERS if isinstance(value.get(name), str | int))
+    names = (str(value[name]) for name in NAMES["speakers"] if isinstance(value.get(name), str | int))
     who = next(filter(None, names), who)
     row = _read_row(value, place, where, name, owner, who)
     if name == "words" and row is None:
@@ -335,6 +321,14 @@ def _list_items(item: dict[str, Any], where: str) -> dict[str, Any]:
         check_count(len(lists[0]), where)
         items = [dict(zip(members.values(), row, strict=True)) for row in zip(*lists, strict=True)]
         return {**{key: each for key, each in item.items() if key not in members}, name: items}
+    stamps: list[Any] = next((item[name] for name in NAMES["stamps"] if isinstance(item.get(name), list)), [])
+    if stamps and all(isinstance(stamp, list) and len(stamp) == 2 for stamp in stamps):
+        text, words = str(item.get("text") or item.get("textseg")), item.get("words")
+        words = words if isinstance(words, list) else MARKS["TOKEN"].findall(text)
+        if len(words) != len(stamps):
+            raise InputError(f"{where}: {len(stamps)} times of {len(words)} words; required a time of each")
+        items = [{"word": word, "start": start, "end": end} for word, (start, end) in zip(words, stamps, strict=True)]
+        return {**{name: each for name, each in item.items() if name not in NAMES["stamps"]}, "words": items}
     if isinstance(item.get("phonemealignments"), list):
         rate = require(values.number(1000, 1e6), item.get("samplerate"), f"{where}: the sample rate in hertz")
         phonemes = [each if isinstance(each, dict) else {} for each in item["phonemealignments"]]
@@ -358,19 +352,19 @@ def _join_characters(rows: list[Row]) -> list[Row]:
     starts = [*(row.start for row in rows[1:]), math.inf]
     lasting = [replace(row, end=after) if math.isnan(row.end) else row for row, after in zip(rows, starts, strict=True)]
     owner_of = [row for row in lasting for _ in row.text]
-    found = SPOKEN_WORD.finditer("".join(row.text for row in rows).replace("▁", " "))
+    found = MARKS["SPOKEN_WORD"].finditer("".join(row.text for row in rows).replace("▁", " "))
     edges = ((match[0], owner_of[match.start()], owner_of[match.end() - 1]) for match in found)
     return [replace(first, end=last.end, text=text, role=WORDS) for text, first, last in edges]
 
 
 def _is_said(item: dict[str, Any]) -> bool:
     """Return whether an item may hold speech: it is of such a kind, it is sure, and it is in the sound."""
-    kinds = () if "chunks" in item else (str(item.get(kind, "")).lower() for kind in KINDS)
+    kinds = () if {"chunks", "timeline"} & item.keys() else (str(item.get(kind, "")).lower() for kind in NAMES["kinds"])
     assessed = item.get("pronunciationassessment")
     missed = item.get("case") == MISSED or (isinstance(assessed, dict) and assessed.get("errortype") == OMITTED)
     is_sound = bool({"alignment", "normalizedalignment"} & item.keys())  # that is spoken, not heard
     unsure = not is_sound and any(item.get(name) == state for name, state in UNFINISHED.items())
-    return not (missed or unsure or any(map(NOT_SAID.search, kinds)))
+    return not (missed or unsure or any(map(MARKS["NOT_SAID"].search, kinds)))
 
 
 def _add_row(rows: list[Row], row: Row, item: dict[str, Any], where: str) -> None:
@@ -392,12 +386,12 @@ def _add_row(rows: list[Row], row: Row, item: dict[str, Any], where: str) -> Non
 def _choose_rows(found: Found, *, phones: bool) -> list[Row]:
     """Return the words, or else the lines, or the phones, of the lists that are known best; words in their lines."""
 
-    def rank(path: Path) -> tuple[bool, int]:
+    def rank(path: Place) -> tuple[bool, int]:
         has_words = any(row.role == WORDS for row in kept[path])
-        return not has_words, LISTS.index(path[-1]) if path[-1] in LISTS else len(LISTS)
+        return not has_words, NAMES["lists"].index(path[-1]) if path[-1] in NAMES["lists"] else len(NAMES["lists"])
 
     kept = {path: rows for (path, kind), rows in found.items() if kind == phones}
-    kept |= {path: _join_characters(rows) for path, rows in kept.items() if path[-1] in CHARACTER_LISTS}
+    kept |= {path: _join_characters(rows) for path, rows in kept.items() if path[-1] in NAMES["characters"]}
     timed = [path for path in kept if any(row.times.end or not math.isnan(row.start) for row in kept[path])]
     rows = kept[min(timed, key=rank)] if timed else []
     parts: dict[int, list[Row]] = defaultdict(list)
@@ -433,8 +427,8 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
         LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
     spoken, phones = (_choose_rows(found, phones=kind) for kind in (False, True))
     if not (spoken or phones):
-        if not (any(found.values()) and all(item.keys() <= TEXT_ALONE for _, item in objects)):
-            lists = [item[name] for _, item in objects for name in LISTS if name in item]
+        if not (any(found.values()) and all(item.keys() <= {*NAMES["text_alone"]} for _, item in objects)):
+            lists = [item[name] for _, item in objects for name in NAMES["lists"] if name in item]
             return [] if lists and not any(lists) else None
         spoken = next(filter(None, found.values()))
     phones = _extend_to_next(phones, [])

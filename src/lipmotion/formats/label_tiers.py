@@ -10,6 +10,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from pathlib import Path
 from statistics import median
 
 from lipmotion.errors import InputError, shorten
@@ -17,8 +18,9 @@ from lipmotion.printable import is_line
 from lipmotion.types import Span, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit, sort_lines
 from lipmotion.types.values import parse_clock, parse_number
 from lipmotion.units import PAUSE, PHONES, RECOGNISED, SILENCE, UNKNOWN_PHONES, find_phone, is_silent, reduce_vowels
-from lipmotion.units.ipa_phones import read_ipa, read_tokens, xsampa_to_ipa
+from lipmotion.units.ipa_phones import find_spelling, read_ipa, read_tokens, xsampa_to_ipa
 from lipmotion.units.phones import CLOSURES, REDUCED_VOWELS, SHORT_PAUSE_S
+from lipmotion.units.spelling import read_patterns, read_table
 from lipmotion.units.spoken_text import (
     SpokenAs,
     check_word_count,
@@ -33,14 +35,8 @@ LOG = logging.getLogger("lipmotion")
 EARLIEST_S = -1.0  # a time up to this is none; recognisers write others a little before 0, where the sound begins
 WORDS, LINES, PHONE_LABELS, RECOGNISED_PHONES, OTHER = "words", "lines", "phones", "recognised", "other"
 """What a tier holds. ``OTHER`` is neither said nor seen: pronunciations, syllables, translations, notes."""
-ROLES = (
-    (OTHER, r"^(kan|kas|mas|pho)\b|canonical|syll|tones?\b|tobi|gloss|transl|comment|notes?\b|pos\b|lemma|gesture"),
-    (PHONE_LABELS, r"phon([eéè]|$|s\b)|fonem|fones?\b|segment|(?<!-)\bmau\b|^laute?\b|ipa\b|x?-?sampa|音素|фонем"),
-    (WORDS, r"\b_?words?\b|\bort\b|orthogr|\bmots?\b|\bw(ö|oe)rter\b|\bwort\b|palabras?|parole\b|tokens?\b|単語|слов"),
-    (LINES, r"\btrn\b|transcri|utteranc|sentence|phrase|\btext\b|äußerung|énoncé|enunciado"),
-)  # fmt: skip
-"""What names of tiers say that they hold: those of Praat's users, of WebMAUS (``ORT-MAU``, ``KAN-MAU``, ``MAU``), of
-aligners, of ELAN's users, in some languages."""
+MARKS = read_patterns(Path(__file__).with_name("label_tiers.tsv"))
+"""What names of tiers say that they hold, and whose, and parts of labels, by their names in the table."""
 SPEAKERS = (r"(?P<speaker>.+?)\s*[-_/:]\s*(?:words?|phones?|phonemes?)", r"[^@]+@(?P<speaker>.+)")
 """Names of tiers that hold a speaker's, too: ``ann - words`` of the Montreal Forced Aligner, ``words@ANN`` of ELAN."""
 PHONES_SHARE = 0.75  # a tier of which this share of the labels are phones is one of phones; the other labels are errors
@@ -48,10 +44,7 @@ SHARED_TIME = 0.5
 """Tiers of unknown kinds of which so much is at the same time are versions of one text; else they are of speakers."""
 ROUNDING_S = 1e-3  # times may differ by this much: they are written with three digits or more
 WHOLE_WORD_S = 0.03  # a span of unknown phones whose ends are so near to those of a word is all of it
-IN_CONTEXT = re.compile(r"\A[^-+]*-([^-+]+)\+.*\Z")
-"""Triphones and full-context labels of HTK and HTS: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
 GLOTTAL_STOP = "q"  # TIMIT's: a sound of the throat, with any lips
-STATE_NUMBER = re.compile(r"\[(\d{1,9})\]$")
 RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")  # a phone or unit, and its confidence
 MAX_LABELS = 250_000  # most labels of a file: phones of five hours of speech
 TYPICAL_PHONE_S, TYPICAL_WORD_S = 0.08, 0.3  # how long a phone, and a word, alone or of a line, last
@@ -63,6 +56,9 @@ WHOLE_LIMITS = ((15, 1), (70, 0), (220, 100), *UNIT_LIMITS[1:])
 TICKS_PER_S = 10_000_000
 UNITS = {1: "seconds", 100: "hundredths of a second", 1000: "milliseconds", 1_000_000: "microseconds"}
 UNITS[TICKS_PER_S] = "ticks of 100 ns"
+OCULUS = read_table("oculus")
+OCULUS_ALONE = frozenset("PP FF DD SS RR kk nn".split())
+"""Phones with the mouths of Oculus' visemes, and the names of those that are no phones."""
 PAUSES = frozenset((" ", *' ^ $ . , ; : ! ? — – … ( ) “ ” " « » ¡ ¿'.split(" ")))
 """Symbols of voices for silence: padding, blanks and punctuation, which last as long as the pause."""
 LONGEST_SYMBOL = 40  # most letters of a phone with all its marks
@@ -98,7 +94,7 @@ class LabelTier:
 def find_tier(name: str, labels: Sequence[TimedLabel], speaker: str = "") -> LabelTier:
     """Return a tier in order of time whose name says what it holds and perhaps who speaks."""
     owner = next(filter(None, (re.fullmatch(form, name, re.IGNORECASE) for form in SPEAKERS)), None)
-    role = next((role for role, form in ROLES if re.search(form, name.lower())), "")
+    role = next((role for role in (OTHER, PHONE_LABELS, WORDS, LINES) if MARKS[role].search(name)), "")
     role = RECOGNISED_PHONES if name == RECOGNISED else role
     last_s = -math.inf
     known_s = [last_s := label.start_s if label.start_s > EARLIEST_S else last_s for label in labels]
@@ -116,7 +112,9 @@ def require_time(text: str, place: str, where: str) -> float:
     """Return a time from its text, also with a decimal comma or as 0:01.5. Raises InputError: it is none."""
     if ":" in text and not math.isnan(clock_s := parse_clock(text)):
         return clock_s
-    return parse_number(text.replace(",", "."), f"{where}: {place} has the time", "a finite one")
+    return parse_number(
+        text.replace(",", "."), f"{where}: {place} has the time", "finite seconds from the start of the recording"
+    )
 
 
 def find_time_unit(spans: Sequence[tuple[float, float, str]], role: str, where: str, usual: int = 1) -> int:
@@ -306,8 +304,8 @@ def merge_timelines(timelines: Sequence[Timeline[Unit]]) -> Timeline[Unit]:
 
 def to_phone(text: str) -> str | None:
     """Return the phone that a label stands for, ``UNKNOWN_PHONES`` for speech of unknown ones, or None."""
-    text = STATE_NUMBER.sub("", text)
-    inner = IN_CONTEXT.sub(r"\1", text)
+    text = MARKS["state"].sub("", text)
+    inner = MARKS["context"].sub(r"\1", text)
     name = find_phone(text) or find_phone(inner)
     if name is not None or text == GLOTTAL_STOP:
         return name or "hh"
@@ -319,9 +317,9 @@ def _join_states(labels: Sequence[TimedLabel]) -> list[TimedLabel]:
     phones: list[TimedLabel] = []
     last = -1
     for label in labels:
-        match = STATE_NUMBER.search(label.text)
+        match = MARKS["state"].search(label.text)
         state = int(match[1]) if match else -1
-        name = STATE_NUMBER.sub("", label.text)
+        name = MARKS["state"].sub("", label.text)
         before = phones[-1].text.lower() if phones else ""
         if (phones and state > last >= 0 and before == name.lower()) or name.lower() in CLOSURES.get(before, ()):
             phones[-1] = replace(phones[-1], end_s=label.end_s, text=name)
@@ -386,14 +384,25 @@ def split_ipa(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
 def map_to_inventory(tier: LabelTier, where: str) -> LabelTier:
     """Return a tier; phones in X-SAMPA or IPA become those of the inventory. Raises InputError: as ``split_ipa``."""
     labels = tier.labels if tier.role == PHONE_LABELS else ()
+    names = {label.text.removeprefix("viseme_") for label in tier.labels} - {""}
+    if {"X"} < names <= set("ABCDEFGHX"):
+        return replace(tier, role=OTHER)  # mouth cues
+    if names & OCULUS_ALONE and names <= OCULUS.keys():
+        named = (replace(label, text=OCULUS.get(label.text.removeprefix("viseme_"), "")) for label in tier.labels)
+        return replace(tier, labels=tuple(named), role=PHONE_LABELS)
+    if any("+" in label.text and MARKS["context"].match(label.text) for label in labels):
+        labels = tuple(replace(label, text=MARKS["left_context"].sub(r"\1", label.text)) for label in labels)
+        tier = replace(tier, labels=labels)
     texts = [label.text for label in labels if classify_label(label.text) is SpokenAs.SPEECH]
+    if texts and all(map(str.isdecimal, texts)):
+        raise InputError(f"{where}: tier {tier.name!r} holds numbers of phones, required their names")
     spoken = [WITH_GLIDES.get(text, text) for text in texts]
-    known = sum(to_phone(text) is not None for text in spoken)
+    known = 0 if find_spelling(spoken) else sum(to_phone(text) is not None for text in spoken)
     in_xsampa = sum(bool(xsampa_to_ipa(text)) for text in spoken)
     if known == len(spoken) or (known >= PHONES_SHARE * len(spoken) and in_xsampa < len(spoken)):
         return tier
-    as_ipa = WITH_GLIDES
-    if all(map(str.isascii, spoken)) and in_xsampa >= PHONES_SHARE * len(spoken):
+    as_ipa = find_spelling(spoken) or WITH_GLIDES
+    if as_ipa is WITH_GLIDES and all(map(str.isascii, spoken)) and in_xsampa >= PHONES_SHARE * len(spoken):
         as_ipa = {text: xsampa_to_ipa(text) or text for text in spoken}
     symbols = [replace(label, text=as_ipa.get(label.text, label.text)) for label in labels]
     return replace(tier, labels=tuple(split_ipa(symbols, where)))

@@ -22,6 +22,7 @@ TELEVISION_RATES_HZ = tuple(whole * 1000 / 1001 for whole in (24, 30, 48, 60, 12
 """Rates that even rows have where none of the usual ones fits."""
 NEAR_RATE = 0.15
 """Uneven rows whose median rate is this near to a usual one, as a share, are put on a grid of that rate. Times stay."""
+NEAR_MEAN = 0.01  # with gaps, the mean is lower; without any, it is truer than the median
 EVEN_SHARE = 0.1
 """Times that are this near to an even grid, as a share of a step, are even: the rows are taken as they are."""
 ROUNDING_SHARE = 0.002
@@ -82,7 +83,7 @@ def resample_evenly(time_s: Array, rows: Array) -> tuple[Array, float]:
     if min(off, known_off[0]) <= EVEN_SHARE:
         fits = (hertz for hertz, each in zip(known_hz, known_off, strict=True) if each <= 2 * off + ROUNDING_SHARE)
         return rows, next(fits, round(mean_hz, 6))
-    hertz = 1 / float(np.median(steps))
+    hertz = known_hz[0] if abs(mean_hz / known_hz[0] - 1) < NEAR_MEAN else 1 / float(np.median(steps))
     nearest = min(USUAL_RATES_HZ, key=lambda usual: abs(usual - hertz))
     if abs(nearest - hertz) <= NEAR_RATE * nearest:
         hertz = nearest

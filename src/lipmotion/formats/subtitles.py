@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import re
 from collections.abc import Iterator
@@ -16,54 +17,43 @@ from lipmotion.storage.files import atomic_file
 from lipmotion.types import Timeline, Unit
 from lipmotion.types.values import parse_clock
 from lipmotion.units import group_words, is_silent
+from lipmotion.units.spelling import read_patterns
 from lipmotion.units.spoken_text import extract_spoken_text, find_speaker_names
 
-TIME = r"((?:\d{1,4}:)?\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?)"
-ARROW = r"(?:(?:[-=–—−]\s?){1,3}(?:[>›»]|&gt;)|→)"
-"""The arrow between the times, also as people and programs damage it: ``->``, ``- ->``, ``–>``, ``--&gt;``."""
-CUE = re.compile(
-    rf"^.{{0,40}}\d\s*-->\s*\d|^.{{0,20}}:\d{{1,2}}(?:[.,]\d{{1,6}})?\s{{0,4}}{ARROW}\s{{0,4}}\d{{1,4}}:\d", re.M
-)
-"""The times of a subtitle."""
-FULL_CLOCK = r"(?:\d{1,4}:\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?|\d{1,2}:\d{1,2}[.,]\d{1,6})"
-FRAMES, GAP = r"\d\d(?:[:;]\d\d){3}", r"[^\w\n]{1,12}"
-NO_ARROW = re.compile(rf"^\s{{0,20}}(?:{FULL_CLOCK}{GAP}{FULL_CLOCK}\s{{0,20}}$|{FRAMES}{GAP}{FRAMES})", re.M)
-"""A line of two times without an arrow that is known, or that begins with two timecodes; times of day do not count."""
-TIMES = re.compile(rf"\s*{TIME}\s*{ARROW}\s*{TIME}(?:\s.*)?")
-SBV = re.compile(r"^TIME\s?,\s?TIME\s*?$".replace("TIME", r"((?:\d{1,4}:)?\d{1,2}:\d\d[.,]\d{1,6})"), re.M)
-"""The times of YouTube's own format and of SubViewer, ``0:00:01.000,0:00:02.500``."""
-COUNTED = re.compile(r"^([{\[])(\d{1,7})[}\]][{\[](\d{0,7})[}\]][ \t/]*(.*)$|^(\d{1,2}:\d\d:\d\d)[:=](?!\d)", re.M)
-"""The start of lines of MicroDVD (``{25}{63}Hello``, frames), MPL2 (``[10][25]``, tenths), TMPlayer (``00:00:01:``)."""
-RATE = re.compile(r"\{\d\}\{\d\}(\d{2,3}(?:[.,]\d{1,6})?)[ \t]*$", re.M)  # MicroDVD's: {1}{1}23.976
-WORD_TIME = re.compile(rf"<{TIME}>")  # when the words after it are said, as in the captions that YouTube makes
-NO_CUE = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")  # the start of a block of WebVTT that is not shown
+LOG = logging.getLogger("lipmotion")
+MARKS = read_patterns(Path(__file__).with_name("subtitles.tsv"))
+"""Patterns of lines and their times, by their names in the table."""
+FRAME_RATES = (24, 25, 30, 50, 60)
 BRIDGE_S, BRIDGES_SHARE, NEAR_S = 0.1, 0.2, 0.1
 """Captions that scroll repeat each line, and between them are bridges shorter than this; if so large a share of cues
 of a file are bridges, lines that the cue before, which ends so near, showed already are left out."""
-SUBSTATION = re.compile(rf"\A\s*\[(?i:Script Info)\]|^Dialogue:[^,\n]{{0,40}},\s*{TIME}\s*,\s*{TIME}\s*,", re.M)
-"""SubStation Alpha: its first line, or, where an editor saved none, a line that is shown, with its start and end."""
 DEFAULT_FIELDS = "layer start end style name marginl marginr marginv effect text".split()
 """The fields of a line where no line ``Format:`` says them."""
-STYLES = re.compile(r"(\{[^{}]{0,200}\})")
-DRAWING_MODE = re.compile(r"\\p(\d)")
-"""Begins a drawing (``{\\p1}``) or ends it (``{\\p0}``): the numbers in between are no words."""
-BREAK = re.compile(r"\\[Nnh]")  # line breaks and hard blanks within the text
-LYRICS_TAG = r"\[(?:[a-zA-Z]{2,10}|#):[^\]\n]{0,500}\]"
-"""What lyrics say of themselves: ``[ar:Anna]``, ``[offset:+250]``."""
-SPAN = rf"\[([\d:.,]{{1,20}})s?\s{{0,3}}{ARROW}\s{{0,3}}([\d:.,]{{1,20}})s?\]"
-LYRICS = re.compile(rf"\A(?:\s{{0,20}}{LYRICS_TAG}){{0,40}}\s{{0,20}}\[{TIME}\]|^[ \t]{{0,20}}{SPAN}", re.M)
-"""The start of lyrics, or of a text whose lines begin with their times: ``[00:12.50]Hello``, ``[0.00s -> 2.50s] Hello``
-as Whisper's programs print, perhaps after other lines."""
-LYRICS_TIME = re.compile(rf"\[{TIME}\]|{SPAN}")
-LYRICS_LINE = re.compile(rf"((?:(?:\[{TIME}\]|{SPAN})\s{{0,4}}){{1,100}}).*")
 PHONES = ".phones"  # a file whose name ends so before its suffix, as ``talk.phones.vtt``, holds phones, not words
 _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
 
 
 def is_subtitles(text: str) -> bool:
     """Return whether a text is a file of subtitles or lyrics."""
-    forms = (SUBSTATION, CUE, SBV, LYRICS)
-    return text.startswith("WEBVTT") or COUNTED.match(text) is not None or any(form.search(text) for form in forms)
+    begins = text.startswith("WEBVTT") or MARKS["COUNTED"].match(text) is not None
+    return begins or any(MARKS[form].search(text) for form in ("SUBSTATION", "CUE", "SBV", "LYRICS"))
+
+
+def convert_timecodes(text: str, where: str) -> str:
+    """Return a text with clocks for its timecodes, and arrows between two at the start of a line, as in subtitles.
+
+    Their rate is the lowest usual one that has all these frames, which a warning says (``where`` empty: nothing does).
+    """
+    codes = MARKS["TIMECODE"].finditer(text)
+    frames = [max(int(code[4]), 29 * (";" in code[0])) for code in codes]  # 29.97 drops frames
+    rate = next((rate for rate in FRAME_RATES if rate > max(frames, default=0)), 0)
+    if len(frames) < 2 or not rate:
+        return text
+    if where:
+        LOG.warning("%s: its times count frames, taken for %d a second; give seconds if that is wrong", where, rate)
+    text = MARKS["TIMECODE"].sub(lambda code: f"{code[1]}:{code[2]}:{int(code[3]) + int(code[4]) / rate:06.3f}", text)
+    named = MARKS["PREMIERE"].sub(r"\1 --> \2\n\3: ", text)
+    return MARKS["TWO_CLOCKS"].sub(r"\1 --> \2\n", named)
 
 
 def parse_subtitles(text: str, where: str) -> LabelTier:
@@ -74,16 +64,16 @@ def parse_subtitles(text: str, where: str) -> LabelTier:
     Raises InputError: times that are damaged or end before they start, with their line; too many cues or words; frames
     of an unknown rate.
     """
-    text = _convert_counts(text, where) if COUNTED.match(text) else text
-    is_dialogue = SUBSTATION.search(text) is not None
-    read = _read_lyrics if LYRICS.search(text) else _read_dialogue if is_dialogue else _read_cues
+    text = _convert_counts(text, where) if MARKS["COUNTED"].match(text) else text
+    is_dialogue = MARKS["SUBSTATION"].search(text) is not None
+    read = _read_lyrics if MARKS["LYRICS"].search(text) else _read_dialogue if is_dialogue else _read_cues
     labels = (replace(cue, parts=_split_words(cue)) for cue in _drop_repetitions(list(read(text, where))))
     return LabelTier("subtitles", tuple(labels), LINES)
 
 
 def _convert_counts(text: str, where: str) -> str:
     """Return lines that begin with counts of frames or tenths of a second with times instead, as those of lyrics."""
-    stated = RATE.match(text)
+    stated = MARKS["RATE"].match(text)
     if text[0] == "{" and not stated:
         problem = "is MicroDVD, whose times are in frames, and says no rate"
         raise InputError(f"{where}: {problem}; required: frames a second in the first line, as {{1}}{{1}}25.000")
@@ -93,29 +83,31 @@ def _convert_counts(text: str, where: str) -> str:
         edges = [line[5]] if line[5] else [clock(int(edge) / per_s, ".") for edge in line.group(2, 3) if edge]
         return f"[{' -> '.join(edges)}]" + (line[4] or "").replace("|", " ")
 
-    return COUNTED.sub(time_line, RATE.sub("", text, count=1) if stated else text)
+    return MARKS["COUNTED"].sub(time_line, MARKS["RATE"].sub("", text, count=1) if stated else text)
 
 
 def strip_markup(text: str) -> str:
     """Return what is said of subtitles as a text. Raises InputError: as ``parse_subtitles``."""
     lines = [label.text for label in parse_subtitles(text, "the text").labels]
     names = find_speaker_names(lines)
-    return "\n".join(extract_spoken_text(WORD_TIME.sub("", line), names) for line in lines)
+    return "\n".join(extract_spoken_text(MARKS["WORD_TIME"].sub("", line), names) for line in lines)
 
 
 def _read_lyrics(text: str, where: str) -> Iterator[TimedLabel]:
     """Yield the lines of lyrics in order, each to the next; several times before a line repeat it."""
     cues: list[TimedLabel] = []
+    if re.search(r"\[\d\d:\d\d:[6-9]\d\]", text):  # hundredths
+        text = re.sub(r"\[(\d\d:\d\d):(\d\d)\]", r"[\1.\2]", text)
     offset = re.search(r"\[offset:\s?([+-]?\d{1,7})\s?\]", text)
     early_s = int(offset[1]) / 1000 if offset else 0.0
     for number, row in enumerate(StringIO(text), 1):
         line = row.strip()
-        timed = LYRICS_LINE.fullmatch(line)
+        timed = MARKS["LYRICS_LINE"].fullmatch(line)
         if timed is None:
-            if cues and not re.fullmatch(LYRICS_TAG, line):
+            if cues and not re.fullmatch(MARKS["LYRICS_TAG"], line):
                 cues[-1] = replace(cues[-1], text=f"{cues[-1].text}\n{line}")
             continue
-        for time in LYRICS_TIME.finditer(timed[1]):
+        for time in MARKS["LYRICS_TIME"].finditer(timed[1]):
             check_count(len(cues), where)
             place = f"line {number}"
             edges_s = [require_time(edge, place, where) - early_s for edge in (time[1] or time[2], time[3]) if edge]
@@ -129,8 +121,8 @@ def _read_cues(text: str, where: str) -> Iterator[TimedLabel]:
     cue, lines, count = None, list[str](), 0
     for number, row in enumerate(StringIO(text), 1):
         line = row.rstrip("\r\n")
-        times = (TIMES.fullmatch(line) or SBV.fullmatch(line)) if ":" in line else None
-        if times is None and (CUE.match(line) or NO_ARROW.match(line)):
+        times = (MARKS["TIMES"].fullmatch(line) or MARKS["SBV"].fullmatch(line)) if ":" in line else None
+        if times is None and (MARKS["CUE"].match(line) or MARKS["NO_ARROW"].match(line)):
             wanted = "00:00:01,000 --> 00:00:02,500"
             raise InputError(f"{where}: line {number} is {shorten(line.strip())!r}; required times as in {wanted}")
         if times is None:
@@ -153,7 +145,7 @@ def _join_shown(lines: list[str]) -> str:
     parts: list[str] = []
     hidden = False
     for before, line in zip(["-", *lines], lines, strict=False):
-        hidden = (hidden and bool(line)) or (not before and NO_CUE.match(line) is not None)
+        hidden = (hidden and bool(line)) or (not before and MARKS["NO_CUE"].match(line) is not None)
         if line.strip() and not hidden:
             parts.append(line)
     return "\n".join(parts)
@@ -162,7 +154,10 @@ def _join_shown(lines: list[str]) -> str:
 def _drop_repetitions(cues: list[TimedLabel]) -> list[TimedLabel]:
     """Return cues without the lines that captions that scroll repeat."""
     plain = [
-        tuple(extract_spoken_text(" ".join(WORD_TIME.sub("", line).split())).strip() for line in cue.text.split("\n"))
+        tuple(
+            extract_spoken_text(" ".join(MARKS["WORD_TIME"].sub("", line).split())).strip()
+            for line in cue.text.split("\n")
+        )
         for cue in cues
     ]
     bridges = sum(
@@ -182,7 +177,7 @@ def _drop_repetitions(cues: list[TimedLabel]) -> list[TimedLabel]:
 def _split_words(cue: TimedLabel) -> tuple[TimedLabel, ...]:
     """Return the words of a cue with times, where these stand between them."""
     text = cue.text
-    marks = list(WORD_TIME.finditer(text))
+    marks = list(MARKS["WORD_TIME"].finditer(text))
     if not marks:
         return ()
     edges = [0, *(mark.end() for mark in marks)]
@@ -208,17 +203,17 @@ def _read_dialogue(text: str, where: str) -> Iterator[TimedLabel]:
             check_count(number, where)
             values = rest.split(",", maxsplit=len(fields) - 1)
             by_name = dict(zip(fields, values, strict=False))
-            start, end = (re.fullmatch(TIME, by_name.get(edge, "").strip()) for edge in ("start", "end"))
+            start, end = (re.fullmatch(MARKS["TIME"], by_name.get(edge, "").strip()) for edge in ("start", "end"))
             if start is None or end is None or len(values) < len(fields):
                 wanted = "Dialogue: 0,0:00:01.00,0:00:02.50,Default,,0,0,0,,Words"
                 raise InputError(f"{where}: line {number} is {shorten(line)!r}; required a line as {wanted}")
             shown, drawing = "", False
-            for place, part in enumerate(STYLES.split(by_name.get("text", values[-1]))):
-                modes = DRAWING_MODE.findall(part) if place % 2 else []  # of a tag
+            for place, part in enumerate(MARKS["STYLES"].split(by_name.get("text", values[-1]))):
+                modes = MARKS["DRAWING_MODE"].findall(part) if place % 2 else []  # of a tag
                 drawing = modes[-1] != "0" if modes else drawing
                 shown += "" if drawing or place % 2 else part
             times = (parse_clock(start[1]), parse_clock(end[1]))
-            yield TimedLabel(*times, BREAK.sub("\n", shown), f"line {number}")
+            yield TimedLabel(*times, MARKS["BREAK"].sub("\n", shown), f"line {number}")
 
 
 def clock(seconds: float, mark: str) -> str:

@@ -43,7 +43,9 @@ TAKE_DECIMALS = 6
 BEFORE_CURVES = ("Timecode", "BlendshapeCount")
 FIRST, COUNT = (name.lower() for name in BEFORE_CURVES)
 """Names of the first two columns of the app; capitals do not matter, for versions of the app differ."""
-NO_CURVES = re.compile(r"(?:|unnamed:?0|(?:frame|face)?(?:index|idx|id|number|no|num)?s?|blendshapecount|neutral)")
+NO_CURVES = re.compile(
+    r"(?:|unnamed:?0|(?:frame|face)?(?:index|idx|id|number|no|num)?s?|blendshapecount|neutral|success|confidence)"
+)
 """Names of columns that are not curves: numbers of frames and faces, and what MediaPipe calls neutral."""
 SCORES = ("score", "value", "weight", "coefficient")
 TIMECODE_RATES = (24, 25, 30, 48, 50, 60, 120)
@@ -157,7 +159,9 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
                 f"the first line is {shorten(','.join(names))!r}, required 'time_s,opening,...', or curves "
                 "beside a column of times: Timecode,BlendshapeCount,JawOpen,... or timestamp_ms,jawOpen,..."
             )
-        times, names, values = _read_rows(table.rows, names, timed, used, keys.index(COUNT) if COUNT in keys else None)
+        counted = next((keys.index(name) for name in (COUNT, "success") if name in keys), None)
+        rows = _choose_face(table.rows, keys.index("faceid")) if "faceid" in keys else table.rows
+        times, names, values = _read_rows(rows, names, timed, used, counted)
         coded = bool(re.search("[:;]", times[0][1]))
         if coded:
             time_s = _read_timecodes([_parse_timecode(text, line) for line, text in times])
@@ -166,6 +170,19 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
             written = np.array([parse_numbers([text], line)[0] for line, text in times])
             time_s = steady_rate.convert_times(written, keys[timed])
         return steady_rate.resample_rows(names, time_s, values, WEIGHT if coded else EYE_DISTANCE)
+
+
+def _choose_face(rows: Iterator[tuple[int, list[str]]], column: int) -> Iterator[tuple[int, list[str]]]:
+    """Yield the rows of the first face; a warning says how many of others there are (OpenFace's)."""
+    first, others = None, 0
+    for line, fields in rows:
+        face = fields[column].strip() if column < len(fields) else None
+        first = first or face
+        others += face != first
+        if face == first:
+            yield line, fields
+    if others:
+        LOG.warning("%d rows are of other faces than the first one (%s), and are left out", others, first)
 
 
 def _read_rows(
@@ -180,7 +197,7 @@ def _read_rows(
         times.append((line, fields[timed].strip() if timed < len(fields) else ""))
         curves = [fields[column] for column in used if column < len(fields)]
         if not any(map(str.strip, curves)) or (
-            counted is not None and fields[counted : counted + 1] in (["0"], [" 0"])
+            counted is not None and [field.strip() for field in fields[counted : counted + 1]] == ["0"]
         ):
             continue
         if len(fields) != columns:

@@ -26,45 +26,18 @@ from lipmotion.formats.label_tiers import (
     to_phone,
 )
 from lipmotion.storage.sources import read_shipped_table
+from lipmotion.units.spelling import read_patterns
 from lipmotion.units.spoken_text import SpokenAs, classify_label
 
 SHORTEST_TICKS = 10_000  # whole numbers below a millisecond are no ticks at sight: "20 30 people" is a sentence
 LONG_SPAN = 45  # Whole numbers in order that are further apart than this are no seconds
-NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?|nan|inf"
-WHOLE = re.compile(r"(?P<start>\d+)[\s,;]\s*(?P<end>\d+)[\s,;]\s*(?P<text>\S+)(?:\s.*)?")
-POINTS = re.compile(r"(?P<start>\d+|\d*\.\d+)\s+(?:-?\d{1,3}\s+)?(?P<text>[^\d\s;]\S*)\s*(?:;.*)?")
-"""A start or an end alone, perhaps a colour, a label: of HTK in ticks; of ESPS, Festival and people in seconds."""
-ESPS = re.compile(r"\A(?:[^\n]*\n){0,20}?#[ \t]*\n(?=\s*[\d.]+\s)")
-"""The header of ESPS and Festival, whose lines say where labels end."""
-_SECONDS = r"[-+]?\d*\.\d+|[-+]?\d+,\d+(?=\t|$)"
-SECONDS = re.compile(rf"(?P<start>{_SECONDS})\s+(?P<end>{_SECONDS})(?:\s+(?P<text>.*))?")
-CTM = re.compile(
-    rf"(?P<recording>\S+)\s+(?!\d*\.\d)(?P<speaker>\S+)\s+(?P<start>{NUMBER})\s+(?P<duration>{NUMBER})\s+"
-    rf"(?P<text>\S+)(?:\s+(?:{NUMBER}|NA))?(?:\s.*)?"
-)
-STM = re.compile(
-    rf"(?P<recording>\S+)\s+\S+\s+(?P<speaker>\S+)\s+(?P<start>{NUMBER})\s+(?P<end>{NUMBER})\s+"
-    r"(?:<[^<>]*>\s*)?(?P<text>.*)"
-)
-"""Those of CTM and STM have a recording, a channel or a speaker, and times in seconds."""
-RTTM = re.compile(r"(?:SPEAKER|SPKR-INFO)\s+\S+\s+\S+\s")
+MARKS = read_patterns(Path(__file__).with_name("timed_lines.tsv"))
+"""Patterns of lines and their times, by their names in the table."""
 COMMENT = (";;", "#")
-LRS_TEXT = re.compile(r"\s*Text:[ \t]+(\S.*)")  # the first line of a text of LRS: what is said
-LRS_WORDS = re.compile(r"^WORD[ \t]+START[ \t]+END\b.*$", re.MULTILINE)
 COLUMNS = {row["column"]: {*row["names"].split()} for row in read_shipped_table(__package__, "label_columns.csv")}
 """Names of columns of tables: of the Montreal Forced Aligner, of Praat, of people."""
-UNIT_END = re.compile(
-    r"(?:[\s_]+(?:-\s)?|[\s_]*[(\[])(?:hh:mm:ss(?:[:.]\w+)?|(?:ss\.)?m?s(?:ecs?)?|(?:milli)?seconds?)[)\]]?$"
-)
-"""A unit at the end of a name, which how long words last tells, too: ``start_ms``, ``Start (s)``."""
-ELAN_TIME = r"(?:\t[\d:]+[.,]\d+)"
-HEADLESS = (
-    (re.compile(rf"[^\t]+\t[^\t]*{ELAN_TIME}{{3}}\t[^\t]*"), "tier\tparticipant\tstart\tend\tduration\ttext"),
-    (re.compile(rf"[^\t]+\t[^\t]*{ELAN_TIME}{{6}}\t[^\t]*"), "tier\tparticipant\t\tstart\t\tend\t\tduration\ttext"),
-    (re.compile(r"[^,]*,\d*\.\d+,\d*\.\d+,.*"), "name,start,end,text"),
-    (re.compile(r"\d*\.\d+,\d*\.\d+,.*"), "start,end,text"),
-)
-"""The first line of tables without a header, and theirs: of ELAN, of aeneas, of people."""
+HEADLESS = {name.replace(" ", "\t"): form for name, form in MARKS.items() if "start" in name}
+"""The first line of tables without a header, by theirs: of ELAN, of aeneas, of people."""
 TIMIT_HZ, TIMIT_SUFFIXES, TIMIT_SILENCE = 16_000, (".phn", ".wrd"), "h#"
 LONGEST_SAMPLES, LAST_SAMPLE = 50_000, 1e7
 """Most samples that the middle label, and those that a whole file, lasts: more are ticks."""
@@ -81,18 +54,19 @@ def parse_line_tiers(text: str, where: str) -> list[LabelTier] | None:
     One time a line is that of the end under the header of ESPS, or where the first label is silence and ends after 0.
     Raises InputError: a later line is of another form, or has a time that is none; or starts that may be ends.
     """
-    if esps := ESPS.match(text):
+    text = re.sub(r"\A\t(?=\S)", "#\t", re.sub(r"\A\ufeff?sep=.[ \t\r]*\n", "\n", text))  # Excel's, pandas'
+    if esps := MARKS["ESPS"].match(text):
         return _read_points(_lines("\n" * esps[0].count("\n") + text[esps.end() :]), where, ends=True)
     lines = _lines(text)
     first = lines[0][1] if lines else ""
-    if RTTM.match(first):
+    if MARKS["RTTM"].match(first):
         raise InputError(f"{where}: is RTTM, which says who speaks and no words; give a transcript or labels")
-    if SECONDS.fullmatch(first):
-        return parse_seconds(_read_form(lines, SECONDS, where), where)
-    header = next((header for form, header in HEADLESS if form.fullmatch(first)), "")
+    if MARKS["SECONDS"].fullmatch(first):
+        return parse_seconds(_read_form(lines, MARKS["SECONDS"], where), where)
+    header = next((header for header, form in HEADLESS.items() if form.fullmatch(first)), "")
     if columns := _find_columns(header or first):
         return _read_table(lines, columns, where, header)
-    if LRS_TEXT.match(text):
+    if MARKS["LRS_TEXT"].match(text):
         return _read_lrs(text, where)
     tiers = (read(lines, where) for read in (_read_wholes, _read_starts, _read_nist) if lines)
     return next((each for each in tiers if each is not None), None)
@@ -135,21 +109,23 @@ def _read_form(lines: Lines, form: re.Pattern[str], where: str, role: str = "") 
 def _read_nist(lines: Lines, where: str) -> list[LabelTier] | None:
     """Return the words of a CTM or the lines of an STM."""
     spoken = [line for line in lines if not line[1].startswith(COMMENT)]
-    matches = ((form, form.fullmatch(spoken[0][1][:1000] if spoken else "")) for form in (STM, CTM))
+    first = spoken[0][1][:1000] if spoken else ""
+    matches = ((MARKS[name], MARKS[name].fullmatch(first)) for name in ("STM", "CTM"))
     found = ((form, match) for form, match in matches if match and "." in match[3] + match[4])
-    form = next((form for form, match in found if not re.match(rf"(?:{NUMBER})(?:\s|$)", match["text"])), None)
-    return form and _read_form(spoken, form, where, "" if form is CTM else LINES)  # Kaldi writes phones in CTM, too
+    form = next((form for form, match in found if not MARKS["BEGINS_NUMBER"].match(match["text"])), None)
+    role = "" if form is MARKS["CTM"] else LINES  # Kaldi writes phones in CTM, too
+    return form and _read_form(spoken, form, where, role)
 
 
 def _read_wholes(lines: Lines, where: str) -> list[LabelTier] | None:
     """Return labels in ticks, samples or milliseconds, if whole numbers are times: large, or in order and far apart."""
-    matches = [WHOLE.fullmatch(line) for _, line in lines[:1000]]
+    matches = [MARKS["WHOLE"].fullmatch(line) for _, line in lines[:1000]]
     spans = [(int(match[1]), int(match[2])) for match in matches if match and len(match[1]) < 15 > len(match[2])]
     in_order = len(matches) == len(spans) > 2 and all(a <= b for a, b in spans) and spans == sorted(spans)
     long = in_order and median(end - start for start, end in spans) > LONG_SPAN
     if matches[0] is None or not (long or float(matches[0][2]) >= SHORTEST_TICKS):
         return None
-    (tier,) = _read_form(lines, WHOLE, where)
+    (tier,) = _read_form(lines, MARKS["WHOLE"], where)
     lengths = [label.end_s - label.start_s for label in tier.labels if label.end_s > label.start_s]
     is_timit = Path(where).suffix.lower() in TIMIT_SUFFIXES or any(each.text == TIMIT_SILENCE for each in tier.labels)
     short = bool(lengths) and median(lengths) < LONGEST_SAMPLES and tier.labels[-1].end_s < LAST_SAMPLE
@@ -161,11 +137,12 @@ def _read_wholes(lines: Lines, where: str) -> list[LabelTier] | None:
 
 def _read_starts(lines: Lines, where: str) -> list[LabelTier] | None:
     """Return labels that each last to the next one, or from the one before, in ticks or seconds."""
-    first, last = POINTS.fullmatch(lines[0][1]), POINTS.fullmatch(lines[-1][1])
+    first, last = MARKS["POINTS"].fullmatch(lines[0][1]), MARKS["POINTS"].fullmatch(lines[-1][1])
     if first is None or last is None or len(lines) < 2:
         return None
     late, in_seconds = float(first[1]) > 0, "." in first[1]
-    if not (all(POINTS.fullmatch(line) for _, line in lines) if in_seconds else float(last[1]) >= SHORTEST_TICKS):
+    are_points = (MARKS["POINTS"].fullmatch(line) for _, line in lines)
+    if not (all(are_points) if in_seconds else float(last[1]) >= SHORTEST_TICKS):
         return None
     if in_seconds and late and classify_label(first[2]) is not SpokenAs.SILENCE:
         problem = f"has one time a line, {first[1]} in the first"
@@ -175,7 +152,7 @@ def _read_starts(lines: Lines, where: str) -> list[LabelTier] | None:
 
 def _read_points(lines: Lines, where: str, *, ends: bool) -> list[LabelTier]:
     """Return the labels of lines with one time: their ends, else their starts."""
-    (tier,) = _read_form(lines, POINTS, where)
+    (tier,) = _read_form(lines, MARKS["POINTS"], where)
     per_s = 1 if any("." in line.split()[0] for _, line in lines) else TICKS_PER_S
     times_s = [label.start_s / per_s for label in tier.labels]
     edges_s = [0.0, *times_s] if ends else [*times_s, math.inf]
@@ -185,7 +162,7 @@ def _read_points(lines: Lines, where: str, *, ends: bool) -> list[LabelTier]:
 
 def _read_lrs(text: str, where: str) -> list[LabelTier]:
     """Return the words of a text of LRS: with times where it has a table ``WORD START END`` of seconds."""
-    heading = LRS_WORDS.search(text)
+    heading = MARKS["LRS_WORDS"].search(text)
     if heading is None:
         words = text.strip().splitlines()[0].partition(":")[2].strip()
         return [LabelTier("Text", (TimedLabel(math.nan, math.nan, words, "line 1"),), LINES)]
@@ -198,7 +175,8 @@ def _find_columns(line: str) -> dict[str, int]:
     """Return the columns of a table whose first line names a start, an end or a duration, and a text; else none."""
     if len(line) > 1000 or "\ufeff" in line:
         return {}
-    names = [re.sub(r"[\s_]", "", UNIT_END.sub("", name.strip(' "').lower())) for name in re.split(r"[,;\t]", line)]
+    plain = (name.strip(' "').lower() for name in re.split(r"[,;\t]", line))
+    names = [re.sub(r"[\s_]", "", MARKS["UNIT_END"].sub("", name)) for name in plain]
     columns = {kind: place for kind, known in COLUMNS.items() for place, name in enumerate(names) if name in known}
     return columns if {"start", "text"} <= columns.keys() and {"end", "duration"} & columns.keys() else {}
 
@@ -210,12 +188,20 @@ def _read_table(lines: Lines, columns: dict[str, int], where: str, given: str = 
     kinds: dict[tuple[str, str], list[TimedLabel]] = defaultdict(list)
     named = re.split(r"[,;\t]", header)[columns["text"]].strip(' "').lower()
     named = "" if named in ("text", "label") else named
+    if "frame" in re.split(r"[,;\t]", header)[columns["start"]].lower():
+        raise InputError(f"{where}: its times are frames, whose rate is not known; required seconds")
     check_count(len(lines), where)
+    joined: Lines = []  # a text in quotes may have line ends
     for number, line in lines[0 if given else 1 :]:
+        first, before = joined.pop() if joined and joined[-1][1].count('"') % 2 else (number, "")
+        joined.append((first, f"{before} {line}".strip()))
+    for number, line in joined:
         place = f"line {number}"
         try:
             fields = next(csv.reader([line], delimiter=delimiter))
             fields += [""] if columns["text"] == len(fields) else []  # of a line that is empty
+            if columns["text"] == header.count(delimiter):  # in the last column, a text without quotes
+                fields[columns["text"] :] = [delimiter.join(fields[columns["text"] :])]
             known = {kind: at for kind, at in columns.items() if at < len(fields) or kind != "speaker"}
             row = {kind: fields[column] for kind, column in known.items()}
             times = (row["start"], row.get("end") or row["duration"])

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shorten
+from lipmotion.errors import InputError, shorten, shorten_list
 from lipmotion.printable import is_formula
 
 EYE_DISTANCE = "eye_distance"  # the unit of all tracked lengths: the distance between the outer eye corners
@@ -83,8 +83,7 @@ class Motion:
     def column(self, name: str) -> int:
         """Return the column of a channel in ``values``. Raises InputError: no such channel."""
         if name not in self.names:
-            some = ", ".join(self.names[:6]) + (", ..." if len(self.names) > 6 else "")
-            raise InputError(f"no motion channel {name!r} among {len(self.names)}: {some}")
+            raise InputError(f"no motion channel {name!r} among {len(self.names)}: {shorten_list(self.names, 6)}")
         return self.names.index(name)
 
     def selected(self, names: Sequence[str]) -> Motion:

@@ -41,6 +41,8 @@ IPA_PHONES: dict[str, tuple[str, ...]] = {letter: (vowel.phone,) for letter, vow
 }
 """IPA symbols to phones of the inventory; the longest symbol counts."""
 _LONGEST = max(map(len, IPA_PHONES))
+ROMAJI, PINYIN = read_table("romaji"), read_table("pinyin")
+ONLY_ROMAJI = frozenset("cl ch sh ky gy ny hy by my py ry ty dy".split())
 XSAMPA = read_table("xsampa") | {letter: letter for letter in "abcdefhijklmnopqrstuvwxyz"}
 """X-SAMPA's symbols, and so SAMPA's of WebMAUS, in IPA."""
 _XSAMPA_SYMBOL = re.compile("|".join(map(re.escape, sorted(XSAMPA, key=len, reverse=True))) + r"|_[^\s\\]\\?|[`^-]")
@@ -48,6 +50,19 @@ _IGNORED = frozenset("'#\"ˈˌː.|‿^-_*!?;:,~%<>ˑʰʲˤˠʼʱⁿˡ0123456789(
 """Marks that no mouth shape depends on; further ones are combining marks and tones."""
 _TIES = str.maketrans("", "", "͜͡")
 UNKNOWN = ("ax",)  # what a letter becomes of which nothing is known: the mouth at ease, slightly open
+
+
+def find_spelling(labels: Sequence[str]) -> dict[str, str]:
+    """Return the IPA of phones in romaji, or in pinyin with tones, if all are such; none of any other.
+
+    >>> find_spelling(["k", "o", "N", "ch", "i"])["ch"], find_spelling(["h", "ao3"])["ao3"], find_spelling(["k", "o"])
+    ('tʃ', 'aʊ', {})
+    """
+    if ONLY_ROMAJI & {*labels} and {*labels} <= ROMAJI.keys():
+        return ROMAJI
+    plain = {label: re.sub(r"(?<=[a-zü])[1-5]$", "", label) for label in labels}
+    is_pinyin = any(plain[label] != label for label in labels) and {*plain.values()} <= PINYIN.keys()
+    return {label: PINYIN[name] for label, name in plain.items()} if is_pinyin else {}
 
 
 @cache

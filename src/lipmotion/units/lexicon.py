@@ -21,7 +21,7 @@ from lipmotion.storage.sources import read_text_file
 from lipmotion.types.languages import ENGLISH, LANGUAGES, find_script
 from lipmotion.units.ipa_phones import read_tokens
 from lipmotion.units.phones import OTHER_NAMES, PAUSE, PHONES, REDUCED_VOWELS, describe_unknown_phone, is_silent
-from lipmotion.units.spelling import guess_pronunciation, normalise_text, read_table, remove_accents
+from lipmotion.units.spelling import guess_pronunciation, normalise_text, read_patterns, read_table, remove_accents
 from lipmotion.units.written_forms import list_readings
 
 LONGEST_WORD = 30  # letters of the longest word that is read by the network: longer ones are web addresses and noise
@@ -62,11 +62,11 @@ LARGEST_LEXICON_BYTES = 1 << 25  # of a user's file; the dictionary of 134,000 w
 LONGEST_PRONUNCIATION = 1000  # most phones of a word
 OFTEN_LENGTHENED = frozenset("no so go do to who hello yo bro ho he me we she be the long stop".split())
 """Words that are meant rather than those with their vowel twice (``noo``, ``loong``, ``stoop``)."""
-LENGTHENED, REPEATED = re.compile(r"(.)\1\1|^(..+?)\2"), re.compile(r"([a-z]{2,4}?)\1+h?")
+MARKS = read_patterns(Path(__file__).with_name("tables") / "lexicon.tsv")
+"""Patterns of words and of entries of lexicons, by their names in the table."""
 SOUNDED = re.compile(r"(?=.*(.)\1\1|.*rr\Z|p[sf]{2})(?!([^fhmrsvz])\2*\Z)[b-df-hj-np-tv-xz]+\Z")
 """Sounds in letters: ``brrr``, ``psst``, ``fff``; no dictionary has them, and their letters are not spelled."""
 LONGEST_LENGTHENED, MAX_LENGTHENED = 100, 5  # a word of more letters, or with more that are doubled, is none of these
-VARIANT_NUMBER = re.compile(r"\(\d+\)$")  # the number by which the dictionary marks a further pronunciation
 MAX_VARIANTS = 32
 """Most pronunciations of a word: alignment tries each after each of the word before. The dictionary has up to six."""
 
@@ -116,13 +116,13 @@ class Lexicon:
         user: dict[str, list[Pronunciation]] = {}
         for number, line in enumerate(StringIO(text), start=1):
             where = f"{path}, line {number}"
-            word, *labels = re.split("#|;;;", line, maxsplit=1)[0].split() or [""]
-            if not word:
+            word, *labels = MARKS["ENTRY"].sub(r"\1 ", re.split("#|;;;", line, maxsplit=1)[0]).split() or [""]
+            if not word or MARKS["NO_WORD"].fullmatch(word):
                 continue
             if not 0 < len(labels) <= LONGEST_PRONUNCIATION:
                 what = f"{len(labels)} phones after a word, required 1 to {LONGEST_PRONUNCIATION}"
                 raise InputError(f"{where}: {what}; write a pronunciation of a word a line")
-            word = VARIANT_NUMBER.sub("", normalise_text(word)).strip("'")  # as in ``split_words``
+            word = MARKS["VARIANT_NUMBER"].sub("", normalise_text(word)).strip("'")  # as in ``split_words``
             phones = tuple([find_phone(label) or "" for label in labels])
             for label, phone in zip(labels, phones, strict=True):
                 if not phone or is_silent(phone):
@@ -193,7 +193,7 @@ def expand_lengthened(word: str) -> tuple[tuple[str, ...], ...]:
     Letters that stand there three times and more are meant once or twice: ``nooo``, ``boooom``; or a part is repeated.
     """
     plain = remove_accents(word)
-    if not LENGTHENED.search(plain) or len(plain) > LONGEST_LENGTHENED or list_entries(word):
+    if not MARKS["LENGTHENED"].search(plain) or len(plain) > LONGEST_LENGTHENED or list_entries(word):
         return ()
     runs = [match[0] for match in re.finditer(r"(.)\1*", plain)]
     choices = [
@@ -204,7 +204,7 @@ def expand_lengthened(word: str) -> tuple[tuple[str, ...], ...]:
         shortest = 3 if SOUNDED.fullmatch(plain) else 1  # "sss" is no name of a letter
         known = [each for each in map("".join, product(*choices)) if len(each) >= shortest and list_entries(each)]
         return tuple((each,) for each in sorted(known, key=lambda each: each not in OFTEN_LENGTHENED))
-    match = REPEATED.fullmatch(plain)
+    match = MARKS["REPEATED"].fullmatch(plain)
     return ((match[1],) * match[0].count(match[1]),) if match and list_entries(match[1]) else ()
 
 
@@ -294,6 +294,10 @@ def detect_language(words: Sequence[str]) -> str:
     (first, highest), (_, second) = counts.most_common(2)
     if highest >= max(MIN_COMMON, AHEAD * second):
         return first
+    if highest > counts[ENGLISH]:  # a few words: better none than a wrong one
+        return first if 1 < highest > second else ""
+    if not counts[ENGLISH] and 2 * sum(word != remove_accents(word) for word in words) >= len(words):
+        return ""
     return ENGLISH if sum(map(Lexicon().known, words)) >= MIN_KNOWN * len(words) else ""
 
 

@@ -16,7 +16,19 @@ def parse_table(rows: str) -> dict[str, str]:
 
 def read_table(name: str) -> dict[str, str]:
     """Return a table of the package (``tables/NAME.tsv``): a key, a tab and a value a line; ``# `` begins a comment."""
-    text = Path(__file__).with_name("tables").joinpath(f"{name}.tsv").read_text(encoding="utf-8")
+    return _read_rows(Path(__file__).with_name("tables") / f"{name}.tsv")
+
+
+def read_patterns(path: Path) -> dict[str, re.Pattern[str]]:
+    """Return the regular expressions of a table as of ``read_table``; ``<NAME>`` in one is that of a row before."""
+    patterns: dict[str, str] = {}
+    for name, form in _read_rows(path).items():
+        patterns[name] = re.sub("<([A-Z_]{3,})>", lambda piece: patterns[piece[1]], form)
+    return {name: re.compile(pattern) for name, pattern in patterns.items()}
+
+
+def _read_rows(path: Path) -> dict[str, str]:
+    text = path.read_text(encoding="utf-8")
     rows = (line.partition("\t") for line in text.splitlines() if not line.startswith("# "))
     return {key: value for key, _, value in rows}
 
@@ -26,18 +38,12 @@ SPELLINGS = read_table("spellings")
 LONG_VOWELS = {"a": "ey", "e": "iy", "i": "ay", "o": "ow", "u": "uw"}
 ACCENTS = re.compile("[\u0300-\u036f]")  # the accents of Latin letters; the marks of other scripts are sounds
 _LONGEST = max(map(len, SPELLINGS))
-_SILENT_E = re.compile(r"e'?s?")  # a silent e, with or without an s, at the end of a word
-_LONG_VOWEL = re.compile(r"[aeiou][bcdfgklmnpstvz]e('?s)?$")  # a long vowel: vowel, consonant, final e
 
 
 MAX_MARKS = 30  # largest number of accents on one letter; no language has so many
-APOSTROPHES = re.compile("[’‘ʼʻ′´`‛ʹ＇]")
-UNSPOKEN = re.compile("\u00ad\\s*\n\\s*|[™®©]")
-"""A soft hyphen at the end of a line, and signs that Unicode's NFKC makes letters of."""
-DASHES = str.maketrans({"‐": "-", "‒": "-", "²": " squared", "³": " cubed", "″": '"'})
-POWERS = re.compile("(?<=\\d)[⁰¹²³⁴-⁹]+")
-NOTES = re.compile("(?:(?<=[^\\W\\d_]{4})|(?<=[.,;:!?”’)]))[¹²³⁴-⁹][⁰¹²³⁴-⁹]*")
-"""What is raised: powers (``10⁵``), and the numbers of notes, which are not said."""
+MARKS = read_patterns(Path(__file__).with_name("tables") / "letters.tsv")
+"""Patterns of apostrophes and of what is not said or raised, by their names in the table."""
+DASHES = str.maketrans({"‐": "-", "‒": "-", "²": " squared", "³": " cubed", "∞": " infinity ", "√": " root ", "″": '"'})
 PLAIN = str.maketrans({"ß": "ss", "æ": "ae", "œ": "oe", "ø": "o", "đ": "d", "ð": "th", "þ": "th", "ł": "l", "ı": "i"})
 """Letters of Latin alphabets that Unicode does not divide into a letter and an accent."""
 
@@ -48,8 +54,10 @@ def convert_to_plain(text: str) -> str:
         marks = re.escape("".join(c for c in set(text) if unicodedata.combining(unicodedata.normalize("NFKD", c)[0])))
         if marks:  # at most so many on a letter, as Unicode Standard Annex 15: they are sorted in quadratic time
             text = re.sub(f"([{marks}]{{{MAX_MARKS}}})[{marks}]+", r"\1", text)
-        text = re.sub(r"(?<=\d)(?=[¼-¾⅐-⅞])", " ", UNSPOKEN.sub("", APOSTROPHES.sub("'", text)))
-        text = POWERS.sub(lambda power: f"^{unicodedata.normalize('NFKC', power[0])}", NOTES.sub("", text))
+        text = re.sub(r"(?<=\d)(?=[¼-¾⅐-⅞])", " ", MARKS["UNSPOKEN"].sub("", MARKS["APOSTROPHES"].sub("'", text)))
+        text = MARKS["POWERS"].sub(
+            lambda power: f"^{unicodedata.normalize('NFKC', power[0])}", MARKS["NOTES"].sub("", text)
+        )
         text = unicodedata.normalize("NFKC", text.translate(DASHES)).translate(DASHES)
         text = "".join(letter for letter in text if unicodedata.category(letter) != "Cf")
         text = re.sub(r"\d", lambda digit: str(int(digit[0])), text)
@@ -80,10 +88,10 @@ def guess_pronunciation(word: str) -> tuple[str, ...]:
     letters = re.sub(r"([b-df-hj-np-tv-z])\1+", r"\1", plain)  # doubled consonants sound once
     at = 0
     while at < len(letters):
-        if phones and _SILENT_E.fullmatch(letters, at):
+        if phones and MARKS["SILENT_E"].fullmatch(letters, at):
             phones += ["z"] * letters.endswith("s")
             break
-        if _LONG_VOWEL.match(letters, at):
+        if MARKS["LONG_VOWEL"].match(letters, at):
             phones.append(LONG_VOWELS[letters[at]])
             at += 1
             continue

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from enum import Enum
 from itertools import pairwise
+from pathlib import Path
 from typing import NamedTuple
 
 from lipmotion.errors import InputError, shorten
@@ -19,53 +20,14 @@ from lipmotion.types import TimedWord, Timeline, Unit
 from lipmotion.types.delivery import MANNERS, MOODS, NEUTRAL, PLAIN, MoodKey, MoodTag, sort_moods
 from lipmotion.types.values import parse_clock
 from lipmotion.units.phone_timelines import group_words
-from lipmotion.units.spelling import read_table
+from lipmotion.units.spelling import read_patterns, read_table
 from lipmotion.units.text_normalisation import find_words, tokenise
 from lipmotion.units.written_forms import list_readings
 
-LINE_BREAK = re.compile(r"<(?:br|p|div)\b[^<>]{0,40}>", re.IGNORECASE)
-MARKUP = re.compile(r"<rt>[^<>]{0,80}|</?[a-zA-Z!|][^<>]{0,200}>|<[\d:.]{1,20}>|\{[^{}]{0,200}\}")
-"""Tags of SubRip (``<i>``), WebVTT (``<v Anna>``, ``<00:01.5>``), SubStation (``{\\an8}``), ``<unk>``, ``<|en|>``, and
-how letters are read (``<rt>``)."""
-SOUND = re.compile(r"\[[^\[\]]{0,200}\]|\((?!\d{3}\))[^()]{0,200}\)|（[^（）]{0,200}）")
-"""Descriptions of sounds, as subtitles for the deaf and recognisers write them: ``[music]``, ``(laughs)``."""
-DEED = re.compile(
-    r"[*(](?i:(?:[a-z]+ly )?(?:clears?|clearing|(?:cough|laugh|giggle?|chuckle?|sigh|sniff|sneeze?|gasp|breathe?"
-    r"|inhale?|exhale?|sob|groan|grunt|moan|snort|yawn|whistle?|scream|burp|gulp)(?:e?s|ing)?)"
-    r"(?: (?:\w+ )?throat| \w+ly)?)[*)]"
-)
-"""What somebody does, as chats and texts for voices write it: ``*coughs*``, ``(clears throat)``."""
-SPEAKER = re.compile(
-    r"^[ \t>\-–—*_]{0,8}(?:\[([^\[\]\n:]{1,31})\]|([^\W\d_][\w.'’&# -]{0,30}?))"
-    r"[ \t]*(\([^()\n]{1,30}\))?[ \t*_]*[:：][*_]*(?=\s|$)",
-    re.MULTILINE,
-)
-"""What may be the name of a speaker: before a colon at the start of a line, perhaps with ``(V.O.)``."""
-STAMP = re.compile(
-    r"(?m)^[ \t]*(?:[^\W\d_][\w.'’ -]{0,30}?[ \t]+(?=[(\[]?[\d:]{4,8}[)\]]?[ \t]*$))?"
-    r"[(\[]?((?:\d{1,2}:)?\d{1,2}:\d\d)(?:[.,]\d{1,3})?[)\]]?(?:[ \t]*$|[ \t]*[-–—|]?[ \t]+(?=\S))"
-)
-"""The time of a line of a transcript of the web, before it or above it: ``0:12 Hello``, ``Anna  0:12``."""
-NUMBER = re.compile(
-    r"(?m)^[ \t]*[(#]?(?:(\d{1,4})(?:[.):]+(?=\s|[^\W\d_])|[ \t]+[-–—](?=\s)|\t)|([a-z])\)(?=\s))[ \t]*(?=\S)"
-)
-"""The number of a line of a list, which is not said: ``1. Hello``, ``2) Hello``, ``a) Hello``."""
-CUE = re.compile(r"(?:\A|(?<=\n\n))[ \t]*([A-Z][A-Z0-9.'’ -]{1,30}(?:\([^()\n]{1,20}\))?)[ \t]*\n(?=[^\n]*[a-z])")
-"""A name in capitals above what that person says, as in screenplays."""
-DIRECTION = re.compile(r"^[ \t]*(?:\([^()\n]{1,80}\)|(?:INT|EXT)\b[./][^\n]*)[ \t]*$", re.MULTILINE)
-"""A line of a screenplay that is not spoken."""
-SCRIPT = re.compile(r'[ \t]*(?:([a-z_]\w*)((?:[ \t]+[\w@-]+){0,3})[ \t]+)?"(?![a-z])(?:[^"\\\n]|\\.)*"[ \t]*')
-"""A line of a game's script: who speaks, how he looks, and in quotes a sentence (``e happy "Hello"``)."""
-NO_TAGS = frozenset("i he she we they you it and then but so or said says".split())
-"""Words that begin a sentence with quotes in it."""
-NO_NAMES = frozenset("note notes warning question answer step tip remember ps p.s example".split())
-MARKED = r"[~%!]+(?:sp|(?:sil|pau|lau|noise|breath|inhal|exhal|cough|throat|lip|smack|sniff|sigh|click|music)\w*)"
-"""Sounds with a mark before them: ``~SIL``, ``%noise``, ``!SIL``."""
-SYMBOLS = re.compile(
-    rf"&=\S+|%hesitation\b|(?<!\S){MARKED}(?!\S)|\b(?:xxx|yyy)\b|&[-+~](?=\w)|(?<!\w)%(?=[^\W\d])", re.IGNORECASE
-)
-"""CHAT's sounds (``&=laughs``) and words that nobody understood; of hesitations (``%uh``) the mark alone."""
-SPEAKER_NAME_LINES = 3  # a name that begins this many lines is that of a speaker
+MARKS = read_patterns(Path(__file__).with_name("tables") / "spoken_forms.tsv")
+"""Patterns of what stands in texts and labels and is not spoken, by their names in the table."""
+WORDS = {name: frozenset(words.split()) for name, words in read_table("spoken_words").items()}
+"""Words by what they are in texts and labels: of silence, of speech that is not known, no names, ..."""
 LONGEST_LINE = 1 << 18  # maximum characters of a line: a label may hold four hours of speech
 MAX_WORDS = 500_000  # maximum words of a transcript: twelve hours of the fastest speech on record
 
@@ -78,15 +40,7 @@ class SpokenAs(Enum):
     UNKNOWN = "unknown"
 
 
-SILENCES = frozenset(["", *"sil sp pau ssil nsn h# #h # ## _ - silence = vocnoise iver".split()])
-"""Labels of silence, pauses and noise that is not speech; so is anything in brackets that is not of speech."""
 LAUGHTER = "LAU"  # in capitals, as in lexicons of telephone speech; ``Lau`` is a name
-UNKNOWN_WORDS = frozenset("spn unk oov xxx yyy usb".split())
-"""Labels of speech of which nobody knows the words, also in brackets: of aligners, of CHAT, of WebMAUS (``<usb>``)."""
-IN_BRACKETS = re.compile(
-    r"<[^<>]*>|\[[^\[\]]*\]|\([^()]*\)|\{[^{}]*\}|\+\+?\w+\+\+?|&=\S+|♪+|\*+|" + MARKED + "|" + DEED.pattern
-)
-UNKNOWN_SPEECH = re.compile(r"unknown|unintelligible|inaudible|indistinct|garbage|spoken.?noise", re.IGNORECASE)
 
 
 def classify_label(label: str) -> SpokenAs:
@@ -96,22 +50,22 @@ def classify_label(label: str) -> SpokenAs:
     (<SpokenAs.SILENCE: 'silence'>, <SpokenAs.UNKNOWN: 'unknown'>, <SpokenAs.SPEECH: 'speech'>)
     """
     name = "sil" if label.strip() == LAUGHTER else label.strip().lower()
-    bracketed = IN_BRACKETS.fullmatch(name) is not None
+    bracketed = MARKS["IN_BRACKETS"].fullmatch(name) is not None
     inner = name.strip("<>[](){}+&=* ") if bracketed else name
-    if inner in UNKNOWN_WORDS or (bracketed and UNKNOWN_SPEECH.search(inner)):
+    if inner in WORDS["unknown"] or (bracketed and MARKS["UNKNOWN_SPEECH"].search(inner)):
         return SpokenAs.UNKNOWN
-    return SpokenAs.SILENCE if bracketed or name in SILENCES else SpokenAs.SPEECH
+    return SpokenAs.SILENCE if bracketed or name in WORDS["silences"] or not name else SpokenAs.SPEECH
 
 
 def extract_spoken_text(text: str, names: frozenset[str] = frozenset()) -> str:
     """Return what is spoken of a text; ``names``: of speakers, as ``find_speaker_names`` returns them."""
-    text = LINE_BREAK.sub("\n", html.unescape(MARKUP.sub("", LINE_BREAK.sub("\n", text))))
-    text = DEED.sub(" ", SOUND.sub(" ", MARKUP.sub("", text)))
-    return remove_speakers(SYMBOLS.sub(" ", text), names)[0]
+    text = MARKS["LINE_BREAK"].sub("\n", html.unescape(MARKS["MARKUP"].sub("", MARKS["LINE_BREAK"].sub("\n", text))))
+    text = MARKS["DEED"].sub(" ", MARKS["SOUND"].sub(" ", MARKS["MARKUP"].sub("", text)))
+    return remove_speakers(MARKS["SYMBOLS"].sub(" ", text), names)[0]
 
 
-def remove_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[str, list[str]]:
-    """Return a text without the names of speakers, and what was left out.
+def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str, list[str]]:
+    """Return a text without the names of speakers, and what was left out; ``names``: None finds them in the text.
 
     Names are those in capitals and with a remark (``ANNA:``, ``Anna (V.O.):``, ``[Anna]:``), ``Speaker 1:``, those in
     ``names``, two lines or more in capitals above what is said, as in screenplays, and what stands before the quotes of
@@ -126,34 +80,52 @@ def remove_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[str
     def leave_out_name(match: re.Match[str]) -> str:
         name = match[1] or match[2]
         in_capitals = name == name.upper() != name.lower()
-        has_remark = match[1] or (match[3] and name[0].isupper())
-        numbered = re.fullmatch(r"[Ss]peaker[ _]?\w{1,3}", name)
-        return leave_out(match) if in_capitals or has_remark or numbered or name in names else match[0]
+        is_bold = match[0].endswith(("**", "__")) and name.lower() not in WORDS["no_names"]  # the colon, too
+        has_remark = match[1] or (name[0].isupper() and (match[3] or is_bold))
+        numbered = MARKS["NUMBERED"].fullmatch(name)
+        return leave_out(match) if in_capitals or has_remark or numbered or name in speakers else match[0]
 
-    times_s = [parse_clock(stamp[1]) for stamp in STAMP.finditer(text)]
-    if times_s[:1] == [0] or (len(times_s) > 1 and times_s[0] < 60 and times_s == sorted({*times_s})):
-        text = STAMP.sub(leave_out, text)
-    numbers = [int(line[1] or ord(line[2])) for line in NUMBER.finditer(text)]
-    if len(numbers) > 1 and all(b in (a + 1, 1, ord("a")) for a, b in pairwise(numbers)):
-        text = NUMBER.sub(leave_out, text)
-    cues = list(CUE.finditer(text))
+    if text.lstrip("\ufeff").startswith("@"):
+        text = MARKS["CHAT"].sub(leave_out, text)
+    text = MARKS["CODE"].sub(leave_out, text)
+    if len(MARKS["RECORDING"].findall(text)) == sum(map(bool, text.split("\n"))):
+        text = MARKS["RECORDING"].sub(leave_out, text)
+    dated = list(MARKS["DATED"].finditer(text))
+    if len(dated) > 1 or any(each[1] or "T" in each[0] for each in dated):
+        text = MARKS["DATED"].sub(leave_out, text)
+    stamps = list(MARKS["STAMP"].finditer(text))
+    times_s = [parse_clock(stamp[1]) for stamp in stamps]
+    is_full = all(stamp[1].count(":") == 2 or "[" in stamp[0] for stamp in stamps)  # no time of day that is said
+    if times_s[:1] == [0] or (len(times_s) > 1 and times_s == sorted({*times_s}) and (is_full or times_s[0] < 60)):
+        text = MARKS["STAMP"].sub(leave_out, text)
+    speakers = find_speaker_names([text]) if names is None else names
+    for form in (MARKS["NUMBER"], MARKS["BARE_NUMBER"]):
+        found = [line[1] or str(ord(line[2])) for line in form.finditer(text)]
+        numbers = list(map(int, found))
+        counted = len(numbers) > 1 and all(b in (a + 1, 1, ord("a")) for a, b in pairwise(numbers))
+        if form is MARKS["BARE_NUMBER"]:
+            padded = all(re.match(r"0\d\d", number) and number != "007" for number in found)
+            counted = padded or (counted and numbers[0] < 2 and len(numbers) == len(text.split("\n")))
+        text = form.sub(leave_out, text) if counted else text
+    cues = list(MARKS["CUE"].finditer(text))
     if len(cues) > 1 or any("(" in cue[1] for cue in cues):
-        text = DIRECTION.sub(leave_out, CUE.sub(leave_out, text))
-    text = SPEAKER.sub(leave_out_name, text)
-    lines = [SCRIPT.fullmatch(line) for line in text.splitlines() if line.strip()]
+        text = MARKS["DIRECTION"].sub(leave_out, MARKS["CUE"].sub(leave_out, text))
+    text = MARKS["SPEAKER"].sub(leave_out_name, text)
+    lines = [MARKS["SCRIPT"].fullmatch(line) for line in text.splitlines() if line.strip()]
     tags = [line[1] for line in lines if line and line[1]]
-    if tags and all(lines) and not NO_TAGS & {*tags} and (len(lines) > 1 or not (lines[0] and lines[0][2])):
+    if tags and all(lines) and not WORDS["no_tags"] & {*tags} and (len(lines) > 1 or not (lines[0] and lines[0][2])):
         text = re.sub(r'^[^"\n]+(?=")', leave_out, text, flags=re.MULTILINE)
     return text, [name for name in left_out if name]
 
 
 def find_speaker_names(texts: Iterable[str]) -> frozenset[str]:
-    """Return the names before a colon at the start of several lines, or of every one of two lines and more."""
+    """Return the names before a colon at the start of three lines, one twice, or of each of two lines and more."""
     lines = [line for text in texts for line in text.splitlines() if line.strip()]
-    matched = [match[2] for match in map(SPEAKER.match, lines) if match and match[2] and match[2].istitle()]
-    names = {name: count for name, count in Counter(matched).items() if name.lower() not in NO_NAMES}
+    matched = [match[2] for match in map(MARKS["SPEAKER"].match, lines) if match and match[2] and match[2].istitle()]
+    names = {name: count for name, count in Counter(matched).items() if name.lower() not in WORDS["no_names"]}
     in_all = len(matched) == len(lines) > 1
-    return frozenset(name for name, count in names.items() if in_all or count >= SPEAKER_NAME_LINES)
+    speak = in_all or (max(names.values(), default=0) > 1 and sum(names.values()) > 2)
+    return frozenset(names if speak else ())
 
 
 def read_line_words(text: str, where: str) -> tuple[str, ...]:
@@ -186,20 +158,6 @@ def check_word_count(count: int, where: str) -> None:
 
 
 LOG = logging.getLogger("lipmotion")
-TAG = re.compile(
-    r"[\[<{](/?)([^\W\d_][^\[\]<>{}\n]{0,80})[\]>}]|\*(?P<did>[a-z]+s)\*|"
-    + DEED.pattern
-    + r"|<<[^<>\n]{1,200}>>|<[/!#?|][^<>\n]{0,80}>|\\[nN]|\{[^{}\n]{0,200}\}|\[/?\]|\[\d[\d:.,]{0,12}m?s?\]"
-    r"|\([a-z-]{2,20}: ?[$\"'][^()\n]{0,200}\)|#line:\w+|\[\[(?:slnc|rate|volm|pbas|emph|inpt|rset)\b[^\[\]\n]{0,80}]]"
-)
-"""Tags of moods, and markup of games and voices (Ren'Py, Unity, Yarn, Twine, SSML): ``{w=0.5}``, ``<color=red>``."""
-LINK = re.compile(
-    r"\[\[(?!(?:slnc|rate|volm|pbas|emph|inpt|rset)\b)(?:[^\[\]\n]*<-)?([^\[\]|\n]*?)(?:(?:\||->)[^\[\]\n]*)?\]\]"
-    r"|!?\[([^\[\]\n]{0,200})\]\([^()\s]{1,400}\)"
-)
-"""A link (``[[Go north|North]]``, ``[our site](https://example.org)``), of which what is shown is spoken."""
-INSIDE_WORDS = frozenset("a b i u s em strong mark sub sup font span color colour size wave shake".split())
-"""Tags of style, which may stand inside a word."""
 _NAME = re.compile(r"([a-z][a-z '-]*?)\s*(?::\s*(\d*\.?\d+))?")
 SYNONYMS: dict[str, tuple[str, float]] = {
     word: (mood, float(strength))
@@ -228,14 +186,16 @@ def parse_tagged_text(text: str, words: Callable[[str], Sequence[str]] = find_wo
     TaggedText(text='  I know.  But  so what', tags=(MoodTag(share=0.0, mood='sad', strength=0.5), \
 MoodTag(share=0.4, mood='happy', strength=0.6), MoodTag(share=0.6, mood='neutral', strength=1.0)))
     """
-    text, unknown = remove_speakers(LINK.sub(r"\1\2", text), find_speaker_names([text]))
+    text, unknown = remove_speakers(
+        MARKS["LINK"].sub(lambda link: " ".join(link[4] or "") or "".join(link.groups("")), text)
+    )
     spoken, tags, last = "", [], 0
-    for tag in TAG.finditer(text):
+    for tag in MARKS["TAG"].finditer(text):
         meaning = _meaning(tag)
-        if tag["did"] and meaning is None and not DEED.fullmatch(tag[0]):
+        if tag["did"] and meaning is None and not MARKS["DEED"].fullmatch(tag[0]):
             continue
         name = re.split(r"[\W_]", tag[2] or "", maxsplit=1)[0]
-        spoken += text[last : tag.start()] + " " * (meaning is not None or name.lower() not in INSIDE_WORDS)
+        spoken += text[last : tag.start()] + " " * (meaning is not None or name.lower() not in WORDS["inside_words"])
         last = tag.end()
         if meaning is None:
             unknown.append(tag[0])
@@ -253,7 +213,7 @@ MoodTag(share=0.4, mood='happy', strength=0.6), MoodTag(share=0.6, mood='neutral
 
 def remove_known_tags(text: str) -> str:
     """Return a text without the tags that are understood."""
-    return TAG.sub(lambda tag: " " if _meaning(tag) else tag[0], text)
+    return MARKS["TAG"].sub(lambda tag: " " if _meaning(tag) else tag[0], text)
 
 
 def time_moods(tags: Sequence[MoodTag], units: Timeline[Unit]) -> tuple[MoodKey, ...]:

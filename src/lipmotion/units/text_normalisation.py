@@ -7,31 +7,16 @@ import re
 import unicodedata
 from collections.abc import Iterator, Sequence
 from functools import cache
+from pathlib import Path
 
 from lipmotion.errors import AlignmentError, InputError, shorten
 from lipmotion.units.lexicon import SOUNDED, expand_lengthened, list_entries
-from lipmotion.units.spelling import ACCENTS, convert_to_plain, normalise_text
-from lipmotion.units.written_forms import FORMS, NUMERIC, WORD, list_readings
+from lipmotion.units.spelling import ACCENTS, convert_to_plain, normalise_text, read_patterns
+from lipmotion.units.written_forms import FORMS, NUMERIC, PIECES, WORD, list_readings
 
 CHINESE = "[\u3400-\u4dbf\u4e00-\u9fff]"
-INITIALS = re.compile("[A-Z]{2,5}s?")  # what may be letters that are said one by one
-RANGE = re.compile(
-    r"(?:(?<=\d[ap]m)|(?<=\d [ap]m)|(?<=\d [ap]\.m\.)|(?<=:\d\d)|(?<=\d%)|(?<=\d(?:st|nd|rd|th)))\s?[-–]\s?(?=\d)"
-    r"|(?<=\d)-(?=\d{1,2}\s?[ap]m\b)|(?<=\d)(?:-|\s?–\s?)(?=[$£€]\d)",
-    re.IGNORECASE,
-)
-"""The dash of ``9am-5pm``, ``5:00-6:30``, ``5%-10%``, ``$5-$10`` and ``1st-3rd``."""
-COMMA = re.compile(r"(?<![\d.,])(\d+(?:\.\d{3})*),(\d\d?)(?=\s?(?:[€%°]|(?:km|kg|cm|mm|m|g|l|h)\b))")
-EUROS = re.compile(r"(?<=€)\s?(\d+(?:\.\d{3})*),(\d\d)(?!\d)")
-"""Numbers with a decimal comma, where their unit says so: ``1,5 km``, ``€1.234,56``."""
-CURRENCY = re.compile(r"(?<=\d) ?(?:USD|EUR|GBP)\b|\b(?:USD|EUR|GBP) ?(?=\d)")
-GROUPED = re.compile(
-    r"(?<![\w.,])(?<!\d )[1-9](?:\d{0,2}(?:(?:'\d{3})+|(?:\.\d{3}){2,}|(?: \d{3})* 000)|\d?(?: \d{3}){2,})"
-    r"(?![\d']| \d|\.\d)"
-)
-"""Numbers whose thousands are parted by blanks, points or apostrophes: ``1 000 000``, ``1'000'000``."""
-SMILEY = re.compile(r"(?<!\w)(?:[:;=8][-o']?[)(\]DPpO3|/\\]+|<3+|[xX]D+|\^_+\^|[tT]_[tT])(?!\w)")
-REFERENCE = re.compile(r"&(?:[a-zA-Z]{2,8}|#\d{1,6}|#x[\da-fA-F]{1,5});")
+MARKS = read_patterns(Path(__file__).with_name("tables") / "text_forms.tsv")
+"""Patterns of texts as people write them, by their names in the table."""
 CHARACTERS_PER_S = 200
 """Most characters a second: three times the fastest speech on record (655 words a minute), blanks and punctuation."""
 ALWAYS_ALLOWED_CHARACTERS = 10_000
@@ -65,33 +50,44 @@ def tokenise(text: str) -> tuple[str, ...]:
     >>> tokenise("Dr. Brown met Henry VIII at 5:00, in May 1995!")
     ('Dr.', 'brown', 'met', 'Henry VIII', 'at', '5:00', 'in', 'may', '1995')
     """
-    text = SMILEY.sub(" ", REFERENCE.sub(lambda match: html.unescape(match[0]), text))
+    text = MARKS["SMILEY"].sub(" ", MARKS["REFERENCE"].sub(lambda match: html.unescape(match[0]), text))
     text = re.sub(r"\bWW(?=II?\b)", "World War ", re.sub("№ ?", "No. ", text))
-    plain = re.sub(r"\b(?:[AC]|US|CA|AU|NZ|HK)(?=\$)", "", RANGE.sub("–", ACCENTS.sub("", convert_to_plain(text))))
+    plain = re.sub(
+        r"\b(?:[ACS]|US|CA|AU|NZ|HK|NT|SG|MX)(?=\$)",
+        "",
+        MARKS["RANGE"].sub("–", ACCENTS.sub("", convert_to_plain(text))),
+    )
     plain = re.sub(r"([$£€])-(?=\d)", r"-\1", plain)
-    for form in (COMMA, EUROS):
+    plain = MARKS["QUOTED"].sub(r"\2 ", plain)
+    for form in (MARKS["COMMA"], MARKS["EUROS"]):
         plain = form.sub(lambda number: f"{number[1].replace('.', '')}.{number[2]}", plain)
-    plain = CURRENCY.sub(lambda match: {"U": "$", "E": "€", "G": "£"}[match[0].strip()[0]], plain)
-    plain = GROUPED.sub(lambda match: re.sub(r"\D", ",", match[0]), plain)
+    plain = MARKS["CURRENCY"].sub(lambda match: dict(zip("UEGIRJ", "$€£₹₹¥", strict=True))[match[0].strip()[0]], plain)
+    plain = MARKS["GROUPED"].sub(lambda match: re.sub(r"\D", ",", match[0]), plain)
     shouted = not any(letter.islower() for letter in plain)
     tokens = []
     for token in (match[0] for match in _scanner().finditer(plain)):
         is_word = token.isalpha() or ("'" in token and token.replace("'", "").isalpha())
-        is_short = not shouted and INITIALS.fullmatch(token) and not list_entries(token.lower())
-        is_short = is_short and not (expand_lengthened(token.lower()) or SOUNDED.fullmatch(token.lower()))
-        tokens.append(token.lower() if is_word and not is_short else token)
+        name = token.lower()
+        is_short = not shouted and MARKS["INITIALS"].fullmatch(token) is not None
+        if is_short and not re.fullmatch(PIECES["LETTERS"], token):
+            is_short = not (list_entries(name) or expand_lengthened(name) or SOUNDED.fullmatch(name))
+        tokens.append(name if is_word and not is_short else token)
     return tuple(tokens)
 
 
 @cache
 def _scanner() -> re.Pattern[str]:
-    word = rf"{WORD}(?=[,;!?]|\s+(?-i:[a-z])|\s*\Z)"  # most are words and no more; the rest takes a tenfold time
+    # most are words and no more (but "XIX century"); the rest takes a tenfold time
+    word = rf"(?!(?-i:[IVX]+) c){WORD}(?=[,;!?]|\s+(?-i:[a-z])|\s*\Z)"
     forms = [rf"(?:{form})(?:'s)?(?![^\W_])" for form, _ in FORMS[:-1]]  # initials are words
     numeric, worded = ("|".join(part) for part in (forms[: len(NUMERIC)], forms[len(NUMERIC) :]))
-    signs = r"(?<!\w)w/o?(?=[\s.,;!?]|\Z)|[&@×÷≥≤≠]|[+=](?![+=])(?<![+=]{2})|#(?=\w)|[~≈±](?=\d)"
+    signs = r"(?<!\w)w/o?(?=[\s.,;!?]|\Z)|[&@×÷≥≤≠§]|[+=](?![+=])(?<![+=]{2})|#(?=\w)|[~≈±](?=\d)"
+    signs += r"|(?<![\w<>-])[<>](?=[$£€]?\d)|(?<=\d )[<>](?= \d)"
+    after = r"(?:(?<=\d)|(?<=[\d ][a-z%])|(?<=[\d ][a-z]{2})|(?<=[a-z]{3}s)(?=/(?:min|sec|h|day|week|month|year)))"
+    rates = rf"{after}/{PIECES['PER']}\b"
     dashes = r"(?<![^\s(])-(?=[.$£€]?\d)|−(?=\d)|(?<=[mdht\d%.])–(?=[$£€]?\d)"
     begun = rf"(?<![^\W_])(?:{word}|(?=[^\W\d_])(?:{worded})|(?![\s,;!?])(?:{numeric}))"
-    grouped = "|".join([begun, signs, dashes, WORD, r"\d+(?:\.\d+)*"])
+    grouped = "|".join([begun, rates, signs, dashes, WORD, r"\d+(?:\.\d+)*"])
     return re.compile(re.sub(r"(?<!\\)\((?!\?)", "(?:", grouped), re.IGNORECASE)
 
 
@@ -142,8 +138,6 @@ _ABBREVIATED = frozenset(
     "mr mrs ms dr prof st jr sr vs etc no vol fig inc ltd co gen col capt lt sgt rev hon e.g i.e a.m p.m approx".split()
 )
 """What ends in a full stop that does not end a sentence, without its last stop."""
-_END = re.compile(r"""(?:[.!?…]+["')\]”’»]*(?=\s)|[。！？]+["')\]”’»」』]*)\s*""")
-_BREAK = re.compile(r"[,;:–—、，；：]\s*|\s-+\s")
 
 
 def clean_text(text: str) -> str:
@@ -174,7 +168,7 @@ def split_sentences(text: str) -> list[str]:
     for sentence in _divide(plain):
         rest = sentence
         while len(rest) > LONGEST_SENTENCE:
-            breaks = [match.end() for match in _BREAK.finditer(rest, LONGEST_SENTENCE // 2, LONGEST_SENTENCE)]
+            breaks = [match.end() for match in MARKS["BREAK"].finditer(rest, LONGEST_SENTENCE // 2, LONGEST_SENTENCE)]
             blank = rest.rfind(" ", 1, LONGEST_SENTENCE)
             cut = breaks[-1] if breaks else blank if blank > 0 else LONGEST_SENTENCE
             parts.append(rest[:cut].strip())
@@ -188,7 +182,7 @@ def split_sentences(text: str) -> list[str]:
 
 def _divide(text: str) -> Iterator[str]:
     start = 0
-    for end in _END.finditer(text):
+    for end in MARKS["END"].finditer(text):
         before = text[start : end.start()].rsplit(" ", maxsplit=1)[-1].lstrip("\"'(“‘«")
         is_initial = len(before) == 1 and before.isalpha() and before.isupper() and before != "I"
         if text[end.start()] == "." and (before.lower() in _ABBREVIATED or is_initial):

@@ -6,6 +6,7 @@ A new kind is a class of ``Output`` in a module of its own, and a line in ``OUTP
 
 from __future__ import annotations
 
+import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,7 +17,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from lipmotion.articulation.delivery import Delivery, delay_units
-from lipmotion.errors import ExportError
+from lipmotion.errors import ExportError, shorten_list
 from lipmotion.extensions import Registry, load_provided
 from lipmotion.formats.label_files import LABEL_SUFFIXES, write_labels
 from lipmotion.formats.sound import SOUND_CODECS, write_sound
@@ -32,6 +33,7 @@ from lipmotion.storage.sources import VIDEO_SUFFIXES
 from lipmotion.types import SPEECH_RATE_HZ, Audio, Generation, Monitor, Prosody, silent_monitor
 from lipmotion.types.delivery import Staging
 
+LOG = logging.getLogger("lipmotion")
 Made = TypeVar("Made")
 
 
@@ -346,6 +348,9 @@ def write(  # noqa: PLR0913
 def write_files(performance: Performance, outputs: Sequence[str | Path], *, temporary: bool = False) -> None:
     """Write what is performed to files; ``temporary``: as of ``write``. Raises as that."""
     planned = create_outputs(outputs, performance.settings)
+    end_s = len(performance.generation.motion.values) / performance.generation.motion.rate_hz
+    if late := [str(key) for key in performance.settings.delivery.moods if key.time_s > end_s]:
+        LOG.warning("the motion ends at %.2f s, before these moods, which are not shown: %s", end_s, shorten_list(late))
     if performance.sound_file is None or temporary:
         written = (output.path for output in planned if isinstance(output, SoundOutput))
         performance = replace(performance, sound_file=next(written, None))
