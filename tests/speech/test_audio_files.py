@@ -270,6 +270,16 @@ def test_the_cover_of_an_album_changes_nothing(tmp_path: Path) -> None:
     assert np.array_equal(plain.samples, covered.samples)
 
 
+@pytest.mark.parametrize("tag", [b"ID3\3\0\0\0\1\x1a\0" + bytes(range(256)) * 106, b"APETAGEX" + bytes(24)])
+def test_tags_between_files_that_are_joined_are_no_damage(tmp_path: Path, caplog, tag) -> None:
+    path = write_sound(tmp_path / "a.mp3", babble(44_100), 44_100, "libmp3lame")
+    one, content = read_audio(path), path.read_bytes()[44:]  # behind the tag of its own
+    path.write_bytes(content + tag + content)
+    joined = read_audio(path).samples
+    assert caplog.text == ""
+    assert abs(late_by(joined[len(joined) // 2 :], one.samples)[0]) < 50 * MS
+
+
 def test_the_first_of_several_tracks(tmp_path: Path, original: Samples) -> None:
     with av.open(str(tmp_path / "a.mka"), "w") as container:
         streams = [container.add_stream("pcm_s16le", rate=16_000, layout="mono") for _ in range(2)]

@@ -133,7 +133,6 @@ def _read_form(lines: Lines, form: re.Pattern[str], where: str, role: str = "") 
 
 
 def _read_nist(lines: Lines, where: str) -> list[LabelTier] | None:
-    """Return the words of a CTM or the lines of an STM."""
     spoken = [line for line in lines if not line[1].startswith(COMMENT)]
     matches = ((form, form.fullmatch(spoken[0][1][:1000] if spoken else "")) for form in (STM, CTM))
     found = ((form, match) for form, match in matches if match and "." in match[3] + match[4])
