@@ -170,6 +170,7 @@ def test_what_is_missing_of_other_files_is_said(tmp_path: Path, caplog: pytest.L
             assert ("cut short" in caplog.text, said in caplog.text) == (share < 1, share < 1)
     caplog.clear()  # a length that FFmpeg guesses is none that the file states
     read_audio(write_sound(tmp_path / "a.aac", np.pad(babble(16_000, 2), ((0, 0), (160_000, 0))), 16_000, "aac"))
+    read_audio(write_sound(tmp_path / "a.asf", babble(44_100, 0.5), 44_100, "mp2", video=True))
     assert not caplog.text
 
 

@@ -88,8 +88,7 @@ class Stream:
         seed: int | None = 0,
     ) -> None:
         if sample_rate not in range(LOWEST_RATE_HZ, HIGHEST_RATE_HZ + 1):
-            allowed = f"a whole number from {LOWEST_RATE_HZ} to {HIGHEST_RATE_HZ}"
-            raise InputError(f"a stream of {sample_rate!r} Hz, required {allowed}")
+            raise InputError(f"a stream of {sample_rate!r} Hz, required {LOWEST_RATE_HZ} to {HIGHEST_RATE_HZ}, whole")
         if look_ahead_ms is not None and not 0 <= look_ahead_ms <= LONGEST_LOOK_AHEAD_MS:
             raise InputError(f"a look-ahead of {look_ahead_ms} ms, required 0 to {LONGEST_LOOK_AHEAD_MS:g}, or None")
         if pauses not in get_args(Pauses):

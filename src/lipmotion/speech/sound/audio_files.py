@@ -97,7 +97,8 @@ class _TrackDecoder:
             first, piece = self._pieces.pop()
             samples[first : first + len(piece) // 4] = np.frombuffer(piece, np.float32)
         kind, starts = self._container.format.name, self._stream.start_time
-        is_stated = (self._stream.duration or not self._container.streams.video) and kind not in GUESSED
+        has_own = self._stream.duration and kind != "asf"  # which states that of the longest of its tracks
+        is_stated = (has_own or not self._container.streams.video) and kind not in GUESSED
         is_stated = is_stated and (kind != "mp3" or starts)  # a header that states the length begins after the delay
         stated_s = read_duration(self._container, self._stream) if is_stated else 0.0
         if kind == "matroska,webm" and starts and not list_video(self._container):  # it states its end
