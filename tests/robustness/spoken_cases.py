@@ -4,7 +4,6 @@ from robustness.case import case
 
 GROUP = "texts to speak"
 
-
 case(GROUP, "a million characters without a blank", 3, "has 1000000 characters, required at most 50000")(
     lambda bench: ["speak", "a" * 1_000_000, "--model", bench.model, "-o", "a.json"]
 )

@@ -240,7 +240,7 @@ def find_place(target: Path) -> Path:
         return target
     with suppress(OSError):
         if not (stat.S_ISREG(mode := target.stat().st_mode) or stat.S_ISDIR(mode)):
-            raise ExportError(f"{target}: is a pipe or a device, required the name of a file; -o - is standard output")
+            raise ExportError(f"{target}: is a pipe or a device, required a file; -o - prints motion and cues")
     try:
         place = Path(os.path.realpath(target)) if target.is_symlink() else target
         endless = place.is_symlink()
