@@ -377,11 +377,7 @@ def analysed(audio: Audio, features: Features | None = None) -> AnalysedAudio:
 
 
 def _without_offset(samples: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return samples without the offsets of what lies between digital silences.
-
-    A constant one goes where it is most of the quietest sound; where it changes, as at a knock against the microphone,
-    all that is slower than a voice goes.
-    """
+    """Return samples without offsets between digital silences; where one changes, without all slower than a voice."""
     from scipy.ndimage import median_filter
 
     count = len(samples) // HOP
