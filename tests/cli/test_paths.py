@@ -50,6 +50,9 @@ def test_however_it_is_spelled(run, laid):
     for spelled in ("./t.txt", "../here/t.txt", "soft", "hard"):
         check_refused(run("animate", *TALKING.split(), "-o", spelled), 7, "the transcript itself; give another name")
         assert content(laid) == before
+    os.mkfifo(laid / "pipe")
+    check_refused(run("cues", "a.wav", "-o", "pipe"), 7, "is a pipe or a device")  # no file replaces it
+    assert (laid / "pipe").is_fifo()
 
 
 def test_the_model_that_ships_is_an_input_too(run, laid):

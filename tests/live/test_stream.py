@@ -183,7 +183,7 @@ def test_what_cannot_be_heard_is_refused_and_the_stream_goes_on(sound: np.ndarra
         *((np.array([0.1, value]), "not finite, or beyond 1e") for value in (np.nan, np.inf, 1e300, 2e6)),
         (np.zeros((3, 0)), r"shape \(3, 0\)"),
         ([[1.0, 2.0], [3.0]], "no samples"),
-        (np.zeros((2, 2, 2)), r"shape \(2, 2, 2\)"),
+        *((np.zeros(shape), rf"shape \({str(shape)[1:-1]}\)") for shape in ((2, 2, 2), (1, 800), (2, 16_000))),
         (np.zeros(3, np.int32), "int32"),
         (b"123", "3 bytes"),
     ):
@@ -191,7 +191,12 @@ def test_what_cannot_be_heard_is_refused_and_the_stream_goes_on(sound: np.ndarra
             stream.push(wrong)
     heard, wanted = (values_of(all_of(each, sound[:8000], [80])) for each in (stream, Stream()))
     assert np.array_equal(heard, wanted)
-    for arguments, message in (((0,), "0 Hz"), ((16_000, 700), "700 ms"), ((16_000, -1), "-1 ms")):
+    for arguments, message in (
+        ((0,), "0 Hz"),
+        (("16000",), "'16000' Hz"),
+        ((16_000, 700), "700 ms"),
+        ((16_000, -1), "-1 ms"),
+    ):
         with pytest.raises(InputError, match=message):
             Stream(*arguments)
 

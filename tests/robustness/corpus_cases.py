@@ -135,9 +135,6 @@ def _write_sentence_with_motion(bench: Bench, name: str = "a") -> None:
 
 
 NONE = "none of 1 recordings is usable; the first, a:"
-_recordings_case("a text named .mp4", 4, NONE, "is text, required a recording")(
-    lambda bench: bench.file("a.mp4", "hello " * 500)
-)
 
 
 def _label_file(name: str, suffix: str, content: bytes | str, *messages: str) -> None:

@@ -3,20 +3,11 @@
 from robustness.case import case
 
 GROUP = "transcripts"
-NO_WORD = ("holds no word", "give the words that are spoken")
 TOO_LONG = ("the transcript has", "characters, required at most 10552 for 2.76 s of sound: nobody says so much")
-TOO_MUCH = ("words take at least", "frames of 10 ms, found", "too short for what should be said")
 
-
-def _transcript(name: str, text: str, code: int, *messages: str) -> None:
-    case(GROUP, name, code, *messages)(lambda bench: bench.animate(None, "--transcript", text))
-
-
-_transcript("lone surrogates", "\udcff\udcfe", 3, *NO_WORD)
 case(GROUP, "a number of 20 million digits", 5, *TOO_LONG)(
     lambda bench: bench.animate(None, "--transcript", "7" * 20_000_000)
 )
-_transcript("one word of 10,000 letters", "ab" * 5000, 5, *TOO_MUCH)
 
 
 def _transcript_file(name: str, content: bytes | str, code: int, *messages: str) -> None:
@@ -33,15 +24,3 @@ _transcript_file("a million accents on one letter", b"b" + "\u0316\u0301".encode
 _transcript_file(
     "a sound as a transcript", b"RIFF\x80\x81\x82", 3, "not a readable UTF-8 transcript", "save it as UTF-8 text"
 )
-
-
-LEXICONS = "lexicons"
-
-
-def _lexicon(name: str, content: bytes, code: int, *messages: str) -> None:
-    case(LEXICONS, name, code, *messages)(
-        lambda bench: bench.animate(None, "--transcript", "papa", "--lexicon", bench.file("lexicon.txt", content))
-    )
-
-
-_lexicon("a line of 900 phones", b"papa" + b" P" * 900, 5, *TOO_MUCH)

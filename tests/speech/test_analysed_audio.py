@@ -152,3 +152,11 @@ def test_a_constant_offset_hides_no_pause(offset: float) -> None:
         assert [(p.first, p.own) for p in audio.passages] == [(p.first, p.own) for p in plain.passages]
         np.testing.assert_allclose(audio.mfcc().values, plain.mfcc().values, rtol=0, atol=0.02, equal_nan=False)
     assert np.array_equal(of_samples(sound).samples, sound.astype(np.float32))
+
+
+@pytest.mark.parametrize("size", [0.2, -0.5])
+def test_neither_does_an_offset_that_changes(size: float) -> None:
+    sound = np.concatenate([hiss(2), spoken(0), hiss(1, 3), spoken(1)])
+    plain, moved = of_samples(sound), of_samples(sound + size * (np.arange(len(sound)) > 0.6 * len(sound)))
+    assert [each.first for each in moved.passages] == pytest.approx([each.first for each in plain.passages], abs=10)
+    assert np.abs(moved.mfcc().values - plain.mfcc().values).mean() < 0.1

@@ -170,6 +170,7 @@ def test_what_is_missing_of_other_files_is_said(tmp_path: Path, caplog: pytest.L
             assert ("cut short" in caplog.text, said in caplog.text) == (share < 1, share < 1)
     caplog.clear()  # a length that FFmpeg guesses is none that the file states
     read_audio(write_sound(tmp_path / "a.aac", np.pad(babble(16_000, 2), ((0, 0), (160_000, 0))), 16_000, "aac"))
+    read_audio(write_sound(tmp_path / "a.asf", babble(44_100, 0.5), 44_100, "mp2", video=True))
     assert not caplog.text
 
 
@@ -268,6 +269,16 @@ def test_the_cover_of_an_album_changes_nothing(tmp_path: Path) -> None:
     plain = read_audio(write_sound(tmp_path / "a.mp3", babble(44_100), 44_100, "libmp3lame"))
     covered = read_audio(write_sound(tmp_path / "b.mp3", babble(44_100), 44_100, "libmp3lame", cover=True))
     assert np.array_equal(plain.samples, covered.samples)
+
+
+@pytest.mark.parametrize("tag", [b"ID3\3\0\0\0\1\x1a\0" + bytes(range(256)) * 106, b"APETAGEX" + bytes(24)])
+def test_tags_between_files_that_are_joined_are_no_damage(tmp_path: Path, caplog, tag) -> None:
+    path = write_sound(tmp_path / "a.mp3", babble(44_100), 44_100, "libmp3lame")
+    one, content = read_audio(path), path.read_bytes()[44:]  # behind the tag of its own
+    path.write_bytes(content + tag + content)
+    joined = read_audio(path).samples
+    assert caplog.text == ""
+    assert abs(late_by(joined[len(joined) // 2 :], one.samples)[0]) < 50 * MS
 
 
 def test_the_first_of_several_tracks(tmp_path: Path, original: Samples) -> None:

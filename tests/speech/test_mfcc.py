@@ -111,15 +111,18 @@ def test_the_delta_of_a_ramp_is_its_slope(frames: int, slope: float, start: floa
 @pytest.mark.parametrize("measure", [mfcc, log_f0])
 def test_it_says_what_is_wrong(measure: Callable[[types.Audio], object]) -> None:
     peak = "finite samples, full scale 1, found a peak of"
-    for audio, message in (
-        (types.Audio(noise(16_000), 44_100), "need 16000 Hz, found 44100 Hz; resample first"),
-        (types.Audio(noise(399), RATE_HZ), r"need 400 samples of one channel, found shape \(399,\)"),
-        (types.Audio(noise(16_000).reshape(2, 8000), RATE_HZ), r"found shape \(2, 8000\)"),
-        (types.Audio(np.where(np.arange(800) == 7, np.nan, 0.1), RATE_HZ), f"{peak} nan"),
-        (types.Audio(1e30 * noise(800), RATE_HZ), r"found a peak of \d.*e\+29"),
-    ):
+    wrong: list[tuple[Any, Any, str]] = [
+        (noise(16_000), 44_100, "need 16000 Hz, found 44100 Hz; resample first"),
+        (noise(399), RATE_HZ, r"need 400 samples of one channel, found shape \(399,\)"),
+        (noise(16_000).reshape(2, 8000), RATE_HZ, r"are float32 \(2, 8000\), .* the mean of channels"),
+        *((kind(noise(800).tolist()), RATE_HZ, f"are {kind.__name__}") for kind in (np.int16, np.complex128, list)),
+        *((noise(800), rate_hz, f"of {rate_hz!r} Hz") for rate_hz in ("16000", None, 0)),
+        (np.where(np.arange(800) == 7, np.nan, 0.1), RATE_HZ, f"{peak} nan"),
+        (1e30 * noise(800), RATE_HZ, r"found a peak of \d.*e\+29"),
+    ]
+    for samples, rate_hz, message in wrong:
         with pytest.raises(errors.InputError, match=message):
-            measure(audio)
+            measure(types.Audio(samples, rate_hz))
 
 
 def drawn_features(seed: int, frames: int = 200) -> types.Features:

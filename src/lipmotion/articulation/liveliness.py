@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import smooth_step
 from lipmotion.articulation.expression import list_action_units
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import FRAME_RATE_HZ, Motion, Prosody, Timeline, Unit
 from lipmotion.units import group_words, is_silent
 
@@ -46,15 +47,8 @@ slowest and fastest parts of it."""
 NOD_RAD, PHRASE_FALL_RAD = 0.045, 0.03
 """How far the head nods with a strong accent, and how much lower a phrase ends than it begins, in radians."""
 STILL_SHARE = 0.35  # share of the turning of the head that is left in silence
-MOOD_TURNS = {
-    53: (0, 0.1, 0),
-    54: (0, -0.12, 0),
-    55: (0, 0, 0.1),
-    56: (0, 0, -0.1),
-    57: (0, -0.09, 0),
-    58: (0, 0.07, 0),
-}
-"""How far the head turns to its left, upwards and to its left shoulder for an action unit, in radians."""
+MOOD_TURNS = [list(map(float, row.values())) for row in read_shipped_table("lipmotion.articulation", "mood_turns.csv")]
+"""Action units, and how far the head turns for each to its left, upwards and to its left shoulder, in radians."""
 MOOD_WANDER, MOOD_ACCENT = 0.13, 0.3
 """How far a mood comes and goes in the upper face, and how much stronger it is in a strong accent."""
 MOOD_GAZE_RAD = 0.22  # how far the eyes look down for the action unit 64, in radians
@@ -142,9 +136,9 @@ def compute_liveliness(  # noqa: PLR0913
         accented = _at(_smooth(accent, 0.2), time_s + BROW_LEAD_S) - 0.4
         lively = 1 + MOOD_WANDER * slow + MOOD_ACCENT * accented
         mood |= {unit: np.clip(mood[unit] * lively, 0, 1) for unit in UPPER_FACE_UNITS.values() if unit in mood}
-    for unit, angles in MOOD_TURNS.items():
+    for unit, *angles in MOOD_TURNS:
         if head and unit in mood:
-            turned = mood[unit][:, None] * np.array(angles, float)  # the eyes hold their target
+            turned = mood[int(unit)][:, None] * np.array(angles)  # the eyes hold their target
             turn, eyes = turn + turned, eyes - GAZE_COUNTER_SHARE * turned[:, :2]
     if 64 in mood:
         eyes[:, 1] -= MOOD_GAZE_RAD * mood[64]

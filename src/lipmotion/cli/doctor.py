@@ -20,24 +20,14 @@ from lipmotion.errors import LipMotionError, MissingDependencyError, ModelFormat
 from lipmotion.extensions import find_version, install_command, load_provided
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.request import Outputs, Request
-from lipmotion.storage.sources import hash_file
+from lipmotion.storage.sources import hash_file, read_shipped_table
 from lipmotion.types.delivery import Staging
 
 if TYPE_CHECKING:
     from lipmotion.types import Audio
 
 State = Literal["works", "absent", "broken"]
-EXTRAS = {
-    "video": "face tracking: corpora, faces and measures from videos",
-    "text": "espeak-ng: text to speech, and other languages than English",
-    "plots": "pictures of 'experiment xieliu2007'",
-    "cluster": "'batch --cluster'",
-    "study": "the page of 'study serve'",
-    "studio": "the page of 'studio'",
-    "live": "a microphone for 'live', its pages, VTube Studio",
-    "pipecat": "lip motion in Pipecat's voice agents",
-    "livekit": "lip motion in LiveKit's voice agents",
-}
+EXTRAS = {row["extra"]: row["brings"] for row in read_shipped_table("lipmotion.cli", "extras.csv")}
 """What each extra of the package brings."""
 WORDS = "mama"
 LOUDNESS = ((0.3, 0.0), (0.09, 0.25), (0.16, 1.0), (0.09, 0.25), (0.1, 1.0), (0.3, 0.0))

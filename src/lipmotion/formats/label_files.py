@@ -299,7 +299,6 @@ def _choose_tiers(tiers: list[LabelTier], where: str, tier: str = "", speaker: s
 
 
 def _refuse(kind: str, name: str, known: list[str], where: str) -> list[LabelTier]:
-    """Raise InputError: there is no such speaker or tier."""
     names = ", ".join(map(repr, list(dict.fromkeys(filter(None, known)))[:NAMED_TIERS])) or "none with a name"
     raise InputError(f"{where}: has no {kind} {shorten(name)!r}; it has: {names}")
 

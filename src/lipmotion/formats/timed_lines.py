@@ -107,7 +107,6 @@ def _read_form(lines: Lines, form: re.Pattern[str], where: str, role: str = "") 
 
 
 def _read_nist(lines: Lines, where: str) -> list[LabelTier] | None:
-    """Return the words of a CTM or the lines of an STM."""
     spoken = [line for line in lines if not line[1].startswith(COMMENT)]
     first = spoken[0][1][:1000] if spoken else ""
     matches = ((MARKS[name], MARKS[name].fullmatch(first)) for name in ("STM", "CTM"))

@@ -21,6 +21,7 @@ from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.network_steps import shape_convolutional
 from lipmotion.speech.features.mfcc import BANDS, FFT_SIZE, HOP, WINDOW, mel_filters
+from lipmotion.speech.sound.audio_files import MAX_CHANNELS
 from lipmotion.stats.networks import ConvolutionalNetwork
 from lipmotion.storage.archive import read_shipped_arrays
 from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS, SPEECH_RATE_HZ
@@ -78,7 +79,7 @@ class Resampler:
 
 def mono_samples(samples: Any) -> NDArray[np.float32]:
     """Return samples as floats of one channel, full scale 1. Raises InputError: as ``Stream.push``."""
-    if isinstance(samples, bytes | bytearray | memoryview):
+    if isinstance(samples, bytes | bytearray) or (isinstance(samples, memoryview) and samples.itemsize == 1):
         if len(samples) % 2:
             raise InputError(f"{len(samples)} bytes of sound, required whole samples of 16 bits")
         samples = np.frombuffer(samples, "<i2")
@@ -87,9 +88,9 @@ def mono_samples(samples: Any) -> NDArray[np.float32]:
     except ValueError as error:
         raise InputError(f"no samples ({error}), required an array of shape (N,) or (N, C)") from error
     is_number = values.dtype.kind == "f" or (values.dtype.kind == "i" and values.itemsize == 2)
-    if not is_number or values.ndim not in (1, 2) or 0 in values.shape[1:]:
+    if not is_number or values.ndim not in (1, 2) or not all(0 < count <= MAX_CHANNELS for count in values.shape[1:]):
         found = f"samples of shape {values.shape} and type {values.dtype}"
-        raise InputError(f"{found}, required (N,) or (N, C), floats or int16")
+        raise InputError(f"{found}, required (N,) or (N, C), C at most {MAX_CHANNELS}, floats or int16")
     with np.errstate(over="ignore"):
         floats = values.astype(np.float32) / np.float32(32768 if values.dtype.kind == "i" else 1)
     if not (np.abs(floats) <= LARGEST_SAMPLE).all():

@@ -6,6 +6,7 @@ import copy
 from collections import deque
 from collections.abc import AsyncIterable, AsyncIterator, Iterable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
@@ -62,7 +63,7 @@ class Stream:
     sample_rate   : of the sound that is pushed, Hz
     look_ahead_ms : how long after its time a frame may be known, 0 to 640; more is better. None: frames come with
                     ``flush`` alone, and are those of ``animate``
-    model         : whose face moves; None: the one that ships
+    model         : whose face moves, a model or its file; None: the one that ships
     pauses        : "rest": the lips close in pauses; "natural": they stay as people's do
     lexicon       : pronounces the words of ``add_words``
     seed          : of blinks, glances and the sway of the head; None: only the mouth moves
@@ -80,21 +81,20 @@ class Stream:
         self,
         sample_rate: int = SPEECH_RATE_HZ,
         look_ahead_ms: float | None = 160.0,
-        model: Model | None = None,
+        model: Model | str | Path | None = None,
         *,
         pauses: Pauses = "rest",
         lexicon: Lexicon | None = None,
         seed: int | None = 0,
     ) -> None:
-        if not LOWEST_RATE_HZ <= sample_rate <= HIGHEST_RATE_HZ or sample_rate != int(sample_rate):
-            allowed = f"a whole number from {LOWEST_RATE_HZ} to {HIGHEST_RATE_HZ}"
-            raise InputError(f"a stream of {sample_rate} Hz, required {allowed}")
+        if sample_rate not in range(LOWEST_RATE_HZ, HIGHEST_RATE_HZ + 1):
+            raise InputError(f"a stream of {sample_rate!r} Hz, required {LOWEST_RATE_HZ} to {HIGHEST_RATE_HZ}, whole")
         if look_ahead_ms is not None and not 0 <= look_ahead_ms <= LONGEST_LOOK_AHEAD_MS:
             raise InputError(f"a look-ahead of {look_ahead_ms} ms, required 0 to {LONGEST_LOOK_AHEAD_MS:g}, or None")
         if pauses not in get_args(Pauses):
             raise InputError(f"pauses {pauses!r}, required one of {', '.join(get_args(Pauses))}")
         self.sample_rate, self.look_ahead_ms, self._pauses, self._seed = int(sample_rate), look_ahead_ms, pauses, seed
-        self._face = ModelFace(model if model is not None else load_model())
+        self._face = ModelFace(load_model(model))
         self._sound: list[NDArray[np.float32]] | None = [] if look_ahead_ms is None else None
         self._lag = max(int(np.floor(((look_ahead_ms or 0.0) / 1000 - HEARD_S) / STEP_S + 1e-9)), -1)
         self._smoother = _Smoother(live_network(), self._lag)
@@ -233,7 +233,6 @@ class Stream:
         return frames
 
     def _speak(self) -> tuple[Array, Array]:
-        """Return pose and weights of the frame that is known now."""
         smooth, known = self._smoother.solve(self._answers, self._before)
         visemes, silent = known[0], float(known[: AHEAD_STEPS + 1, SILENT_ROW].min())
         self._before = [smooth, self._before[0]]
@@ -269,7 +268,6 @@ class Stream:
         return LiveFrame(time_s, known_s, motion, self._face.names, named)
 
     def _animate_all(self) -> list[LiveFrame]:
-        """Return the frames of ``animate`` of all sound."""
         sound, self._sound = np.concatenate(self._sound or [np.zeros(0, np.float32)]), []
         if not len(sound):
             return []

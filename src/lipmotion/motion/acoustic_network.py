@@ -164,7 +164,6 @@ def _rate_sureness(speech: Speech, less: float = 0.0) -> float:
 
 
 def _train(training: PredictorTraining, mean: Array, scale: Array) -> ConvolutionalNetwork:
-    """Return the trained network; ``mean`` and ``scale`` standardise its targets."""
     steps = max(training.epochs * -(-len(training.examples) // BATCH_SIZE), MIN_STEPS)
 
     @cache

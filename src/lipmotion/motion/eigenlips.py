@@ -125,7 +125,6 @@ def _sort_by_colour(images: Images) -> NDArray[np.uint8]:
 
 
 def _check(images: Images, size: tuple[int, int] | None = None) -> None:
-    """Raise InputError unless these are pictures, of a height and width if given."""
     required = f"(T, {size[0]}, {size[1]}, 3)" if size else "(N, H, W, 3)"
     is_valid = images.ndim == 4 and images.shape[3] == len(COLOURS) and (size is None or images.shape[1:3] == size)
     if not is_valid or images.dtype != np.uint8 or not images.size:

@@ -208,7 +208,6 @@ def _train_recurrent(training: PredictorTraining, sequences: Shifted, motion_s: 
 
 
 def _draw_piece(sequences: Shifted, rng: np.random.Generator, number: int) -> TrainingSequence:
-    """Return one of the shifts of an example, or a piece of it."""
     shifted = sequences[number]
     return cut_random_piece(shifted[int(rng.integers(len(shifted)))], rng)
 

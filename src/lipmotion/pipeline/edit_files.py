@@ -161,7 +161,6 @@ def read_edits(path: str | Path, *, phones: bool = True) -> EditFile:
 
 
 def _check_suffix(path: Path) -> None:
-    """Raise InputError unless a name is that of a file of edits."""
     if path.suffix.lower() != SUFFIX:
         raise InputError(f"{path}: a file of edits is called .json, not {path.suffix!r}; rename it")
 

@@ -362,7 +362,8 @@ class SetStep(Step):
     def __post_init__(self) -> None:
         if self.name not in _KIND_OF:
             name, known = shorten(repr(self.name)), ", ".join(_KIND_OF)
-            raise InputError(f"{str(self)!r}: nothing is called {name}; required one of: {known}")
+            others = "the rest, as --fps, are options of animate and render"
+            raise InputError(f"{str(self)!r}: nothing is called {name}; required one of: {known}; {others}")
         _KIND_OF[self.name](**{self.name: self.parsed_value})  # checks it
 
     @property

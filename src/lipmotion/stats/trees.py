@@ -251,7 +251,6 @@ def trees_from_arrays(arrays: Arrays) -> dict[str, Tree]:
 
 
 def _check_nodes(splits: NDArray[np.int32], no: NDArray[np.int32], questions: int) -> None:
-    """Raise ValueError unless the nodes are a tree in the order of ``Tree``."""
     inner = splits >= 0
     if (splits >= questions).any() or (splits < -1).any() or (no[~inner] != -1).any():
         raise ValueError("a tree asks a question that does not exist")

@@ -232,9 +232,15 @@ def remove_left_files(target: Path) -> None:
 
 
 def find_place(target: Path) -> Path:
-    """Return the path that an output is written to; for a link, that of its target, so that the link remains."""
+    """Return the path that an output is written to; for a link, that of its target, so that the link remains.
+
+    Raises ExportError: a pipe or a device, which a file would replace, as ``/dev/null``; an endless link.
+    """
     if _split_confined(target):
         return target
+    with suppress(OSError):
+        if not (stat.S_ISREG(mode := target.stat().st_mode) or stat.S_ISDIR(mode)):
+            raise ExportError(f"{target}: is a pipe or a device, required a file; -o - prints motion and cues")
     try:
         place = Path(os.path.realpath(target)) if target.is_symlink() else target
         endless = place.is_symlink()

@@ -155,7 +155,6 @@ def read_toml(path: Path, kind: str, instead: str) -> dict[str, Any]:
 
 
 def _check_wholes(content: Any) -> None:
-    """Raise ValueError for a whole number beyond 64 bits, which TOML has none of."""
     for name, each in content.items() if isinstance(content, dict) else enumerate(content, 1):
         if isinstance(each, dict | list):
             _check_wholes(each)

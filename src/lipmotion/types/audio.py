@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.errors import InputError
 from lipmotion.types.timeline import Span
 
 SPEECH_RATE_HZ = 16_000  # of all speech that is analysed
@@ -23,6 +24,7 @@ class Audio:
 
     samples : float32 array [shape=(N,)], full scale is ±1
     rate_hz : samples per second; speech is processed at 16,000
+    Raises InputError: other samples, as integers or of several channels; no rate.
 
     >>> import numpy as np
     >>> Audio(np.zeros(8_000, np.float32), 16_000).duration_s
@@ -31,6 +33,15 @@ class Audio:
 
     samples: NDArray[np.float32]
     rate_hz: int
+
+    def __post_init__(self) -> None:
+        samples = self.samples
+        if not isinstance(samples, np.ndarray) or samples.dtype.kind != "f" or samples.ndim != 1:
+            found = f"{samples.dtype} {samples.shape}" if isinstance(samples, np.ndarray) else type(samples).__name__
+            how = f"divide integers of 16 bits by {FULL_SCALE}, take the mean of channels"
+            raise InputError(f"the samples are {found}, required a NumPy array of floats of shape (N,); {how}")
+        if isinstance(self.rate_hz, str | None) or not self.rate_hz > 0:
+            raise InputError(f"the samples are of {self.rate_hz!r} Hz, required a number over 0")
 
     @property
     def duration_s(self) -> float:

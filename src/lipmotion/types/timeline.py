@@ -112,7 +112,6 @@ class Timeline(Generic[LabelT]):
 
 
 def _describe(span: Span[LabelT]) -> str:
-    """Return what a span is, for messages: the phone, the unit, or another label."""
     label = span.label
     if isinstance(label, Unit):
         return f"the phone {label.phone!r}" if label.phone else f"the unit {label.unit!r}"

@@ -231,7 +231,6 @@ def time_moods(tags: Sequence[MoodTag], units: Timeline[Unit]) -> tuple[MoodKey,
 
 
 def _meaning(tag: re.Match[str]) -> tuple[str, float] | None:
-    """Return the mood and the strength that a tag asks for; None: it is not known."""
     name = _NAME.fullmatch((tag[2] or tag["did"] or "").strip().lower())
     known = SYNONYMS.get(name[1]) if name else None
     if name is None or known is None:

@@ -103,7 +103,6 @@ def split_written_words(text: str) -> tuple[str, ...]:
 
 
 def _require_words(words: tuple[str, ...], text: str) -> tuple[str, ...]:
-    """Return words. Raises InputError: there is none."""
     if not words:
         raise InputError(f"the transcript {text[:40]!r} holds no word; give the words that are spoken")
     return words

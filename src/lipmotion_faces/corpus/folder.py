@@ -15,7 +15,7 @@ from lipmotion.errors import CorpusError, InputError, shorten
 from lipmotion.extensions import Registry
 from lipmotion.formats.label_files import find_labels, read_labels
 from lipmotion.formats.tables import is_live_link_file
-from lipmotion.storage.sources import AUDIO_SUFFIXES, VIDEO_SUFFIXES, check_listable
+from lipmotion.storage.sources import AUDIO_SUFFIXES, VIDEO_SUFFIXES, check_listable, read_shipped_table
 from lipmotion.units import split_words
 from lipmotion_faces.corpus.source_recordings import (
     LISTS,
@@ -216,20 +216,7 @@ def read_aligned_words(path: Path) -> tuple[str, ...]:
 
 LRS = "LRS"  # the kind whose clips may be longer than a sentence
 Words = tuple[str, ...]
-CREMA_SENTENCES = {
-    "DFA": "don't forget a jacket",
-    "IEO": "it's eleven o'clock",
-    "IOM": "i'm on my way to the meeting",
-    "ITH": "i think i have a doctor's appointment",
-    "ITS": "i think i've seen this before",
-    "IWL": "i would like a new alarm clock",
-    "IWW": "i wonder what this is about",
-    "MTI": "maybe tomorrow it will be cold",
-    "TAI": "the airplane is almost full",
-    "TIE": "that is exactly what happened",
-    "TSI": "the surface is slick",
-    "WSI": "we'll stop in a couple of minutes",
-}
+CREMA_SENTENCES = {row["code"]: row["sentence"] for row in read_shipped_table("lipmotion_faces.corpus", "crema_d.csv")}
 """What is said in CREMA-D, by the code in a file's name. Source: Cao et al. 2014, Table 1."""
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.extensions import install_command
 from lipmotion.pipeline.batch.report import insert_colours
+from lipmotion.storage.sources import read_shipped_table
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
@@ -64,19 +65,7 @@ def open_socket(host: str, port: int) -> socket.socket:
     return place
 
 
-KINDS = {
-    ".html": "text/html; charset=utf-8",
-    ".css": "text/css; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
-    ".mjs": "text/javascript; charset=utf-8",
-    ".json": "application/json",
-    ".svg": "image/svg+xml",
-    ".png": "image/png",
-    ".txt": "text/plain; charset=utf-8",
-    ".md": "text/plain; charset=utf-8",
-    ".woff2": "font/woff2",
-    ".wasm": "application/wasm",
-}
+KINDS = {row["suffix"]: row["kind"] for row in read_shipped_table("lipmotion_studio.web", "kinds.csv")}
 """What files are served as, by their suffixes; others are not served."""
 
 

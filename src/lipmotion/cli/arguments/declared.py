@@ -250,7 +250,6 @@ def _list_flags(each: Field[Any]) -> tuple[str, ...]:
 
 
 def _name(each: Field[Any]) -> str:
-    """Return the name of an option among those that were parsed."""
     return _list_flags(each)[-1].lstrip("-").replace("-", "_")
 
 

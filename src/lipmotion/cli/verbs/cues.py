@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lipmotion.cli.arguments.declared import add_options, add_output, is_pipe, pick_part, read_pipe
+from lipmotion.cli.arguments.declared import PIPE, add_options, add_output, is_pipe, pick_part, read_pipe
 from lipmotion.cli.arguments.options import Version
 from lipmotion.cli.terminal.printing import flush_output, print_line, print_lines
 from lipmotion.cli.terminal.progress import LEVELS, print_status_lines
@@ -108,6 +108,8 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.model import load_model
     from lipmotion.pipeline.outputs.cues import check_cue_options, check_cue_outputs, cues, write_cues
 
+    if options.output == [Path(PIPE)]:
+        options.output = []  # they are printed
     with print_status_lines(options) as set_progress, read_pipe(options.speech) as speech:
         if [path.suffix.lower() in {"", ".txt"} for path in options.output] == [True]:
             options.format = options.format or "tsv"  # as Rhubarb writes whatever the name is

@@ -79,7 +79,6 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _read_pipe(rate_hz: int) -> Iterator[bytes]:
-    """Yield what comes on standard input, as whole samples."""
     rest, begins = b"", True
     while content := os.read(sys.stdin.fileno(), 2 * int(CHUNK_S * rate_hz)):
         if begins and content.startswith(b"RIFF"):

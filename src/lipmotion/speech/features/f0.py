@@ -131,7 +131,6 @@ def candidates(correlation: Floats) -> tuple[Floats, Floats]:
 
 
 def _weigh_lag(lag: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the weight of the correlation at a lag (``LONG_LAG_SHARE``)."""
     return 1 - LONG_LAG_SHARE * lag * LOWEST_HZ / _RATE_HZ
 
 

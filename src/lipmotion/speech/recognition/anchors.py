@@ -196,6 +196,5 @@ def align_within(
 
 
 def _average_neighbours(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean of each value and those beside it."""
     count = np.convolve(np.ones(len(values)), np.ones(3))[1:-1]
     return np.convolve(values, np.ones(3))[1:-1] / count

@@ -204,7 +204,6 @@ def _trace(
     edges: Columns,
     heard: Array,
 ) -> Path:
-    """Return the best path, which is followed from its end."""
     place, how = int(edges[-1]), int(arrivals[-1, -1])
     words: list[Range | None] = [None] * (len(edges) - 1)
     free: list[tuple[Range, Range]] = []

@@ -42,6 +42,8 @@ SILENT_FRAMES = 50
 """Frames of silence before and after the sound of each passage, recorded or not: the mouth opens before the sound."""
 QUIETEST = 0.1  # so large a share of a passage, its most silent frames, say what silence is like in it
 OFFSET_SHARE = 0.02  # an offset of so small a share of the level of the sound hides no pause
+MOVED_FRAMES, MOVED_SHARE = 101, 0.6  # in the median over a second, rumble changes by 0.45 of the level, knocks by 7
+SLOW_FRAMES, BLOCK = 11, 1 << 20  # the median over so many frames is slower than a voice; samples at a time
 SILENT_ENERGY = -17.0  # the log energy between passages: 80 dB beneath their loudest moments
 
 
@@ -375,8 +377,10 @@ def analysed(audio: Audio, features: Features | None = None) -> AnalysedAudio:
 
 
 def _without_offset(samples: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return samples without constant offsets that are most of the quietest sound between digital silences."""
-    count = len(samples) // HOP if samples.ndim == 1 else 0
+    """Return samples without offsets between digital silences; where one changes, without all slower than a voice."""
+    from scipy.ndimage import median_filter
+
+    count = len(samples) // HOP
     sound, result = np.flatnonzero(samples[: count * HOP].reshape(count, HOP).any(axis=1)), samples
     for part in np.split(sound, np.flatnonzero(np.diff(sound) > SILENT_FRAMES) + 1) if len(sound) else ():
         first = part[0] * HOP
@@ -390,7 +394,14 @@ def _without_offset(samples: NDArray[np.float32]) -> NDArray[np.float32]:
             spread = powers - means**2
             quiet = np.argsort(spread, kind="stable")[: int(len(frames) * QUIETEST) + 1]
             offset, level = np.median(means[quiet]), np.median(spread[quiet])
-            if max(level, OFFSET_SHARE**2 * powers.mean(), 0) < offset**2 < np.inf:
+            moved = np.ptp(median_filter(means, MOVED_FRAMES)) if len(means) > MOVED_FRAMES else 0.0
+            if MOVED_SHARE**2 * spread.mean() < moved**2 < np.inf:
+                result = samples.copy() if result is samples else result
+                slow, centres = median_filter(means, SLOW_FRAMES), (np.arange(len(means)) + 0.5) * HOP
+                for at in range(place.start, place.stop, BLOCK):
+                    block = result[at : min(at + BLOCK, place.stop)]
+                    block -= np.interp(np.arange(len(block)) + (at - place.start), centres, slow)
+            elif max(level, OFFSET_SHARE**2 * powers.mean(), 0) < offset**2 < np.inf:
                 result = samples.copy() if result is samples else result
                 result[place] -= np.float32(offset)
     return result

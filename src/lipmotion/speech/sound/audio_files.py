@@ -70,7 +70,7 @@ class _TrackDecoder:
         """Decode the track; can be called once."""
         import av
 
-        for packet in self._container.demux(self._stream):
+        for packet in self._demux():
             self.packets += packet.size > 0
             self._size += packet.size
             try:
@@ -97,7 +97,8 @@ class _TrackDecoder:
             first, piece = self._pieces.pop()
             samples[first : first + len(piece) // 4] = np.frombuffer(piece, np.float32)
         kind, starts = self._container.format.name, self._stream.start_time
-        is_stated = (self._stream.duration or not self._container.streams.video) and kind not in GUESSED
+        has_own = self._stream.duration and kind != "asf"  # which states that of the longest of its tracks
+        is_stated = (has_own or not self._container.streams.video) and kind not in GUESSED
         is_stated = is_stated and (kind != "mp3" or starts)  # a header that states the length begins after the delay
         stated_s = read_duration(self._container, self._stream) if is_stated else 0.0
         if kind == "matroska,webm" and starts and not list_video(self._container):  # it states its end
@@ -112,6 +113,18 @@ class _TrackDecoder:
             self.energies = np.atleast_1d(np.maximum(self._energies - constant, 0)).tolist()
             self.mean_energy -= float(np.mean(self._sums)) ** 2 / max(self._count, 1)
         self.missing_s = missing_s if missing_s > rounded_s else 0.0
+
+    def _demux(self) -> Iterator[Any]:
+        """Yield the packets; those of an MP3 without the tags, and pictures, between files that were joined."""
+        tag_end = 0
+        for packet in self._container.demux(self._stream):
+            head = bytes(packet)[:10] if self._container.format.name == "mp3" else b""
+            if head[:3] == b"ID3":
+                tag_end = packet.pos + sum(byte << 7 * (9 - at) for at, byte in enumerate(head[6:], 6))
+            if (packet.pos or 0) < tag_end or head[:8] == b"APETAGEX":
+                self._clock_s = None
+            else:
+                yield packet
 
     def _place(self, frame: Any) -> None:
         """Note a hole before a frame that starts later than the one before it ended."""
