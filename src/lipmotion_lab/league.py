@@ -37,7 +37,7 @@ from lipmotion.types.motion import interpolate_rows
 from lipmotion.units import Lexicon, is_silent
 from lipmotion_lab.evaluation.evaluate import BILABIAL, ClipStatistic, divide_sums
 from lipmotion_lab.report.page import FPS, FinishedPart, draw_mouths, write_html
-from lipmotion_lab.report.section import Column, Section, Table, warn_of_few, write_text
+from lipmotion_lab.report.section import Section, Table, read_columns, warn_of_few, write_text
 
 Array = NDArray[np.float64]
 CHANNELS = ("opening", "width")
@@ -501,17 +501,6 @@ def run_rivals(  # noqa: PLR0913
     return League(standings, absent, failed, recordings[: len(reported)], about)
 
 
-COLUMNS = (
-    Column("given", "given"),
-    Column("acc", "opening", ".3f", "mean correlation of a recording's opening with its speaker's"),
-    Column("width", "width", ".3f", "the same of the width of the mouth"),
-    Column("lips", "p b m", ".2f", "closings in p, b and m: F1; false are those in other phones"),
-    Column("f1", "closings", ".2f", "all closings: F1 of pairs within two frames"),
-    Column("strength", "strength", ".2f", "98th percentile of the opening in speech, by the speaker's"),
-    Column("jerk", "jerk", ".2f", "mean third difference of the opening, by the speaker's"),
-    Column("onset", "onset", ".0f", "mean error, in ms, with which the mouth begins to open; 200 where it never does"),
-    Column("seconds", "processor", ".3f", "processor seconds for a second of sound"),
-)
 SUBTITLE = "Rivals and our engines on the same filmed recordings."
 HOW_TO_READ = (
     "Weights of a rival become opening and width by a linear map that moves as widely as the speakers do. The map, its "
@@ -544,7 +533,8 @@ def describe_league(league: League) -> Section:
             verdict += f"; {low:+.3f} to {high:+.3f} more than the best rival, {best.rival.title}"
     lips = int(sum(counts[:2].sum() for counts in league.standings[0].figures["lips"].sums)) if league.standings else 0
     about = ", ".join(f"{key}: {value}" for key, value in league.about.items())
-    table = Table("standings", f"recorded closings in p, b, m: {lips}", COLUMNS, rows, best.rival.title if best else "")
+    title, columns = f"recorded closings in p, b, m: {lips}", read_columns("league")
+    table = Table("standings", title, columns, rows, best.rival.title if best else "")
     words = warn_of_few(len(league.recordings))
     for title, reasons in (("Not installed", league.absent), ("Failed", league.failed)):
         words |= {title: [f"{name}: {reason}" for name, reason in reasons.items()]} if reasons else {}

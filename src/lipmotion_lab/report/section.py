@@ -11,6 +11,7 @@ from typing import Any
 
 from lipmotion.printable import printable
 from lipmotion.storage.files import atomic_file, make_folder
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.storage.text_table import as_field
 from lipmotion_lab.evaluation.evaluate import find_sign, mark_significance
 from lipmotion_lab.evaluation.table import format_figure
@@ -34,6 +35,12 @@ class Column:
     title: str
     form: str = ""
     note: str = ""
+
+
+def read_columns(table: str) -> tuple[Column, ...]:
+    """Return the columns of a table of ``columns.csv``, in order."""
+    rows = read_shipped_table(__package__, "columns.csv")
+    return tuple(Column(row["key"], row["title"], row["form"], row["note"]) for row in rows if row["table"] == table)
 
 
 @dataclass(frozen=True)

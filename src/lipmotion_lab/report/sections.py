@@ -8,39 +8,14 @@ from itertools import pairwise
 from typing import Any
 
 from lipmotion_lab.evaluation.evaluate import find_sign
-from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES
+from lipmotion_lab.evaluation.held_out import AUDIO_ONLY
 from lipmotion_lab.evaluation.table import format_figure
 from lipmotion_lab.hofer2008 import PAPER_SCORES, PINS, REFERENCE_SET
 from lipmotion_lab.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS
-from lipmotion_lab.report.section import Column, PaperOrder, PaperPair, Row, Section, Table, warn_of_few
+from lipmotion_lab.report.section import Column, PaperOrder, PaperPair, Row, Section, Table, read_columns, warn_of_few
 from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM, SPLIT
 
-ACC = Column("acc", "ACC", ".3f", "correlation of the opening with the recording")
-NRMSE = Column("nrmse", "nRMSE", ".3f")
-SCORE = Column("score", "score", ".1f", "closings of the recording that the motion makes within two frames, in %")
-PRECISION = Column("precision", "precision", ".1f", "generated closings that are of the recording, in %")
-RECALL = Column("recall_p_b_m", "p b m", ".1f", "p, b and m in which the lips close, in %")
-VARIANCE = Column("global_variance", "variance", ".2f", "of the opening, by that of the recording")
-JERK = Column("jerk", "jerk", ".2f", "of the opening, by that of the recording")
-ELSEWHERE = Column("false_per_minute", "elsewhere", ".1f", "closings outside p, b and m, a minute of speech")
-OPENING = (ACC, NRMSE, SCORE, PRECISION, RECALL, VARIANCE)
-"""What the experiments that no paper printed say of the opening."""
-TIMING = Column("timing_ms", "timing", "+.0f", "by how much closings are late, in ms")
 AS_PRINTED, SETS = next(iter(PINS)), "Unit sets, "
-HOFER_COLUMNS = (
-    Column("paper", "paper: score", ".1f", "the paper's Table 1, in %: another speaker, corpus and threshold"),
-    SCORE,
-    PRECISION,
-    RECALL,
-    TIMING,
-    ACC,
-    NRMSE,
-    JERK,
-    VARIANCE,
-    Column("units", "units", ".0f", "how many the set has"),
-    Column("gaussians", "K", ".0f", "Gaussians a state for speech, chosen on val"),
-    Column("motion_gaussians", "K, motion", ".0f", "and for motion"),
-)
 
 
 def subtract(one: float | None, other: float | None) -> float | None:
@@ -112,32 +87,7 @@ def _describe_closings(figures: Mapping[str, Any], row: Row) -> str:
 def _build_hofer_table(block: Mapping[str, Any]) -> Table:
     case = f"{block['states']} states, {block['condition']}, {block['pins']}"
     name = f"hofer2008-{case}".replace(",", "").replace(" ", "-")
-    return Table(name, f"{SETS}{case}", HOFER_COLUMNS, block["rows"], REFERENCE_SET, "unit set")
-
-
-RATIOS = (VARIANCE, JERK)
-MINNIS_COLUMNS = (
-    ACC,
-    replace(RECALL, note="p, b and m in which the lips close, without pins, in %"),
-    SCORE,
-    ELSEWHERE,
-    NRMSE,
-    *(
-        Column(f"{channel}_{each.key}", f"{each.title}, {channel}", ".2f", "by that of the recording")
-        for channel in DISTANCES
-        for each in RATIOS
-    ),
-    Column("joins_candidates", "candidates", ".0f", "units that are looked up for a phone, median"),
-    Column(
-        "overlap_error",
-        "overlaps",
-        ".4f",
-        "error, in eye distances, where the print overlaps units other than in halves",
-    ),
-    Column("joins_per_clip", "joins", ".1f", "a recording"),
-    Column("joins_hard", "hard", ".0f", "joins at which units abut, in %"),
-    Column("joins_smooth", "smooth", ".0f", "joins no rougher than 95 % of the speaker's own motion, in %"),
-)
+    return Table(name, f"{SETS}{case}", read_columns("hofer2008"), block["rows"], REFERENCE_SET, "unit set")
 
 
 def build_minnis_section(figures: Mapping[str, Any]) -> Section:
@@ -153,9 +103,11 @@ def build_minnis_section(figures: Mapping[str, Any]) -> Section:
                 own |= {f"joins_{key}": joins[key] and 100 * joins[key] for key in ("hard", "smooth")}
                 own |= {f"overlap_{key}": each for key, each in overlap.items()}
                 for channel, each in row["channels"].items():
-                    own |= {f"{channel}_{ratio.key}": each[ratio.key] for ratio in RATIOS}
+                    own |= {f"{channel}_{ratio}": each[ratio] for ratio in ("global_variance", "jerk")}
                 with_joins[system] = {**row, **own}
-            tables[split, condition] = Table(name.replace(" ", "-"), caption, MINNIS_COLUMNS, with_joins, PRINTED)
+            tables[split, condition] = Table(
+                name.replace(" ", "-"), caption, read_columns("minnis2000"), with_joins, PRINTED
+            )
     split, last = list(figures["lists"].items())[-1]
     main = tables[split, AUDIO_ONLY]
     rows, everything = main.rows, main.rows.get(EVERYTHING, main.rows[PRINTED])
@@ -209,22 +161,6 @@ def _group(signs: Mapping[str, int], described: Mapping[str, str], outcomes: Seq
     ]
 
 
-XIELIU_COLUMNS = (
-    Column("paper_acc", "paper: ACC", ".3f", "the paper's Table 3, of eigenlips of another speaker"),
-    Column("acc", "ACC", ".3f", "mean correlation of the channels with the recording"),
-    Column("paper_amse", "paper: AMSE", ".3f", "in the paper's units of eigenlips, which do not compare"),
-    Column("amse", "AMSE", ".4f", "mean distance from the recording, smaller is better"),
-    Column("opening_acc", "opening", ".3f", "correlation of the opening alone"),
-    NRMSE,
-    Column("rmse", "RMSE", ".4f", "of the opening"),
-    SCORE,
-    RECALL,
-    ELSEWHERE,
-    VARIANCE,
-    Column("lag_ms", "lag", "+.0f", "in ms"),
-    Column("parameters", "numbers", ".0f", "what the chains have learned"),
-    Column("seconds", "seconds", ".1f", "of a processor, for training"),
-)
 MEASURES = (("acc", "ACC", "+.3f"), ("amse", "AMSE", "+.4f"))
 
 
@@ -277,7 +213,7 @@ def _build_systems_table(case: str, rows: Mapping[str, Row], size: Mapping[str, 
         amse, acc = PAPER_FIGURES.get(name.removesuffix(SPLIT), (None, None))
         training = {key: size["training"][name][key] for key in ("parameters", "seconds")}
         full_rows[name] = {**(row["opening"] or {}), **row, **training, "paper_amse": amse, "paper_acc": acc}
-    columns = [*XIELIU_COLUMNS]
+    columns = [*read_columns("xieliu2007")]
     if not any(row["opening"] for row in rows.values()):  # eigenlips alone, in grey levels
         columns = [replace(column, form=".1f") if column.key == "amse" else column for column in columns]
     elif any("eigenlips_acc" in row for row in rows.values()):
@@ -304,15 +240,6 @@ def _compare_order(
     return PaperOrder(title, paper, here, compared, form, is_error)
 
 
-ENGINES_COLUMNS = (
-    *(*OPENING, ELSEWHERE, JERK, Column("width_acc", "width", ".3f", "correlation of the width")),
-    *(
-        Column(f"unpinned_{each.key}", f"{each.title}, no pins", each.form, "lips not made to meet")
-        for each in (SCORE, PRECISION, RECALL, ELSEWHERE)
-    ),
-)
-
-
 def build_engines_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``compare_engines`` say."""
     reference = figures["reference"]
@@ -324,7 +251,7 @@ def build_engines_section(figures: Mapping[str, Any]) -> Section:
         }
         for condition, case in figures["conditions"].items()
     }
-    main, *more = _make_tables("engines", "Engines", ENGINES_COLUMNS, conditions, reference)
+    main, *more = _make_tables("engines", "Engines", read_columns("engines"), conditions, reference)
     signs = {name: find_sign(row["acc_gain_95"]) for name, row in main.rows.items() if name != reference}
     best = max(main.rows, key=lambda name: main.rows[name]["acc"] or 0.0)
     acc = format_figure(main.rows[best]["acc"], ".3f")
@@ -344,17 +271,11 @@ def build_engines_section(figures: Mapping[str, Any]) -> Section:
 def build_learning_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``run_learning_curve`` say."""
     sizes = {str(row["names"]): row for row in figures["rows"]}
-    columns = (
-        Column("used", "used", ".0f", "recordings that could be used"),
-        Column("minutes", "minutes", ".1f", "of training"),
-        Column("seconds", "seconds", ".0f", "that training took"),
-        *OPENING,
-        *(Column(f"acc_{name}", name, ".3f", f"correlation of the {name}") for name in DISTANCES[1:]),
-    )
     conditions = {
         condition: {size: {**row, **row["conditions"][condition]} for size, row in sizes.items()}
         for condition in figures["rows"][0]["conditions"]
     }
+    columns = read_columns("learning-curve")
     main, *more = _make_tables("learning-curve", "Learning curve", columns, conditions, head="recordings")
     first, last = next(iter(main.rows)), list(main.rows)[-1]
     low, high = (format_figure(main.rows[size]["acc"], ".3f") for size in (first, last))
@@ -382,8 +303,8 @@ def build_learning_section(figures: Mapping[str, Any]) -> Section:
 def build_folds_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``cross_validate`` say."""
     rows = figures["conditions"]
-    original = Column("original_per_minute", "recorded elsewhere", ".1f", "the same of the recordings")
-    columns, row = (*OPENING, TIMING, ELSEWHERE, original), rows[AUDIO_ONLY]
+    row = rows[AUDIO_ONLY]
+    columns = read_columns("folds")
     table = Table("folds", f"Cross-validation, {figures['folds']} folds", columns, rows, head="condition")
     acc, clips = format_figure(row["acc"], ".3f"), figures["clips"]
     verdict = f"ACC {acc} on {clips} recordings, each generated by a model of the others."
@@ -408,12 +329,11 @@ def build_folds_section(figures: Mapping[str, Any]) -> Section:
 def build_blocks_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``cross_validate_blocks`` say: of sound alone, systems by their mean correlation."""
     rows = {name: {**(row.get("opening") or {}), **row} for name, row in figures["conditions"][AUDIO_ONLY].items()}
-    columns = (Column("acc", "ACC, mean", ".3f", "correlation, mean over channels"), SCORE, PRECISION, RECALL, VARIANCE)
     best = max(rows, key=lambda name: rows[name]["acc"])
     about = (
         f"{figures['clips']} recordings, {figures['minutes']:.1f} minutes, in {figures['blocks']} blocks: each is "
         f"generated by systems trained on the others but one, on which they choose."
     )
     verdict = f"Highest ACC: {best}, {rows[best]['acc']:.3f}."
-    table = Table("blocks", "Small corpus, sound alone", columns, rows, head="system")
+    table = Table("blocks", "Small corpus, sound alone", read_columns("blocks"), rows, head="system")
     return Section("Small corpus in blocks", about, verdict, warn_of_few(figures["clips"]), table)
