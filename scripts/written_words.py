@@ -29,9 +29,10 @@ def main() -> None:
     network = G2PModel()
     tokens = sorted((token for token in PhoneRecogniser().tokens if not token.startswith("<")), key=len, reverse=True)
     lines = []
-    for word in load_english().language.words[:MAX_WORDS]:
+    for word in load_english().words[:MAX_WORDS]:
         known = {tuple(FULL_FORMS.get(phone, phone) for phone in each) for each in Lexicon().pronunciations(word)}
-        phones = spelt(unicodedata.normalize("NFC", network.predict(word).ipa), tokens)
+        ipa = unicodedata.normalize("NFC", network.predict(word).ipa).replace("ɾ", "ɹ")  # it spells many an r as a tap
+        phones = spelt(ipa, tokens)
         if word.replace("'", "").isalpha() and phones and phones not in known:
             lines.append(f"{word} {' '.join(phones)}\n")
     TARGET.write_text("".join(lines), encoding="ascii")
