@@ -24,6 +24,7 @@ from lipmotion.kernels.factorial_loops import (
     Loop,
     LoopCounts,
     count_cached_frames,
+    join_logs,
     log_ends,
 )
 
@@ -90,28 +91,19 @@ def infer_factorial(
     logs = logs._replace(pair=logs.pair[:, order], pairs=logs.pairs[order])
     ways: list[_Scaled | _InLogs] = []
     share = np.prod([np.mean(log > -np.inf) for log in (logs.audio, logs.visual)])
-    probabilities = (
-        part
-        for loop in (audio, visual)
-        for part in (loop.stay, loop.onward, loop.leave[:, None] * loop.enter, loop.initial, loop.final)
-    )
+    probabilities = (p for loop in (audio, visual) for p in (*_moves(loop, DOUBLE), loop.initial, loop.final))
     least = min(float(part.min(where=part > 0, initial=1.0)) for part in probabilities)
     if least >= MIN_PROBABILITY and share > SPARSE_SHARE:
         ways += [_Scaled(audio, visual, logs, kind) for kind in OFF if kind in (DOUBLE, logs.audio.dtype)]
     results = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
-    result = next((each for each in results if each is not None), None)
-    if result is None:  # there is no path
-        loops = ((loop.stay, loop.onward, loop.enter) for loop in (audio, visual))
-        first, second = (LoopCounts(*map(np.zeros_like, parts)) for parts in loops)
-        in_audio, in_visual, in_pairs = (np.zeros(log.shape) for log in logs[:3])
-        return FactorialPosteriors(in_audio, in_visual, in_pairs, first, second, -np.inf)
+    result = next(each for each in results if each is not None)
     return result._replace(pair=result.pair[:, np.argsort(order)])
 
 
 def _forward_backward(
     loops: tuple[Loop, Loop], logs: FactorialLogLikelihoods, way: _Scaled | _InLogs, stretch: int | None
 ) -> FactorialPosteriors | None:
-    """Return the posteriors, computed in a way; None: there is no path, or the precision is not enough."""
+    """Return the posteriors, computed in a way; None: its precision is not enough."""
     frames = len(logs.audio)
     stretch = stretch or count_cached_frames(frames, way.frame_bytes)
     starts, heads, log_likelihood = range(0, frames, stretch), list[Array | None](), 0.0
@@ -129,15 +121,14 @@ def _forward_backward(
             forward.clear()
             way.forward(start, start + stretch, head, forward)
         log_overlaps = way.back(start, forward, posteriors, entered)
-        if not min(log_overlaps) > way.min_log_overlap:
+        if not min(log_overlaps) >= way.min_log_overlap:
             return None
         if start == starts[-1]:
             log_likelihood += log_overlaps[-1]
-    counts = [_counted(*parts) for parts in zip(loops, posteriors[:2], entered, strict=True)]
+    counts = _counted(loops[0], posteriors[0], entered[0]), _counted(loops[1], posteriors[1], entered[1])
     for part in (*posteriors, *counts[0], *counts[1]):
         part[part < MIN_POSTERIOR] = 0
-    of_audio, of_visual, of_pairs = posteriors
-    return FactorialPosteriors(of_audio, of_visual, of_pairs, counts[0], counts[1], log_likelihood)
+    return FactorialPosteriors(*posteriors, *counts, log_likelihood)
 
 
 Forward = list[tuple[Array, Array]]
@@ -154,7 +145,6 @@ class _Scaled:
         self.audio, self.visual = _moves(audio, kind), _moves(visual, kind)
         self.start, self.densities = 0, list[tuple[Array, Array, Array, float]]()
         self.after = self.initial, self.initial  # of the frame after: backward probabilities times densities, leaving
-        self.pairs: tuple[Index, Index] = logs.pairs[:, 0], logs.pairs[:, 1]
         # In a frame, what was raised is 1 / whole² at most for each joint state, forward and backward, times the sum of
         # all that leads to a state or from it: up to U + 2 ≤ 3 U in each loop.
         raised = 2 * len(logs.audio) * 9 * self.initial.size / self.whole**2
@@ -166,18 +156,21 @@ class _Scaled:
         loop's transition only [shape=(Na, Uv)]; return the log of the product of their scales.
         """
         self.start, self.densities = start, self.logs.densities(start, stop)
-        log_total, units, count = 0.0, len(self.audio[2]), len(self.visual[2])
+        (stay, onward, leave), log_total = self.audio, 0.0
+        units, count = len(leave), len(self.visual[2])
         for audio, visual, pair, best in self.densities:
             if before is None:
-                before, log = self._shares(self.initial + self.logs.joint(0))
+                before, log = self._shares(self.initial + join_logs(self.logs, 0))
                 results.append((before, before[:, :count]))
                 log_total += log
                 continue
-            entering, after = self.audio[2].T @ before[-units:], np.empty_like(before)
-            moved = _move_to_last(before, *self.audio[:2], entering, count)
+            entering, last, after = leave.T @ before[-units:], before[:, -count:], np.empty_like(before)
+            moved = stay[:, None] * last
+            moved[:units] += entering[:, -count:]
+            moved[units:] += onward[:, None] * last[:-units]
             total = _forward(
-                before, *self.audio[:2], entering, *self.visual[:2], moved @ self.visual[2],
-                audio, visual, pair, *self.pairs,
+                before, stay, onward, entering, *self.visual[:2], moved @ self.visual[2],
+                audio, visual, pair, self.logs.pairs,
                 MIN_PRODUCT[self.kind], self.whole, after,
             )  # fmt: skip
             if not total > MIN_TOTAL[self.kind]:
@@ -197,7 +190,7 @@ class _Scaled:
             before, sums = forward[t - start][0], [part[t] for part in posteriors]
             backward, leaving = self.after
             if t == len(self.logs.audio) - 1:
-                after, log = self._shares(self.final + self.logs.joint(t))
+                after, log = self._shares(self.final + join_logs(self.logs, t))
                 if not log > -math.inf:
                     break
                 rows, columns = map(np.arange, before.shape)
@@ -205,13 +198,15 @@ class _Scaled:
                 log_overlap = _meet_in_logs(logs, self.final, self.logs.pairs, rows, columns, *sums)
                 log_overlap -= math.log(self.whole)
             else:
-                (audio, visual, pair, _), units = self.densities[t - self.start], len(self.audio[2])
-                first = backward[:, : len(self.visual[2])]
-                moved = _move_back(backward, *self.visual[:2], first @ self.visual[2].T)
+                audio, visual, pair, _ = self.densities[t - self.start]
+                (stay, onward, leave), units, count = self.visual, len(self.audio[2]), len(self.visual[2])
+                first, moved = backward[:, :count], stay * backward
+                moved[:, :-count] += onward * backward[:, count:]
+                moved[:, -count:] += first @ leave.T
                 after = np.empty_like(before)
                 total = _backward(
                     before, moved, *self.audio[:2], self.audio[2] @ moved[:units], audio, visual, pair,
-                    *self.pairs, MIN_PRODUCT[self.kind], self.whole, after, *sums,
+                    self.logs.pairs, MIN_PRODUCT[self.kind], self.whole, after, *sums,
                 )  # fmt: skip
                 met = float(sums[0].sum())
                 if not (met > 0 and total > MIN_TOTAL[self.kind]):
@@ -222,7 +217,7 @@ class _Scaled:
                 entered[1][:] += leaving.T @ first / np.float64(met)
                 log_overlap = math.log(met) - 2 * math.log(self.whole)
             log_overlaps[t - start], self.after = log_overlap, (after, forward[t - start][1])
-            if not log_overlap > self.min_log_overlap:
+            if not log_overlap >= self.min_log_overlap:
                 break
         return log_overlaps
 
@@ -247,7 +242,7 @@ def _moves(loop: Loop, kind: np.dtype[Any]) -> tuple[Array, Array, Array]:
 class _InLogs:
     """The steps of ``_Scaled`` in logarithms: those of backward probabilities and densities, too."""
 
-    min_log_overlap = -math.inf
+    min_log_overlap = -math.inf  # of a recording without a path
 
     def __init__(self, audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -> None:
         self.loops, self.logs = (LogTransitions.of(audio), LogTransitions.of(visual)), logs
@@ -257,7 +252,6 @@ class _InLogs:
         self.possible = logs.audio > -np.inf, logs.visual > -np.inf
         for possible, states in zip(self.possible, logs.pairs.T, strict=True):
             np.logical_or.at(possible.T, states, -np.inf < logs.pair.T)
-            possible[[0, -1]] = True  # as beginnings and ends are given for all
         self.after = self.initial, self.initial  # of the frame after: backward probabilities times densities, leaving
 
     def forward(self, start: int, stop: int, before: Array | None, results: Forward) -> float:
@@ -299,7 +293,7 @@ def _forward_in_logs(
             _move_logs(before, loops[0], rows, before_columns, moved)
             _move_logs(moved.T, loops[1], columns, rows, after.T)
             leaving[t - start] = moved[:, moved.shape[1] - leaving.shape[2] :]
-        _add_densities(after, logs, t, rows, columns)
+        after += join_logs(logs, t)
         before = after
 
 
@@ -327,10 +321,10 @@ def _back_in_logs(
             _move_logs(moved[::-1], loops[0], turned[1], columns, beta[::-1])
         sums = posteriors[0][t], posteriors[1][t], posteriors[2][t]
         log_overlap = _meet_in_logs(before, beta, logs.pairs, rows, columns, *sums)
-        if t + 1 < len(logs.audio):
+        if t + 1 < len(logs.audio) and log_overlap > -np.inf:
             _count_entered(before[len(before) - units :], moved[:units], log_overlap, entered[0])
             _count_entered(leaving_after.T, backward[:, :others].T, log_overlap, entered[1])
-        _add_densities(beta, logs, t, rows, columns)
+        beta += join_logs(logs, t)
         log_overlaps[t - start], backward, leaving_after, rows_after = log_overlap, beta, leaving[t - start], rows
     return log_overlaps, backward
 
@@ -341,19 +335,6 @@ def _add_logs(one: float, other: float) -> float:
     best = max(one, other)
     less = min(one, other) - best
     return best + math.log1p(math.exp(less)) if less > MIN_LOG_SHARE else best
-
-
-@compiled
-def _add_densities(joint: Double, logs: FactorialLogLikelihoods, t: int, rows: Index, columns: Index) -> None:
-    """Add the log densities of a frame; only these rows and columns are possible."""
-    priors, pairs = np.empty(len(logs.pairs)), logs.pairs
-    for p in range(len(pairs)):
-        priors[p] = joint[pairs[p, 0], pairs[p, 1]]
-    for i in rows:
-        for j in columns:
-            joint[i, j] += np.float64(logs.audio[t, i]) + logs.visual[t, j]
-    for p in range(len(pairs)):
-        joint[pairs[p, 0], pairs[p, 1]] = priors[p] + logs.pair[t, p]
 
 
 @compiled
@@ -382,19 +363,16 @@ def _sum_entering(
 def _move_logs(before: Double, loop: LogTransitions, rows: Index, columns: Index, after: Double) -> None:
     """Fill in log probabilities one frame on, along axis 0, in rows and columns, in ascending order."""
     units, last = len(loop.leaving), before[len(before) - len(loop.leaving) :]
-    tops, parts = np.full(len(columns), -np.inf), np.zeros((units, len(columns)))
+    tops, parts = np.empty(len(columns)), np.zeros((units, len(columns)))
     if len(rows) and rows[0] < units:  # some first states are entered
-        for u in range(units):
-            for c in range(len(columns)):
-                tops[c] = max(tops[c], last[u, columns[c]])
-        for u in range(units):
-            for c in range(len(columns)):
-                if last[u, columns[c]] > tops[c] - LARGEST_EXPONENT:
-                    parts[u, c] = math.exp(last[u, columns[c]] - tops[c])
+        for c, j in enumerate(columns):
+            tops[c] = last[:, j].max()
+            for u in range(units):
+                if last[u, j] > tops[c] - LARGEST_EXPONENT:
+                    parts[u, c] = math.exp(last[u, j] - tops[c])
     for i in rows:
         entering = _sum_entering(last, loop, i, columns, parts, tops) if i < units else tops
-        for c in range(len(columns)):
-            j = columns[c]
+        for c, j in enumerate(columns):
             other = entering[c] if i < units else before[i - units, j] + loop.onward[i - units]
             after[i, j] = _add_logs(before[i, j] + loop.stay[i], other)
 
@@ -432,9 +410,7 @@ def _count_entered(last: Array, first: Array, log_overlap: float, entered: Doubl
     """Add the sums of the products of leaving units and of entering units [shapes=(U, M)], from logarithms."""
     left, into = np.empty(len(last)), np.empty(len(first))
     for j in range(last.shape[1]):
-        top = best = -np.inf
-        for u in range(len(last)):
-            top, best = max(top, last[u, j]), max(best, first[u, j])
+        top, best = last[:, j].max(), first[:, j].max()
         if top == -np.inf or best == -np.inf:
             continue
         shift = top - log_overlap
@@ -445,9 +421,7 @@ def _count_entered(last: Array, first: Array, log_overlap: float, entered: Doubl
             continue
         for u in range(len(last)):
             left[u], into[u] = math.exp(last[u, j] - top), math.exp(first[u, j] + shift)
-        for u in range(len(last)):
-            for v in range(len(first)):
-                entered[u, v] += left[u] * into[v]
+        entered += left[:, None] * into
 
 
 def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:
@@ -462,58 +436,37 @@ def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:
 
 
 @compile_to_rounding
-def _move_to_last(before: Array, stay: Array, onward: Array, entering: Array, count: int) -> Array:
-    """Return joint probabilities, last columns, one frame on along axis 0 by those of entering [shape=(U, M)]."""
-    last, into_last = before[:, before.shape[1] - count :], entering[:, before.shape[1] - count :]
-    after = np.empty((len(before), count), before.dtype)
-    for i in range(len(before)):
-        _move(last, stay, onward, into_last, i, after[i])
-    return after
-
-
-@compile_to_rounding
-def _move_back(after: Array, stay: Array, onward: Array, left: Array) -> Array:
-    """Return joint backward probabilities a frame back along axis 1; ``left``: of leaving last states [(N, U)]."""
-    before, units = np.empty_like(after), left.shape[1]
-    inner = after.shape[1] - units
-    for i in range(len(after)):
-        into, out = before[i], after[i]
-        next_states = out[units:]
-        for j in range(inner):
-            into[j] = stay[j] * out[j] + onward[j] * next_states[j]
-        last, out_last, stay_last, left_last = into[inner:], out[inner:], stay[inner:], left[i]
-        for j in range(units):
-            last[j] = stay_last[j] * out_last[j] + left_last[j]
-    return before
-
-
-@compile_to_rounding
 def _forward(
     before: Array, stay_0: Array, onward_0: Array, entering_0: Array, stay_1: Array, onward_1: Array, entering_1: Array,
-    density_0: Array, density_1: Array, pair: Array, pair_0: Index, pair_1: Index, floor: float, whole: float,
+    density_0: Array, density_1: Array, pair: Array, pairs: Index, floor: float, whole: float,
     after: Array,
 ) -> float:  # fmt: skip
     """Fill in joint probabilities one frame on along both axes, times densities, normalised; return their sum before.
 
     entering_0, entering_1 : [shapes=(U, M), (N, U)], probabilities of entering the first states
-    pair, pair_0, pair_1 : the densities of pairs, and the two states of each, sorted by the first
+    pair, pairs : the densities of pairs, and the two states of each, sorted by the first [shape=(P, 2)]
     """
     moved, prior = np.empty(before.shape[1], before.dtype), np.empty(before.shape[1], before.dtype)
-    total, p = np.float64(0), 0
+    units, others, p = len(entering_0), entering_1.shape[1], 0
+    rest, moved_rest, stay_rest = prior[others:], moved[others:], stay_1[others:]
     for i in range(len(before)):
-        _move(before, stay_0, onward_0, entering_0, i, moved)
-        _move_along(moved, stay_1, onward_1, entering_1[i], prior)
-        _emit(prior, density_0[i], density_1, floor, after[i])
-        p = _emit_pairs(prior, i, p, pair_0, pair_1, pair, floor, after[i])
-        total += _sum(after[i])
-    _share(after, total, whole)
-    return total / whole
+        if i < units:
+            _combine(before[i], stay_0[i], entering_0[i], 1.0, moved)
+        else:
+            _combine(before[i], stay_0[i], before[i - units], onward_0[i - units], moved)
+        entering = entering_1[i]
+        for j in range(others):
+            prior[j] = stay_1[j] * moved[j] + entering[j]
+        for j in range(len(onward_1)):
+            rest[j] = stay_rest[j] * moved_rest[j] + onward_1[j] * moved[j]
+        p = _emit(prior, i, p, density_0, density_1, pair, pairs, floor, after[i])
+    return _share(after, whole)
 
 
 @compile_to_rounding
 def _backward(
     before: Array, moved: Array, stay: Array, onward: Array, left: Array,
-    density_0: Array, density_1: Array, pair: Array, pair_0: Index, pair_1: Index, floor: float, whole: float,
+    density_0: Array, density_1: Array, pair: Array, pairs: Index, floor: float, whole: float,
     after: Array, posterior_0: Array, posterior_1: Array, posterior_pair: Array,
 ) -> float:  # fmt: skip
     """Fill in posteriors, not normalised, and backward probabilities times densities, normalised; return their sum.
@@ -522,24 +475,23 @@ def _backward(
     left  : [shape=(U, M)], those of leaving the last states
     """
     beta = np.empty(before.shape[1], before.dtype)
-    units, total, p = len(left), np.float64(0), 0
-    inner = len(before) - units
+    units, inner, p = len(left), len(before) - len(left), 0
     posterior_1[:] = 0
     for i in range(len(before)):
         if i < inner:
             _combine(moved[i], stay[i], moved[i + units], onward[i], beta)
         else:
             _combine(moved[i], stay[i], left[i - inner], 1.0, beta)
-        posterior_0[i] = _meet(before[i], beta, posterior_1)
-        q = p
-        while q < len(pair_0) and pair_0[q] == i:
-            posterior_pair[q] = np.float64(before[i, pair_1[q]]) * beta[pair_1[q]]
-            q += 1
-        _emit(beta, density_0[i], density_1, floor, after[i])
-        p = _emit_pairs(beta, i, p, pair_0, pair_1, pair, floor, after[i])
-        total += _sum(after[i])
-    _share(after, total, whole)
-    return total / whole
+        alpha, total, first = before[i], np.float64(0), p
+        for j in range(len(beta)):
+            product = np.float64(alpha[j]) * beta[j]
+            posterior_1[j] += product
+            total += product
+        posterior_0[i] = total
+        p = _emit(beta, i, p, density_0, density_1, pair, pairs, floor, after[i])
+        for q in range(first, p):
+            posterior_pair[q] = np.float64(alpha[pairs[q, 1]]) * beta[pairs[q, 1]]
+    return _share(after, whole)
 
 
 @compile_to_rounding
@@ -550,71 +502,31 @@ def _combine(one: Array, weight: float, other: Array, other_weight: float, into:
 
 
 @compile_to_rounding
-def _move(before: Array, stay: Array, onward: Array, entering: Array, i: int, into: Array) -> None:
-    """Fill in row i, one frame on along axis 0."""
-    units = len(entering)
-    if i < units:
-        _combine(before[i], stay[i], entering[i], 1.0, into)
-    else:
-        _combine(before[i], stay[i], before[i - units], onward[i - units], into)
-
-
-@compile_to_rounding
-def _move_along(before: Array, stay: Array, onward: Array, entering: Array, into: Array) -> None:
-    """Fill in a row, one frame on along itself."""
-    units = len(entering)
-    for j in range(units):
-        into[j] = stay[j] * before[j] + entering[j]
-    rest, before_rest, weight = into[units:], before[units:], stay[units:]
-    for j in range(len(onward)):
-        rest[j] = weight[j] * before_rest[j] + onward[j] * before[j]
-
-
-@compile_to_rounding
-def _emit(prior: Array, own: float, density: Array, floor: float, into: Array) -> None:
-    """Fill in a row times the densities of both axes; ``own`` is that of the row."""
+def _emit(
+    prior: Array, i: int, p: int, density_0: Array, density_1: Array, pair: Array, pairs: Index, floor: float,
+    into: Array,
+) -> int:  # fmt: skip
+    """Fill in row i times its densities; its pairs are from p on: return the first pair of the next row."""
+    own = density_0[i]
     for j in range(len(prior)):
         partly = np.float64(prior[j]) * own
-        product = (partly if partly > floor else 0.0) * density[j]
+        product = (partly if partly > floor else 0.0) * density_1[j]
         into[j] = product if product > floor else 0.0
-
-
-@compile_to_rounding
-def _emit_pairs(
-    prior: Array, i: int, p: int, pair_0: Index, pair_1: Index, pair: Array, floor: float, into: Array
-) -> int:
-    """Multiply the pairs of row i, from pair p on, by their own densities; return the first pair of the next row."""
-    while p < len(pair_0) and pair_0[p] == i:
-        product = np.float64(prior[pair_1[p]]) * pair[p]
-        into[pair_1[p]] = product if product > floor else 0.0
+    while p < len(pairs) and pairs[p, 0] == i:
+        product = np.float64(prior[pairs[p, 1]]) * pair[p]
+        into[pairs[p, 1]] = product if product > floor else 0.0
         p += 1
     return p
 
 
 @compile_to_rounding
-def _sum(row: Array) -> float:
-    total = np.float64(0)
-    for j in range(len(row)):
-        total += row[j]
-    return total
-
-
-@compile_to_rounding
-def _meet(one: Array, other: Array, sums: Array) -> float:
-    """Add the products of two rows to ``sums``, and return their sum."""
-    total = np.float64(0)
-    for j in range(len(one)):
-        product = np.float64(one[j]) * other[j]
-        sums[j] += product
-        total += product
-    return total
-
-
-@compile_to_rounding
-def _share(joint: Array, total: float, whole: float) -> None:
-    """Make joint probabilities sum to ``whole``; raise the least of them to 1 / ``whole``."""
-    flat = joint.reshape(joint.size)
+def _share(joint: Array, whole: float) -> float:
+    """Make probabilities sum to ``whole``, raised to 1 / ``whole`` at least; return their sum before, by ``whole``."""
+    flat, total = joint.reshape(joint.size), np.float64(0)
+    for j in range(len(flat)):
+        total += flat[j]
     scale, floor = whole / total if total > 0 else 0.0, 1 / whole
     for j in range(len(flat)):
         share = flat[j] * scale
         flat[j] = share if share > floor else floor
+    return total / whole

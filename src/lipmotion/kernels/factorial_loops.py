@@ -62,12 +62,6 @@ class FactorialLogLikelihoods(NamedTuple):
     pair: Logs
     pairs: Index
 
-    def joint(self, t: int) -> Array:
-        """Return the log densities of all joint states in a frame [shape=(Na, Nv)]."""
-        joint = np.add.outer(self.audio[t], self.visual[t], dtype=np.float64)
-        joint[tuple(self.pairs.T)] = self.pair[t]
-        return joint
-
     def densities(self, start: int, stop: int) -> list[tuple[Logs, Logs, Logs, float]]:
         """Return, for each frame, densities relative to an upper bound, and its logarithm; those of pairs in full."""
         logs = self.audio[start:stop], self.visual[start:stop], self.pair[start:stop]
@@ -77,6 +71,15 @@ class FactorialLogLikelihoods(NamedTuple):
         bounds = zip(logs, (top_audio, best - top_audio, best), strict=True)
         audio, visual, pair = (np.exp(log - top[:, None]) for log, top in bounds)
         return list(zip(audio, visual, pair, best.tolist(), strict=True))
+
+
+@compiled
+def join_logs(logs: FactorialLogLikelihoods, t: int) -> Array:
+    """Return the log densities of all joint states in a frame [shape=(Na, Nv)]."""
+    joint = logs.audio[t].astype(np.float64)[:, None] + logs.visual[t]
+    for p in range(len(logs.pairs)):
+        joint[logs.pairs[p, 0], logs.pairs[p, 1]] = logs.pair[t, p]
+    return joint
 
 
 class LogTransitions(NamedTuple):
@@ -132,7 +135,7 @@ def find_factorial_path(
     frames, loops = len(logs.audio), (LogTransitions.of(audio), LogTransitions.of(visual))
     initial, final = log_ends(audio, visual)
     stretch = stretch or count_cached_frames(frames, initial.nbytes)
-    path, heads = np.zeros((frames, 2), np.intp), [initial + logs.joint(0)]
+    path, heads = np.zeros((frames, 2), np.intp), [initial + join_logs(logs, 0)]
     scores = heads[0][None]
     for start in range(1, frames, stretch):
         scores = _fill_scores(heads[-1], *loops, logs, start, min(start + stretch, frames))
@@ -157,7 +160,7 @@ def _fill_scores(
     """Return the best scores after the frames from ``start`` to ``stop`` [shape=(stop - start, Na, Nv)]."""
     scores, row = np.empty((stop - start, *before.shape)), np.empty(before.shape[1])
     units, others, stay, onward = len(audio.leaving), len(visual.leaving), visual.stay, visual.onward
-    last, inner, priors = before.shape[0] - units, before.shape[1] - others, np.empty(len(logs.pairs))
+    last, inner = before.shape[0] - units, before.shape[1] - others
     for t in range(start, stop):
         after = scores[t - start]
         for i in range(len(before)):
@@ -175,14 +178,7 @@ def _fill_scores(
             further = into[others:]
             for j in range(inner):
                 further[j] = max(further[j], row[j] + onward[j])
-        for p in range(len(priors)):
-            priors[p] = after[logs.pairs[p, 0], logs.pairs[p, 1]]
-        for i in range(len(after)):
-            into, own, density = after[i], np.float64(logs.audio[t, i]), logs.visual[t]
-            for j in range(len(row)):
-                into[j] += own + density[j]
-        for p in range(len(priors)):
-            after[logs.pairs[p, 0], logs.pairs[p, 1]] = priors[p] + logs.pair[t, p]
+        after += join_logs(logs, t)
         before = after
     return scores
 
