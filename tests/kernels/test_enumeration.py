@@ -147,10 +147,12 @@ def of_network(draw, spread, extreme, kind=np.float64, chains_of=1, block=False)
     )
 
 
-def of_factorial(draw, spread, extreme, kind=np.float64):
-    """Forward–backward of two loops."""
+def of_factorial(draw, spread, extreme, kind=np.float64, sparse=False):
+    """Forward–backward of two loops; sparse: few of whose joint states are possible."""
     frames = int(draw.integers(1, 5))
     audio, visual, logs = factorial_model(draw, frames, spread, extreme)
+    if sparse:
+        logs.audio[draw.random(logs.audio.shape) < 0.7] = logs.visual[draw.random(logs.visual.shape) < 0.4] = -np.inf
     logs = logs._replace(**{name: getattr(logs, name).astype(kind) for name in ("audio", "visual", "pair")})
     found = factorial.infer_factorial(audio, visual, logs, stretch=int(draw.integers(1, 5)))
     joint, counts, log_likelihood = factorial_oracle.posteriors(audio, visual, logs)
@@ -240,6 +242,7 @@ RECURSIONS: dict[str, Callable[..., bool]] = {
     "network with a block, single": lambda *case: of_network(*case, np.float32, block=True),
     "factorial, double": of_factorial,
     "factorial, single": lambda *case: of_factorial(*case, np.float32),
+    "factorial, sparse": lambda *case: of_factorial(*case, sparse=True),
     "factorial, best path": of_factorial_path,
     "chains": of_chains,
     "best path": of_path,

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from lipmotion.kernels.compiler import compile_to_rounding, compiled
 from lipmotion.kernels.factorial_loops import (
     FactorialLogLikelihoods,
-    FrameDensity,
     LogTransitions,
     Loop,
     LoopCounts,
     count_cached_frames,
+    join_logs,
     log_ends,
 )
 
@@ -47,6 +47,9 @@ MIN_PROBABILITY = 1e-100
 SPARSE_SHARE = 0.2  # a smaller share of possible joint states is fastest in logarithms, which take no time for others
 LARGEST_EXPONENT = 700.0
 """Expected transitions are divided by the probability of the transition: the quotient must stay finite."""
+SAFE_EXPONENT = 300.0  # the product of so great an exponential and one that underflows is negligible
+MIN_SUM = 1e-280  # a sum of at least so much loses nothing by terms under e^-LARGEST_EXPONENT
+MIN_LOG_SHARE = -60.0  # what has less of a sum, as logarithm, is less than the rounding, and than ``MIN_POSTERIOR``
 
 
 class FactorialPosteriors(NamedTuple):
@@ -88,79 +91,49 @@ def infer_factorial(
     logs = logs._replace(pair=logs.pair[:, order], pairs=logs.pairs[order])
     ways: list[_Scaled | _InLogs] = []
     share = np.prod([np.mean(log > -np.inf) for log in (logs.audio, logs.visual)])
-    probabilities = (
-        part
-        for loop in (audio, visual)
-        for part in (loop.stay, loop.onward, loop.leave[:, None] * loop.enter, loop.initial, loop.final)
-    )
+    probabilities = (p for loop in (audio, visual) for p in (*_moves(loop, DOUBLE), loop.initial, loop.final))
     least = min(float(part.min(where=part > 0, initial=1.0)) for part in probabilities)
     if least >= MIN_PROBABILITY and share > SPARSE_SHARE:
         ways += [_Scaled(audio, visual, logs, kind) for kind in OFF if kind in (DOUBLE, logs.audio.dtype)]
     results = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
-    result = next((each for each in results if each is not None), None)
-    if result is None:  # there is no path
-        loops = ((loop.stay, loop.onward, loop.enter) for loop in (audio, visual))
-        first, second = (LoopCounts(*map(np.zeros_like, parts)) for parts in loops)
-        in_audio, in_visual, in_pairs = (np.zeros(log.shape) for log in logs[:3])
-        return FactorialPosteriors(in_audio, in_visual, in_pairs, first, second, -np.inf)
+    result = next(each for each in results if each is not None)
     return result._replace(pair=result.pair[:, np.argsort(order)])
-
-
-class _StepBack(NamedTuple):
-    """The result of a step back to the frame before.
-
-    audio, visual, pair : [shapes=(Na,), (Nv,), (P,)], posteriors of the states of each loop, and of pairs
-    log_overlap : log of the sum of forward times backward probabilities, as a share of the product of both wholes
-    backward : its backward probabilities times densities [shape=(Na, Nv)]
-    audio_entered, visual_entered : [shapes=(U, U)], expected numbers of transitions by the transition's probability
-    """
-
-    audio: Double
-    visual: Double
-    pair: Double
-    log_overlap: float
-    backward: Array
-    audio_entered: Array
-    visual_entered: Array
 
 
 def _forward_backward(
     loops: tuple[Loop, Loop], logs: FactorialLogLikelihoods, way: _Scaled | _InLogs, stretch: int | None
 ) -> FactorialPosteriors | None:
-    """Return the posteriors, computed in a way; None: there is no path, or the precision is not enough."""
-    frames, last = len(logs.audio), len(logs.audio) - 1
+    """Return the posteriors, computed in a way; None: its precision is not enough."""
+    frames = len(logs.audio)
     stretch = stretch or count_cached_frames(frames, way.frame_bytes)
     starts, heads, log_likelihood = range(0, frames, stretch), list[Array | None](), 0.0
-    forward: list[tuple[Array, Array]] = []
+    forward: Forward = []
     for start in starts:
         heads.append(forward[-1][0] if forward else None)
         forward.clear()  # its memory is needed
         log_likelihood += way.forward(start, min(start + stretch, frames), heads[-1], forward)
         if log_likelihood == -math.inf:
             return None
-    posteriors = [np.zeros(part.shape) for part in (logs.audio, logs.visual, logs.pair)]
-    entered = [np.zeros(loop.enter.shape) for loop in loops]
-    backward = leaving = forward[-1][0]
+    posteriors = np.zeros(logs.audio.shape), np.zeros(logs.visual.shape), np.zeros(logs.pair.shape)
+    entered = np.zeros(loops[0].enter.shape), np.zeros(loops[1].enter.shape)
     for start, head in zip(reversed(starts), reversed(heads), strict=True):
         if start != starts[-1]:
             forward.clear()
             way.forward(start, start + stretch, head, forward)
-        for t in range(start + len(forward) - 1, start - 1, -1):
-            before = forward[t - start][0]
-            step = way.end(before) if t == last else way.back(before, backward, leaving, t)
-            if not step.log_overlap > way.min_log_overlap:
-                return None
-            if t == last:
-                log_likelihood += step.log_overlap
-            backward, leaving = step.backward, forward[t - start][1]
-            for part, values in zip(posteriors, step[:3], strict=True):
-                part[t] = values
-            entered = [part + more for part, more in zip(entered, step[-2:], strict=True)]
-    counts = [_counted(*parts) for parts in zip(loops, posteriors[:2], entered, strict=True)]
+        log_overlaps = way.back(start, forward, posteriors, entered)
+        if not min(log_overlaps) >= way.min_log_overlap:
+            return None
+        if start == starts[-1]:
+            log_likelihood += log_overlaps[-1]
+    counts = _counted(loops[0], posteriors[0], entered[0]), _counted(loops[1], posteriors[1], entered[1])
     for part in (*posteriors, *counts[0], *counts[1]):
         part[part < MIN_POSTERIOR] = 0
-    of_audio, of_visual, of_pairs = posteriors
-    return FactorialPosteriors(of_audio, of_visual, of_pairs, counts[0], counts[1], log_likelihood)
+    return FactorialPosteriors(*posteriors, *counts, log_likelihood)
+
+
+Forward = list[tuple[Array, Array]]
+Posteriors = tuple[Double, Double, Double]
+Entered = tuple[Double, Double]
 
 
 class _Scaled:
@@ -170,67 +143,83 @@ class _Scaled:
         self.logs, self.kind, self.whole = logs, kind, WHOLE[kind]
         self.initial, self.final = log_ends(audio, visual)
         self.audio, self.visual = _moves(audio, kind), _moves(visual, kind)
-        self.start, self.densities = 0, list[FrameDensity]()
-        self.pairs: tuple[Index, Index] = logs.pairs[:, 0], logs.pairs[:, 1]
+        self.start, self.densities = 0, list[tuple[Array, Array, Array, float]]()
+        self.after = self.initial, self.initial  # of the frame after: backward probabilities times densities, leaving
         # In a frame, what was raised is 1 / whole² at most for each joint state, forward and backward, times the sum of
         # all that leads to a state or from it: up to U + 2 ≤ 3 U in each loop.
         raised = 2 * len(logs.audio) * 9 * self.initial.size / self.whole**2
         self.min_log_overlap = math.log(raised / OFF[kind])
         self.frame_bytes = self.initial.size * kind.itemsize
 
-    def forward(self, start: int, stop: int, before: Array | None, results: list[tuple[Array, Array]]) -> float:
+    def forward(self, start: int, stop: int, before: Array | None, results: Forward) -> float:
         """Append the forward probabilities of some frames, and those of leaving the last visual states after the audio
         loop's transition only [shape=(Na, Uv)]; return the log of the product of their scales.
         """
         self.start, self.densities = start, self.logs.densities(start, stop)
-        log_total, units, count = 0.0, len(self.audio[2]), len(self.visual[2])
-        for density in self.densities:
+        (stay, onward, leave), log_total = self.audio, 0.0
+        units, count = len(leave), len(self.visual[2])
+        for audio, visual, pair, best in self.densities:
             if before is None:
-                before, log = self._shares(self.initial + self.logs.joint(0))
+                before, log = self._shares(self.initial + join_logs(self.logs, 0))
                 results.append((before, before[:, :count]))
                 log_total += log
                 continue
-            entering, after = self.audio[2].T @ before[-units:], np.empty_like(before)
-            moved = _move_to_last(before, *self.audio[:2], entering, count)
+            entering, last, after = leave.T @ before[-units:], before[:, -count:], np.empty_like(before)
+            moved = stay[:, None] * last
+            moved[:units] += entering[:, -count:]
+            moved[units:] += onward[:, None] * last[:-units]
             total = _forward(
-                before, *self.audio[:2], entering, *self.visual[:2], moved @ self.visual[2],
-                density.audio, density.visual, density.pair, *self.pairs,
+                before, stay, onward, entering, *self.visual[:2], moved @ self.visual[2],
+                audio, visual, pair, self.logs.pairs,
                 MIN_PRODUCT[self.kind], self.whole, after,
             )  # fmt: skip
             if not total > MIN_TOTAL[self.kind]:
                 return -math.inf
-            log_total += math.log(total) + density.best
+            log_total += math.log(total) + best
             results.append((after, moved))
             before = after
         return log_total
 
-    def end(self, before: Array) -> _StepBack:
-        backward, log = self._shares(self.final + self.logs.joint(len(self.logs.audio) - 1))
-        frame = _frame(np.log(before.astype(np.float64)), self.final, self.logs.pairs, self.whole)
-        step = _StepBack(*frame, backward, *_NONE)
-        return step if log > -math.inf else step._replace(log_overlap=-math.inf)
+    def back(self, start: int, forward: Forward, posteriors: Posteriors, entered: Entered) -> Double:
+        """Fill in the posteriors of some frames; add their expected numbers of transitions by their probabilities.
 
-    def back(self, before: Array, backward: Array, leaving: Array, t: int) -> _StepBack:
-        """Return the result of a step back to frame ``t``.
-
-        backward : backward probabilities times densities of the frame after it
-        leaving  : of the frame after it
+        Returns the logarithms of the sums of forward times backward probabilities, as shares of both wholes.
         """
-        density, units, first = self.densities[t - self.start], len(self.audio[2]), backward[:, : len(self.visual[2])]
-        moved = _move_back(backward, *self.visual[:2], first @ self.visual[2].T)
-        after, sums = np.empty_like(before), [np.empty(len(part)) for part in density[:3]]
-        total = _backward(
-            before, moved, *self.audio[:2], self.audio[2] @ moved[:units], density.audio, density.visual, density.pair,
-            *self.pairs,
-            MIN_PRODUCT[self.kind], self.whole, after, *sums,
-        )  # fmt: skip
-        met = float(sums[0].sum())
-        enough = met > 0 and total > MIN_TOTAL[self.kind]
-        scale = np.float64(1 / met if enough else 0.0)
-        log_overlap = math.log(met) - 2 * math.log(self.whole) if enough else -math.inf
-        audio, visual, pair = (part * scale for part in sums)
-        entered = scale * (before[-units:] @ moved[:units].T), scale * (leaving.T @ first)
-        return _StepBack(audio, visual, pair, log_overlap, after, *entered)
+        log_overlaps = np.full(len(forward), -np.inf)
+        for t in range(start + len(forward) - 1, start - 1, -1):
+            before, sums = forward[t - start][0], [part[t] for part in posteriors]
+            backward, leaving = self.after
+            if t == len(self.logs.audio) - 1:
+                after, log = self._shares(self.final + join_logs(self.logs, t))
+                if not log > -math.inf:
+                    break
+                rows, columns = map(np.arange, before.shape)
+                logs = np.log(before.astype(np.float64))
+                log_overlap = _meet_in_logs(logs, self.final, self.logs.pairs, rows, columns, *sums)
+                log_overlap -= math.log(self.whole)
+            else:
+                audio, visual, pair, _ = self.densities[t - self.start]
+                (stay, onward, leave), units, count = self.visual, len(self.audio[2]), len(self.visual[2])
+                first, moved = backward[:, :count], stay * backward
+                moved[:, :-count] += onward * backward[:, count:]
+                moved[:, -count:] += first @ leave.T
+                after = np.empty_like(before)
+                total = _backward(
+                    before, moved, *self.audio[:2], self.audio[2] @ moved[:units], audio, visual, pair,
+                    self.logs.pairs, MIN_PRODUCT[self.kind], self.whole, after, *sums,
+                )  # fmt: skip
+                met = float(sums[0].sum())
+                if not (met > 0 and total > MIN_TOTAL[self.kind]):
+                    break
+                for values in sums:
+                    values[:] = values / met
+                entered[0][:] += before[-units:] @ moved[:units].T / np.float64(met)
+                entered[1][:] += leaving.T @ first / np.float64(met)
+                log_overlap = math.log(met) - 2 * math.log(self.whole)
+            log_overlaps[t - start], self.after = log_overlap, (after, forward[t - start][1])
+            if not log_overlap >= self.min_log_overlap:
+                break
+        return log_overlaps
 
     def _shares(self, joint: Double) -> tuple[Array, float]:
         """Return probabilities, scaled, and the log of their sum before, from log probabilities."""
@@ -253,84 +242,186 @@ def _moves(loop: Loop, kind: np.dtype[Any]) -> tuple[Array, Array, Array]:
 class _InLogs:
     """The steps of ``_Scaled`` in logarithms: those of backward probabilities and densities, too."""
 
-    min_log_overlap = -math.inf
+    min_log_overlap = -math.inf  # of a recording without a path
 
     def __init__(self, audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -> None:
-        self.audio, self.visual, self.logs = LogTransitions.of(audio), LogTransitions.of(visual), logs
-        self.audio_back, self.visual_back = self.audio.reverse(), self.visual.reverse()
+        self.loops, self.logs = (LogTransitions.of(audio), LogTransitions.of(visual)), logs
+        self.back_loops = self.loops[0].reverse(), self.loops[1].reverse()
         self.initial, self.final = log_ends(audio, visual)
         self.frame_bytes = self.initial.nbytes
-        self.possible = [log > -np.inf for log in logs[:2]]
+        self.possible = logs.audio > -np.inf, logs.visual > -np.inf
         for possible, states in zip(self.possible, logs.pairs.T, strict=True):
             np.logical_or.at(possible.T, states, -np.inf < logs.pair.T)
+        self.after = self.initial, self.initial  # of the frame after: backward probabilities times densities, leaving
 
-    def forward(self, start: int, stop: int, before: Array | None, results: list[tuple[Array, Array]]) -> float:
-        for t in range(start, stop):
-            prior = moved = self.initial
-            if before is not None:
-                moved = self.audio.forward(before, self.possible[0][t])
-                prior = self.visual.forward(moved.T, self.possible[1][t]).T
-            before = prior + self.logs.joint(t)
-            results.append((before, moved[:, -len(self.visual.leaving) :]))
+    def forward(self, start: int, stop: int, before: Array | None, results: Forward) -> float:
+        self.joint = np.full((stop - start, *self.initial.shape), -np.inf)
+        self.leaving = np.empty((*self.joint.shape[:2], len(self.loops[1].leaving)))
+        before = self.initial if before is None else before
+        _forward_in_logs(before, self.loops, self.logs, self.possible, start, self.joint, self.leaving)
+        results.extend(zip(self.joint, self.leaving, strict=True))
         return 0.0
 
-    def end(self, before: Array) -> _StepBack:
-        last = self.logs.joint(len(self.logs.audio) - 1)
-        return _StepBack(*_frame(before, self.final, self.logs.pairs), self.final + last, *_NONE)
+    def back(self, start: int, _: Forward, posteriors: Posteriors, entered: Entered) -> Double:
+        parts, known = (self.joint, self.leaving, *self.after), (self.final, self.logs, self.possible)
+        log_overlaps, backward = _back_in_logs(*parts, self.back_loops, *known, start, posteriors, entered)
+        self.after = backward, self.leaving[0]
+        return log_overlaps
 
-    def back(self, before: Array, backward: Array, leaving: Array, t: int) -> _StepBack:
-        units_audio, units_visual = len(self.audio.leaving), len(self.visual.leaving)
-        possible = self.possible[0][t, ::-1]
-        moved = self.visual_back.forward(backward.T[::-1], np.ones(backward.shape[1], bool))[::-1].T
-        beta = self.audio_back.forward(moved[::-1], possible)[::-1]
-        frame = _frame(before, beta, self.logs.pairs)
-        of_audio = _count_entered(before[-units_audio:], moved[:units_audio], frame[3])
-        of_visual = _count_entered(leaving.T, backward[:, :units_visual].T, frame[3])
-        return _StepBack(*frame, beta + self.logs.joint(t), of_audio, of_visual)
+
+Loops = tuple[LogTransitions, LogTransitions]
+Possible = tuple[NDArray[np.bool_], NDArray[np.bool_]]
 
 
 @compiled
-def _meet_in_logs(before: Double, beta: Double, pairs: Index) -> tuple[Double, Double, Double, float, float]:
-    """Return sums of the products along both axes, products of pairs, the greatest's logarithm, and the sum of all."""
-    audio, visual, pair = np.zeros(before.shape[0]), np.zeros(before.shape[1]), np.zeros(len(pairs))
-    best, total = -np.inf, 0.0
-    for i in range(len(before)):
-        for j in range(before.shape[1]):
-            best = max(best, before[i, j] + beta[i, j])
-    for i in range(len(before) if best > -np.inf else 0):
-        for j in range(before.shape[1]):
-            log = before[i, j] + beta[i, j] - best
-            share = math.exp(log) if log > -np.inf else 0.0
-            total += share
-            audio[i] += share
-            visual[j] += share
-    for p in range(len(pairs) if total else 0):
-        i, j = pairs[p]
-        pair[p] = math.exp(before[i, j] + beta[i, j] - best)
-    return audio, visual, pair, best, total
+def _forward_in_logs(
+    before: Double, loops: Loops, logs: FactorialLogLikelihoods, possible: Possible, start: int, joint: Double,
+    leaving: Double,
+) -> None:  # fmt: skip
+    """Fill in the forward log probabilities of some frames [shape=(n, Na, Nv), all -inf], and those of leaving.
+
+    before : of the frame before; of the first frame, of beginning
+    """
+    columns = np.flatnonzero(possible[1][max(start - 1, 0)])
+    for t in range(start, start + len(joint)):
+        after, rows, before_columns = joint[t - start], np.flatnonzero(possible[0][t]), columns
+        columns = np.flatnonzero(possible[1][t])
+        if t == 0:
+            after[:] = before
+        else:
+            moved = np.full(after.shape, -np.inf)
+            _move_logs(before, loops[0], rows, before_columns, moved)
+            _move_logs(moved.T, loops[1], columns, rows, after.T)
+            leaving[t - start] = moved[:, moved.shape[1] - leaving.shape[2] :]
+        after += join_logs(logs, t)
+        before = after
 
 
 @compiled
-def _count_entered(last: Array, first: Array, log_overlap: float) -> Double:
-    """Return the sums of the products of leaving units and of entering units [shapes=(U, M)], from logarithms."""
-    entered = np.zeros((len(last), len(first)))
+def _back_in_logs(
+    joint: Double, leaving: Double, backward: Double, leaving_after: Double, loops: Loops, final: Double,
+    logs: FactorialLogLikelihoods, possible: Possible, start: int, posteriors: Posteriors,
+    entered: Entered,
+) -> tuple[Double, Double]:  # fmt: skip
+    """Fill in the posteriors of some frames, add to entries; return log overlaps, and backward times densities.
+
+    joint, leaving : of ``_forward_in_logs``; ``backward``, ``leaving_after``: of the frame after these
+    loops          : reversed
+    """
+    log_overlaps, units, others = np.empty(len(joint)), len(entered[0]), len(entered[1])
+    rows_after = np.flatnonzero(possible[0][min(start + len(joint), len(logs.audio) - 1)])
+    for t in range(start + len(joint) - 1, start - 1, -1):
+        before, rows, columns = joint[t - start], np.flatnonzero(possible[0][t]), np.flatnonzero(possible[1][t])
+        beta, moved = np.full(before.shape, -np.inf), np.full(before.shape, -np.inf)
+        if t + 1 == len(logs.audio):
+            beta[:] = final
+        else:
+            turned = moved.shape[1] - 1 - columns[::-1], len(moved) - 1 - rows[::-1]
+            _move_logs(backward.T[::-1], loops[1], turned[0], rows_after, moved.T[::-1])
+            _move_logs(moved[::-1], loops[0], turned[1], columns, beta[::-1])
+        sums = posteriors[0][t], posteriors[1][t], posteriors[2][t]
+        log_overlap = _meet_in_logs(before, beta, logs.pairs, rows, columns, *sums)
+        if t + 1 < len(logs.audio) and log_overlap > -np.inf:
+            _count_entered(before[len(before) - units :], moved[:units], log_overlap, entered[0])
+            _count_entered(leaving_after.T, backward[:, :others].T, log_overlap, entered[1])
+        beta += join_logs(logs, t)
+        log_overlaps[t - start], backward, leaving_after, rows_after = log_overlap, beta, leaving[t - start], rows
+    return log_overlaps, backward
+
+
+@compiled
+def _add_logs(one: float, other: float) -> float:
+    """Return the logarithm of the sum of two probabilities."""
+    best = max(one, other)
+    less = min(one, other) - best
+    return best + math.log1p(math.exp(less)) if less > MIN_LOG_SHARE else best
+
+
+@compiled
+def _sum_entering(
+    last: Double, loop: LogTransitions, state: int, columns: Index, parts: Double, tops: Double
+) -> Double:
+    """Return the log probabilities of entering a state, in columns, from ``parts``, relative to the columns' tops.
+
+    Where all that count are so much less that they underflow, they are sums of logarithms.
+    """
+    sums = np.zeros(len(columns))
     for u in range(len(last)):
-        for j in range(last.shape[1]):
-            if last[u, j] > -np.inf:
+        for c in range(len(columns)):
+            sums[c] += loop.shares[u, state] * parts[u, c]
+    for c in range(len(columns)):
+        if sums[c] > MIN_SUM:
+            sums[c] = tops[c] + math.log(sums[c])
+        else:
+            sums[c] = -np.inf
+            for u in range(len(last)):
+                sums[c] = _add_logs(sums[c], last[u, columns[c]] + loop.leaving[u, state])
+    return sums
+
+
+@compiled
+def _move_logs(before: Double, loop: LogTransitions, rows: Index, columns: Index, after: Double) -> None:
+    """Fill in log probabilities one frame on, along axis 0, in rows and columns, in ascending order."""
+    units, last = len(loop.leaving), before[len(before) - len(loop.leaving) :]
+    tops, parts = np.empty(len(columns)), np.zeros((units, len(columns)))
+    if len(rows) and rows[0] < units:  # some first states are entered
+        for c, j in enumerate(columns):
+            tops[c] = last[:, j].max()
+            for u in range(units):
+                if last[u, j] > tops[c] - LARGEST_EXPONENT:
+                    parts[u, c] = math.exp(last[u, j] - tops[c])
+    for i in rows:
+        entering = _sum_entering(last, loop, i, columns, parts, tops) if i < units else tops
+        for c, j in enumerate(columns):
+            other = entering[c] if i < units else before[i - units, j] + loop.onward[i - units]
+            after[i, j] = _add_logs(before[i, j] + loop.stay[i], other)
+
+
+@compiled
+def _meet_in_logs(
+    before: Double, beta: Double, pairs: Index, rows: Index, columns: Index, audio: Double, visual: Double, pair: Double
+) -> float:
+    """Fill in the posteriors of a frame and of pairs in it; return the logarithm of the sum of all products."""
+    best, total = -np.inf, 0.0
+    audio[:], visual[:], pair[:] = 0.0, 0.0, 0.0
+    for i in rows:
+        for j in columns:
+            best = max(best, before[i, j] + beta[i, j])
+    if best == -np.inf:
+        return best
+    for i in rows:
+        for j in columns:
+            log = before[i, j] + beta[i, j] - best
+            if log > MIN_LOG_SHARE:
+                share = math.exp(log)
+                total += share
+                audio[i] += share
+                visual[j] += share
+    for p in range(len(pairs)):
+        i, j = pairs[p]
+        pair[p] = math.exp(before[i, j] + beta[i, j] - best) / total
+    audio /= total
+    visual /= total
+    return best + math.log(total)
+
+
+@compiled
+def _count_entered(last: Array, first: Array, log_overlap: float, entered: Double) -> None:
+    """Add the sums of the products of leaving units and of entering units [shapes=(U, M)], from logarithms."""
+    left, into = np.empty(len(last)), np.empty(len(first))
+    for j in range(last.shape[1]):
+        top, best = last[:, j].max(), first[:, j].max()
+        if top == -np.inf or best == -np.inf:
+            continue
+        shift = top - log_overlap
+        if best + shift > SAFE_EXPONENT:
+            for u in range(len(last)):
                 for v in range(len(first)):
-                    if first[v, j] > -np.inf:
-                        entered[u, v] += math.exp(min(last[u, j] + first[v, j] - log_overlap, LARGEST_EXPONENT))
-    return entered
-
-
-_NONE = np.zeros(()), np.zeros(())  # expected transitions out of the last frame
-
-
-def _frame(before: Double, beta: Double, pairs: Index, whole: float = 1.0) -> tuple[Double, Double, Double, float]:
-    """Return posteriors and log overlap of a frame from logarithms of forward (of sum ``whole``) and backward."""
-    audio, visual, pair, best, total = _meet_in_logs(before, beta, pairs)
-    log_overlap, whole = (best + math.log(total / whole), total) if total else (-math.inf, 1.0)
-    return audio / whole, visual / whole, pair / whole, log_overlap
+                    entered[u, v] += math.exp(min(last[u, j] + first[v, j] - log_overlap, LARGEST_EXPONENT))
+            continue
+        for u in range(len(last)):
+            left[u], into[u] = math.exp(last[u, j] - top), math.exp(first[u, j] + shift)
+        entered += left[:, None] * into
 
 
 def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:
@@ -345,58 +436,37 @@ def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:
 
 
 @compile_to_rounding
-def _move_to_last(before: Array, stay: Array, onward: Array, entering: Array, count: int) -> Array:
-    """Return joint probabilities, last columns, one frame on along axis 0 by those of entering [shape=(U, M)]."""
-    last, into_last = before[:, before.shape[1] - count :], entering[:, before.shape[1] - count :]
-    after = np.empty((len(before), count), before.dtype)
-    for i in range(len(before)):
-        _move(last, stay, onward, into_last, i, after[i])
-    return after
-
-
-@compile_to_rounding
-def _move_back(after: Array, stay: Array, onward: Array, left: Array) -> Array:
-    """Return joint backward probabilities a frame back along axis 1; ``left``: of leaving last states [(N, U)]."""
-    before, units = np.empty_like(after), left.shape[1]
-    inner = after.shape[1] - units
-    for i in range(len(after)):
-        into, out = before[i], after[i]
-        next_states = out[units:]
-        for j in range(inner):
-            into[j] = stay[j] * out[j] + onward[j] * next_states[j]
-        last, out_last, stay_last, left_last = into[inner:], out[inner:], stay[inner:], left[i]
-        for j in range(units):
-            last[j] = stay_last[j] * out_last[j] + left_last[j]
-    return before
-
-
-@compile_to_rounding
 def _forward(
     before: Array, stay_0: Array, onward_0: Array, entering_0: Array, stay_1: Array, onward_1: Array, entering_1: Array,
-    density_0: Array, density_1: Array, pair: Array, pair_0: Index, pair_1: Index, floor: float, whole: float,
+    density_0: Array, density_1: Array, pair: Array, pairs: Index, floor: float, whole: float,
     after: Array,
 ) -> float:  # fmt: skip
     """Fill in joint probabilities one frame on along both axes, times densities, normalised; return their sum before.
 
     entering_0, entering_1 : [shapes=(U, M), (N, U)], probabilities of entering the first states
-    pair, pair_0, pair_1 : the densities of pairs, and the two states of each, sorted by the first
+    pair, pairs : the densities of pairs, and the two states of each, sorted by the first [shape=(P, 2)]
     """
     moved, prior = np.empty(before.shape[1], before.dtype), np.empty(before.shape[1], before.dtype)
-    total, p = np.float64(0), 0
+    units, others, p = len(entering_0), entering_1.shape[1], 0
+    rest, moved_rest, stay_rest = prior[others:], moved[others:], stay_1[others:]
     for i in range(len(before)):
-        _move(before, stay_0, onward_0, entering_0, i, moved)
-        _move_along(moved, stay_1, onward_1, entering_1[i], prior)
-        _emit(prior, density_0[i], density_1, floor, after[i])
-        p = _emit_pairs(prior, i, p, pair_0, pair_1, pair, floor, after[i])
-        total += _sum(after[i])
-    _share(after, total, whole)
-    return total / whole
+        if i < units:
+            _combine(before[i], stay_0[i], entering_0[i], 1.0, moved)
+        else:
+            _combine(before[i], stay_0[i], before[i - units], onward_0[i - units], moved)
+        entering = entering_1[i]
+        for j in range(others):
+            prior[j] = stay_1[j] * moved[j] + entering[j]
+        for j in range(len(onward_1)):
+            rest[j] = stay_rest[j] * moved_rest[j] + onward_1[j] * moved[j]
+        p = _emit(prior, i, p, density_0, density_1, pair, pairs, floor, after[i])
+    return _share(after, whole)
 
 
 @compile_to_rounding
 def _backward(
     before: Array, moved: Array, stay: Array, onward: Array, left: Array,
-    density_0: Array, density_1: Array, pair: Array, pair_0: Index, pair_1: Index, floor: float, whole: float,
+    density_0: Array, density_1: Array, pair: Array, pairs: Index, floor: float, whole: float,
     after: Array, posterior_0: Array, posterior_1: Array, posterior_pair: Array,
 ) -> float:  # fmt: skip
     """Fill in posteriors, not normalised, and backward probabilities times densities, normalised; return their sum.
@@ -405,24 +475,23 @@ def _backward(
     left  : [shape=(U, M)], those of leaving the last states
     """
     beta = np.empty(before.shape[1], before.dtype)
-    units, total, p = len(left), np.float64(0), 0
-    inner = len(before) - units
+    units, inner, p = len(left), len(before) - len(left), 0
     posterior_1[:] = 0
     for i in range(len(before)):
         if i < inner:
             _combine(moved[i], stay[i], moved[i + units], onward[i], beta)
         else:
             _combine(moved[i], stay[i], left[i - inner], 1.0, beta)
-        posterior_0[i] = _meet(before[i], beta, posterior_1)
-        q = p
-        while q < len(pair_0) and pair_0[q] == i:
-            posterior_pair[q] = np.float64(before[i, pair_1[q]]) * beta[pair_1[q]]
-            q += 1
-        _emit(beta, density_0[i], density_1, floor, after[i])
-        p = _emit_pairs(beta, i, p, pair_0, pair_1, pair, floor, after[i])
-        total += _sum(after[i])
-    _share(after, total, whole)
-    return total / whole
+        alpha, total, first = before[i], np.float64(0), p
+        for j in range(len(beta)):
+            product = np.float64(alpha[j]) * beta[j]
+            posterior_1[j] += product
+            total += product
+        posterior_0[i] = total
+        p = _emit(beta, i, p, density_0, density_1, pair, pairs, floor, after[i])
+        for q in range(first, p):
+            posterior_pair[q] = np.float64(alpha[pairs[q, 1]]) * beta[pairs[q, 1]]
+    return _share(after, whole)
 
 
 @compile_to_rounding
@@ -433,71 +502,31 @@ def _combine(one: Array, weight: float, other: Array, other_weight: float, into:
 
 
 @compile_to_rounding
-def _move(before: Array, stay: Array, onward: Array, entering: Array, i: int, into: Array) -> None:
-    """Fill in row i, one frame on along axis 0."""
-    units = len(entering)
-    if i < units:
-        _combine(before[i], stay[i], entering[i], 1.0, into)
-    else:
-        _combine(before[i], stay[i], before[i - units], onward[i - units], into)
-
-
-@compile_to_rounding
-def _move_along(before: Array, stay: Array, onward: Array, entering: Array, into: Array) -> None:
-    """Fill in a row, one frame on along itself."""
-    units = len(entering)
-    for j in range(units):
-        into[j] = stay[j] * before[j] + entering[j]
-    rest, before_rest, weight = into[units:], before[units:], stay[units:]
-    for j in range(len(onward)):
-        rest[j] = weight[j] * before_rest[j] + onward[j] * before[j]
-
-
-@compile_to_rounding
-def _emit(prior: Array, own: float, density: Array, floor: float, into: Array) -> None:
-    """Fill in a row times the densities of both axes; ``own`` is that of the row."""
+def _emit(
+    prior: Array, i: int, p: int, density_0: Array, density_1: Array, pair: Array, pairs: Index, floor: float,
+    into: Array,
+) -> int:  # fmt: skip
+    """Fill in row i times its densities; its pairs are from p on: return the first pair of the next row."""
+    own = density_0[i]
     for j in range(len(prior)):
         partly = np.float64(prior[j]) * own
-        product = (partly if partly > floor else 0.0) * density[j]
+        product = (partly if partly > floor else 0.0) * density_1[j]
         into[j] = product if product > floor else 0.0
-
-
-@compile_to_rounding
-def _emit_pairs(
-    prior: Array, i: int, p: int, pair_0: Index, pair_1: Index, pair: Array, floor: float, into: Array
-) -> int:
-    """Multiply the pairs of row i, from pair p on, by their own densities; return the first pair of the next row."""
-    while p < len(pair_0) and pair_0[p] == i:
-        product = np.float64(prior[pair_1[p]]) * pair[p]
-        into[pair_1[p]] = product if product > floor else 0.0
+    while p < len(pairs) and pairs[p, 0] == i:
+        product = np.float64(prior[pairs[p, 1]]) * pair[p]
+        into[pairs[p, 1]] = product if product > floor else 0.0
         p += 1
     return p
 
 
 @compile_to_rounding
-def _sum(row: Array) -> float:
-    total = np.float64(0)
-    for j in range(len(row)):
-        total += row[j]
-    return total
-
-
-@compile_to_rounding
-def _meet(one: Array, other: Array, sums: Array) -> float:
-    """Add the products of two rows to ``sums``, and return their sum."""
-    total = np.float64(0)
-    for j in range(len(one)):
-        product = np.float64(one[j]) * other[j]
-        sums[j] += product
-        total += product
-    return total
-
-
-@compile_to_rounding
-def _share(joint: Array, total: float, whole: float) -> None:
-    """Make joint probabilities sum to ``whole``; raise the least of them to 1 / ``whole``."""
-    flat = joint.reshape(joint.size)
+def _share(joint: Array, whole: float) -> float:
+    """Make probabilities sum to ``whole``, raised to 1 / ``whole`` at least; return their sum before, by ``whole``."""
+    flat, total = joint.reshape(joint.size), np.float64(0)
+    for j in range(len(flat)):
+        total += flat[j]
     scale, floor = whole / total if total > 0 else 0.0, 1 / whole
     for j in range(len(flat)):
         share = flat[j] * scale
         flat[j] = share if share > floor else floor
+    return total / whole

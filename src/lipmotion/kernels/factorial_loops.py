@@ -62,83 +62,51 @@ class FactorialLogLikelihoods(NamedTuple):
     pair: Logs
     pairs: Index
 
-    def joint(self, t: int) -> Array:
-        """Return the log densities of all joint states in a frame [shape=(Na, Nv)]."""
-        joint = np.add.outer(self.audio[t], self.visual[t], dtype=np.float64)
-        joint[tuple(self.pairs.T)] = self.pair[t]
-        return joint
-
-    def densities(self, start: int, stop: int) -> list[FrameDensity]:
-        """Return the densities of the frames from ``start`` up to ``stop``."""
+    def densities(self, start: int, stop: int) -> list[tuple[Logs, Logs, Logs, float]]:
+        """Return, for each frame, densities relative to an upper bound, and its logarithm; those of pairs in full."""
         logs = self.audio[start:stop], self.visual[start:stop], self.pair[start:stop]
         tops = [log.max(axis=1, initial=-np.inf).astype(np.float64) for log in logs]
         top_audio, top_visual = (np.where(np.isfinite(top), top, 0) for top in tops[:2])
         best = np.maximum(top_audio + top_visual, tops[2])
         bounds = zip(logs, (top_audio, best - top_audio, best), strict=True)
         audio, visual, pair = (np.exp(log - top[:, None]) for log, top in bounds)
-        return [FrameDensity(*rows) for rows in zip(audio, visual, pair, best.tolist(), strict=True)]
+        return list(zip(audio, visual, pair, best.tolist(), strict=True))
 
 
-class FrameDensity(NamedTuple):
-    """Densities of a frame, relative to an upper bound.
-
-    audio, visual : [shapes=(Na,), (Nv,)], whose products are the densities of joint states, except for pairs
-    pair          : [shape=(P,)], the densities of pairs
-    best          : the logarithm of the bound
-    """
-
-    audio: Array
-    visual: Array
-    pair: Array
-    best: float
+@compiled
+def join_logs(logs: FactorialLogLikelihoods, t: int) -> Array:
+    """Return the log densities of all joint states in a frame [shape=(Na, Nv)]."""
+    joint = logs.audio[t].astype(np.float64)[:, None] + logs.visual[t]
+    for p in range(len(logs.pairs)):
+        joint[logs.pairs[p, 0], logs.pairs[p, 1]] = logs.pair[t, p]
+    return joint
 
 
 class LogTransitions(NamedTuple):
-    """Log transition probabilities of a loop.
+    """Transitions of a loop.
 
-    stay    : [shape=(N,)]
-    onward  : [shape=(N - U,)], from state i to i + U
-    leaving : [shape=(U, U)], from each unit's last state to each unit's first
+    stay    : log probabilities [shape=(N,)]
+    onward  : log probabilities of going from state i to i + U [shape=(N - U,)]
+    leaving : log probabilities of going from each unit's last state to each unit's first [shape=(U, U)]
+    shares  : probabilities of the same [shape=(U, U)]
     """
 
     stay: Array
     onward: Array
     leaving: Array
+    shares: Array
 
     @classmethod
     def of(cls, loop: Loop) -> LogTransitions:
         """Return the transitions of a loop."""
         with np.errstate(divide="ignore"):
             leaving = np.log(loop.leave)[:, None] + np.log(loop.enter)
-            return cls(np.log(loop.stay.ravel()), np.log(loop.onward.ravel()), leaving)
-
-    def forward(self, joint: Array, wanted: NDArray[np.bool_]) -> Array:
-        """Return log probabilities one frame on, along axis 0 [shape=(N, M)]; of states not ``wanted``: -inf."""
-        return _move_logs(np.ascontiguousarray(joint), self.stay, self.onward, self.leaving, wanted)
+            return cls(np.log(loop.stay.ravel()), np.log(loop.onward.ravel()), leaving, np.exp(leaving))
 
     def reverse(self) -> LogTransitions:
         """Return the transitions of the loop backward in time, states in the opposite order."""
-        parts = self.stay[::-1], self.onward[::-1], self.leaving.T[::-1, ::-1]
+        parts = self.stay[::-1], self.onward[::-1], self.leaving.T[::-1, ::-1], self.shares.T[::-1, ::-1]
         return LogTransitions(*map(np.ascontiguousarray, parts))
-
-    def best_forward(self, score: Array) -> tuple[Array, NDArray[Any]]:
-        """Return the best scores a frame on, along axis 0, and decisions: U to stay, U + 1 to go on, or a unit left."""
-        units = len(self.leaving)
-        after = score + self.stay[:, None]
-        decision = np.full(score.shape, units, np.min_scalar_type(units + 1))
-        moved = score[: len(self.onward)] + self.onward[:, None]
-        np.copyto(decision[units:], units + 1, where=moved > after[units:])
-        np.maximum(after[units:], moved, out=after[units:])
-        last, first = score[len(score) - units :], (after[:units], decision[:units])
-        _take_best_entering(last, self.leaving, *first)
-        return after, decision
-
-    def previous(self, state: int, decision: int) -> int:
-        """Return the state one frame before, given the decision."""
-        units = len(self.leaving)
-        if decision < units:
-            return len(self.stay) - units + decision
-        return state - units if decision > units else state
 
 
 def count_cached_frames(frames: int, frame_bytes: int) -> int:
@@ -164,79 +132,101 @@ def find_factorial_path(
     Source: the Viterbi recursion, along one loop's axis and then along the other's.
     Cost: time O(T·Na·Nv·(Ua + Uv)), memory O(stretch + T/stretch) times Na·Nv.
     """
-    frames = len(logs.audio)
-    stretch = stretch or count_cached_frames(frames, 2 * logs.audio.shape[1] * logs.visual.shape[1])
-    loops = LogTransitions.of(audio), LogTransitions.of(visual)
-
-    def search(start: int, stop: int, score: Array) -> tuple[Array, list[tuple[NDArray[Any], NDArray[Any]]]]:
-        """Return the scores after the frames of a stretch, and for each the decisions [shapes=(Na, Nv), (Nv, Na)]."""
-        decisions = list[tuple[NDArray[Any], NDArray[Any]]]()
-        for t in range(start, stop):
-            score, by_audio = loops[0].best_forward(score)
-            turned, by_visual = loops[1].best_forward(np.ascontiguousarray(score.T))
-            score = turned.T + logs.joint(t)
-            decisions.append((by_audio, by_visual))
-        return score, decisions
-
+    frames, loops = len(logs.audio), (LogTransitions.of(audio), LogTransitions.of(visual))
     initial, final = log_ends(audio, visual)
-    score = initial + logs.joint(0)
-    befores, decisions = [], list[tuple[NDArray[Any], NDArray[Any]]]()
+    stretch = stretch or count_cached_frames(frames, initial.nbytes)
+    path, heads = np.zeros((frames, 2), np.intp), [initial + join_logs(logs, 0)]
+    scores = heads[0][None]
     for start in range(1, frames, stretch):
-        befores.append((start, score))
-        score, decisions = search(start, min(start + stretch, frames), score)
-    path = np.zeros((frames, 2), np.intp)
-    score = score + final
-    best = float(score.max())
+        scores = _fill_scores(heads[-1], *loops, logs, start, min(start + stretch, frames))
+        heads.append(scores[-1].copy())
+    ends = scores[-1] + final
+    best = float(ends.max())
     if best == -np.inf:
         return path[:, 0], path[:, 1], best
-    path[-1] = np.unravel_index(int(score.argmax()), score.shape)
-    for start, before in reversed(befores):
-        if start != befores[-1][0]:
-            _, decisions = search(start, min(start + stretch, frames), before)
-        for t in range(start + len(decisions) - 1, start - 1, -1):
-            by_audio, by_visual = decisions[t - start]
-            state, other = path[t]
-            other = loops[1].previous(other, int(by_visual[other, state]))  # the later decision
-            path[t - 1] = loops[0].previous(state, int(by_audio[state, other])), other
+    path[-1] = np.unravel_index(int(ends.argmax()), ends.shape)
+    starts = range(1, frames, stretch)
+    for start, head in zip(reversed(starts), reversed(heads[:-1]), strict=True):
+        if start != starts[-1]:
+            scores = _fill_scores(head, *loops, logs, start, start + stretch)
+        _trace_back(head, scores, *loops, path, start)
     return path[:, 0], path[:, 1], best
 
 
 @compiled
-def _take_best_entering(last: Array, leaving: Array, score: Array, decision: Array) -> None:
-    """Replace scores and decisions of first states [shapes=(U, M)] where leaving a last state [(U, M)] is better."""
-    for i in range(len(score)):
-        best, unit = score[i], decision[i]
-        for u in range(len(last)):
-            before, weight = last[u], leaving[u, i]
-            for j in range(len(best)):
-                other = before[j] + weight
-                is_better = other > best[j]
-                best[j] = other if is_better else best[j]
-                unit[j] = u if is_better else unit[j]
+def _fill_scores(
+    before: Array, audio: LogTransitions, visual: LogTransitions, logs: FactorialLogLikelihoods, start: int, stop: int
+) -> Array:
+    """Return the best scores after the frames from ``start`` to ``stop`` [shape=(stop - start, Na, Nv)]."""
+    scores, row = np.empty((stop - start, *before.shape)), np.empty(before.shape[1])
+    units, others, stay, onward = len(audio.leaving), len(visual.leaving), visual.stay, visual.onward
+    last, inner = before.shape[0] - units, before.shape[1] - others
+    for t in range(start, stop):
+        after = scores[t - start]
+        for i in range(len(before)):
+            own, source = audio.stay[i], before[i]
+            for j in range(len(row)):
+                row[j] = source[j] + own
+            if i < units:
+                _take_best(before[last:], audio.leaving[:, i], row)
+            else:
+                _take_best(before[i - units : i - units + 1], audio.onward[i - units : i - units + 1], row)
+            into = after[i]
+            for j in range(len(row)):
+                into[j] = row[j] + stay[j]
+            _take_best(visual.leaving, row[inner:], into[:others])
+            further = into[others:]
+            for j in range(inner):
+                further[j] = max(further[j], row[j] + onward[j])
+        after += join_logs(logs, t)
+        before = after
+    return scores
 
 
 @compiled
-def _move_logs(before: Array, stay: Array, onward: Array, leaving: Array, wanted: NDArray[np.bool_]) -> Array:
-    """Return log probabilities one frame on, along axis 0; what cannot be takes no time."""
-    after = np.full(before.shape, -np.inf)
-    units = len(leaving)
-    last = before[len(before) - units :]
-    for i in range(len(before)):
-        row = after[i]
-        for j in range(len(row) if wanted[i] else 0):
-            row[j] = before[i, j] + stay[i]
-            best = row[j]
-            if i >= units:
-                moved = before[i - units, j] + onward[i - units]
-                best = max(best, moved)
-                if best > -np.inf:
-                    row[j] = best + math.log(math.exp(row[j] - best) + math.exp(moved - best))
-                continue
-            for u in range(units):
-                best = max(best, last[u, j] + leaving[u, i])
-            if best > -np.inf:
-                total = math.exp(row[j] - best)
-                for u in range(units):
-                    total += math.exp(last[u, j] + leaving[u, i] - best)
-                row[j] = best + math.log(total)
-    return after
+def _take_best(scores: Array, weights: Array, best: Array) -> None:
+    """Raise the best scores [shape=(M,)] to those of ways [shape=(U, M)] and their weights, four at a time."""
+    whole = len(scores) // 4 * 4
+    for u in range(0, whole, 4):
+        a, b, c, d = scores[u], scores[u + 1], scores[u + 2], scores[u + 3]
+        w, x, y, z = weights[u], weights[u + 1], weights[u + 2], weights[u + 3]
+        for j in range(len(best)):
+            one, other = max(a[j] + w, b[j] + x), max(c[j] + y, d[j] + z)
+            best[j] = max(best[j], max(one, other))  # noqa: PLW3301 # faster than one call
+    for u in range(whole, len(scores)):
+        a, w = scores[u], weights[u]
+        for j in range(len(best)):
+            best[j] = max(best[j], a[j] + w)
+
+
+@compiled
+def _trace_back(
+    head: Array, scores: Array, audio: LogTransitions, visual: LogTransitions, path: Index, start: int
+) -> None:
+    """Fill in the path before the last frame of a stretch, without back-pointers, from the scores."""
+    units, others = len(audio.leaving), len(visual.leaving)
+    for t in range(start + len(scores) - 1, start - 1, -1):
+        before = scores[t - 1 - start] if t > start else head
+        state, other = path[t]
+        best = -np.inf
+        for v in range(1 + others if other < others else 2):
+            to, weight = _find_source(other, v, visual)
+            score, source = before[state, to] + audio.stay[state], state
+            for u in range(1, 1 + units if state < units else 2):
+                origin, of_arc = _find_source(state, u, audio)
+                if before[origin, to] + of_arc > score:
+                    score, source = before[origin, to] + of_arc, origin
+            if score + weight > best:
+                best = score + weight
+                path[t - 1] = source, to
+
+
+@compiled
+def _find_source(state: int, way: int, loop: LogTransitions) -> tuple[int, float]:
+    """Return the state from which a way leads to a state, and its log probability: 0 is to stay."""
+    units = len(loop.leaving)
+    if way == 0:
+        return state, loop.stay[state]
+    if state >= units:
+        return state - units, loop.onward[state - units]
+    return len(loop.stay) - units + way - 1, loop.leaving[way - 1, state]

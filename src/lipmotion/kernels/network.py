@@ -254,11 +254,8 @@ def _forward_backward(
     counts of block arcs [shapes=(T, ...)]; each frame's scale [shape=(T,)]; and whether the precision is enough.
     """
     T, S = emission.shape
-    targets = 0
-    for b in range(len(blocks)):
-        targets += blocks[b, 1]
     counts, scale = np.zeros(len(run_weight)), np.ones(T)
-    leave, enter = np.zeros((T, len(block_sources))), np.zeros((T, targets))
+    leave, enter = np.zeros((T, len(block_sources))), np.zeros((T, int(blocks[:, 1].sum())))
     alpha, few = np.empty((T, S + CHUNK), emission.dtype), np.empty(len(counts), emission.dtype)
     beta, onward = np.zeros(S + CHUNK, emission.dtype), np.zeros(S + CHUNK, emission.dtype)
     room = np.empty(max(block_weight.shape[1], transposed.shape[1]), emission.dtype)
@@ -337,9 +334,7 @@ def _backward(
         if t % FRAMES_SUMMED == 0:
             counts += few
             few[:] = floor
-    begun = 0.0
-    for i in range(len(initial)):
-        begun += initial[i] * onward[i]
+    begun = (initial * onward[: len(initial)]).sum()
     return abs(begun - 1) < off
 
 
