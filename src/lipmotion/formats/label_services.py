@@ -90,13 +90,8 @@ PARALLEL_LISTS = tuple(
     (row["items"], parse_table(row["members"])) for row in read_shipped_table("lipmotion.formats", "label_lists.csv")
 )
 """Parallel lists: the list of items that they become, and the member that each is of them."""
-UNFINISHED = {
-    "isfinal": False,
-    "final": False,
-    "endofturn": False,
-    "ispartial": True,
-    "message": "AddPartialTranscript",
-}
+PARTIAL = "AddPartialTranscript"  # Speechmatics' message
+UNFINISHED = {"isfinal": False, "final": False, "endofturn": False, "ispartial": True, "message": PARTIAL}
 """Members of what a service heard while somebody spoke, and says again when it is sure."""
 KNOWN_SHAPES = "segments, words, results, utterances, monologues, alignment, tiers, fragments, ..."
 

@@ -77,6 +77,10 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
         left_out.append(match[0].strip())
         return ""
 
+    def leave_out_marks(name: str, text: str) -> str:
+        found = list(MARKS[name].finditer(text))
+        return MARKS[name].sub(leave_out, text) if found and _mark_lines(name, found, text) else text
+
     def leave_out_name(match: re.Match[str]) -> str:
         name = match[1] or match[2]
         in_capitals = name == name.upper() != name.lower()
@@ -88,25 +92,11 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
     if text.lstrip("\ufeff").startswith("@"):
         text = MARKS["CHAT"].sub(leave_out, text)
     text = MARKS["CODE"].sub(leave_out, text)
-    if len(MARKS["RECORDING"].findall(text)) == sum(map(bool, text.split("\n"))):
-        text = MARKS["RECORDING"].sub(leave_out, text)
-    dated = list(MARKS["DATED"].finditer(text))
-    if len(dated) > 1 or any(each[1] or "T" in each[0] for each in dated):
-        text = MARKS["DATED"].sub(leave_out, text)
-    stamps = list(MARKS["STAMP"].finditer(text))
-    times_s = [parse_clock(stamp[1]) for stamp in stamps]
-    is_full = all(stamp[1].count(":") == 2 or "[" in stamp[0] for stamp in stamps)  # no time of day that is said
-    if times_s[:1] == [0] or (len(times_s) > 1 and times_s == sorted({*times_s}) and (is_full or times_s[0] < 60)):
-        text = MARKS["STAMP"].sub(leave_out, text)
+    for name in ("RECORDING", "DATED", "STAMP"):
+        text = leave_out_marks(name, text)
     speakers = find_speaker_names([text]) if names is None else names
-    for form in (MARKS["NUMBER"], MARKS["BARE_NUMBER"]):
-        found = [line[1] or str(ord(line[2])) for line in form.finditer(text)]
-        numbers = list(map(int, found))
-        counted = len(numbers) > 1 and all(b in (a + 1, 1, ord("a")) for a, b in pairwise(numbers))
-        if form is MARKS["BARE_NUMBER"]:
-            padded = all(re.match(r"0\d\d", number) and number != "007" for number in found)
-            counted = padded or (counted and numbers[0] < 2 and len(numbers) == len(text.split("\n")))
-        text = form.sub(leave_out, text) if counted else text
+    for name in ("NUMBER", "BARE_NUMBER"):
+        text = leave_out_marks(name, text)
     cues = list(MARKS["CUE"].finditer(text))
     if len(cues) > 1 or any("(" in cue[1] for cue in cues):
         text = MARKS["DIRECTION"].sub(leave_out, MARKS["CUE"].sub(leave_out, text))
@@ -116,6 +106,25 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
     if tags and all(lines) and not WORDS["no_tags"] & {*tags} and (len(lines) > 1 or not (lines[0] and lines[0][2])):
         text = re.sub(r'^[^"\n]+(?=")', leave_out, text, flags=re.MULTILINE)
     return text, [name for name in left_out if name]
+
+
+def _mark_lines(name: str, found: list[re.Match[str]], text: str) -> bool:
+    """Return whether what was found of a pattern at the starts of lines are names, times or numbers of the lines."""
+    if name == "RECORDING":
+        return len(found) == sum(map(bool, text.split("\n")))
+    if name == "DATED":
+        return len(found) > 1 or any(each[1] or "T" in each[0] for each in found)
+    if name == "STAMP":
+        times_s = [parse_clock(stamp[1]) for stamp in found]
+        is_full = all(stamp[1].count(":") == 2 or "[" in stamp[0] for stamp in found)  # no time of day that is said
+        rise = len(times_s) > 1 and times_s == sorted({*times_s})
+        return times_s[0] == 0 or (rise and (is_full or times_s[0] < 60))
+    numbers = [int(line[1] or ord(line[2])) for line in found]
+    counted = len(numbers) > 1 and all(b in (a + 1, 1, ord("a")) for a, b in pairwise(numbers))
+    if name == "NUMBER":
+        return counted
+    padded = all(re.match(r"0\d\d", line[1]) and line[1] != "007" for line in found)
+    return padded or (counted and numbers[0] < 2 and len(numbers) == len(text.split("\n")))
 
 
 def find_speaker_names(texts: Iterable[str]) -> frozenset[str]:

@@ -92,7 +92,7 @@ def _build_hofer_table(block: Mapping[str, Any]) -> Table:
 
 def build_minnis_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``run_minnis2000`` say, on the last of its lists, which is ``test``."""
-    tables: dict[tuple[str, str], Table] = {}
+    tables, columns = dict[tuple[str, str], Table](), read_columns("minnis2000")
     for split, part in figures["lists"].items():
         for condition, rows in part["conditions"].items():
             name, caption = f"minnis2000-{split}-{condition}", f"Unit selection, {split}, {condition}"
@@ -105,9 +105,7 @@ def build_minnis_section(figures: Mapping[str, Any]) -> Section:
                 for channel, each in row["channels"].items():
                     own |= {f"{channel}_{ratio}": each[ratio] for ratio in ("global_variance", "jerk")}
                 with_joins[system] = {**row, **own}
-            tables[split, condition] = Table(
-                name.replace(" ", "-"), caption, read_columns("minnis2000"), with_joins, PRINTED
-            )
+            tables[split, condition] = Table(name.replace(" ", "-"), caption, columns, with_joins, PRINTED)
     split, last = list(figures["lists"].items())[-1]
     main = tables[split, AUDIO_ONLY]
     rows, everything = main.rows, main.rows.get(EVERYTHING, main.rows[PRINTED])
