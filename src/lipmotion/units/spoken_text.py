@@ -40,16 +40,13 @@ class SpokenAs(Enum):
     UNKNOWN = "unknown"
 
 
-LAUGHTER = "LAU"  # in capitals, as in lexicons of telephone speech; ``Lau`` is a name
-
-
 def classify_label(label: str) -> SpokenAs:
     """Return whether a whole label stands for silence or a sound, speech of unknown words, or speech.
 
     >>> classify_label("[laughs]"), classify_label("<unk>"), classify_label("hello")
     (<SpokenAs.SILENCE: 'silence'>, <SpokenAs.UNKNOWN: 'unknown'>, <SpokenAs.SPEECH: 'speech'>)
     """
-    name = "sil" if label.strip() == LAUGHTER else label.strip().lower()
+    name = "sil" if label.strip() == "LAU" else label.strip().lower()  # in lexicons of calls; ``Lau`` is a name
     bracketed = MARKS["IN_BRACKETS"].fullmatch(name) is not None
     inner = name.strip("<>[](){}+&=* ") if bracketed else name
     if inner in WORDS["unknown"] or (bracketed and MARKS["UNKNOWN_SPEECH"].search(inner)):
@@ -167,7 +164,6 @@ def check_word_count(count: int, where: str) -> None:
 
 
 LOG = logging.getLogger("lipmotion")
-_NAME = re.compile(r"([a-z][a-z '-]*?)\s*(?::\s*(\d*\.?\d+))?")
 SYNONYMS: dict[str, tuple[str, float]] = {
     word: (mood, float(strength))
     for meaning, words in read_table("moods").items()
@@ -240,7 +236,7 @@ def time_moods(tags: Sequence[MoodTag], units: Timeline[Unit]) -> tuple[MoodKey,
 
 
 def _meaning(tag: re.Match[str]) -> tuple[str, float] | None:
-    name = _NAME.fullmatch((tag[2] or tag["did"] or "").strip().lower())
+    name = MARKS["MOOD"].fullmatch((tag[2] or tag["did"] or "").strip().lower())
     known = SYNONYMS.get(name[1]) if name else None
     if name is None or known is None:
         return None
