@@ -411,9 +411,9 @@ def _open_remote(url: str) -> tuple[Path, Callable[[str], None]]:
         raise MissingDependencyError(f"{url}: {error}; {install_command('cluster')}") from error
     except Exception as error:  # every kind of file system has errors of its own
         raise CorpusError(f"{url}: cannot be opened ({error}); give a folder by URL, as s3://BUCKET/NAME") from error
-    kept = ExitStack()
-    folder = kept.enter_context(open_temporary()) / (Path(root).name or "corpus")
-    atexit.register(kept.close)
+    stack = ExitStack()
+    folder = stack.enter_context(open_temporary()) / (Path(root).name or "corpus")
+    atexit.register(stack.close)
 
     def fetch(part: str) -> None:
         place, source = folder / part, f"{root.rstrip('/')}/{part}"

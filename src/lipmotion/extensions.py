@@ -80,11 +80,11 @@ class Registry(Generic[ExtensionT]):
     @property
     def names(self) -> tuple[str, ...]:
         """All names: first those of this distribution, then those of installed packages in alphabetical order."""
-        own = dict.fromkeys((*self.built_in, *self._own))
-        return (*own, *sorted(set(self._installed) - set(own)))
+        listed = dict.fromkeys((*self.built_in, *self._own))
+        return (*listed, *sorted(set(self._installed) - set(listed)))
 
     def load(self, name: str) -> ExtensionT:
-        """Import an extension and return it; what it prints meanwhile goes to standard error.
+        """Import an extension and return it; what it prints while it loads goes to standard error.
 
         Raises InputError: none has this name, the package that adds it cannot be imported, or it is of another kind.
         """

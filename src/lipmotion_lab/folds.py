@@ -89,7 +89,7 @@ def cross_validate(
         what = "speakers" if by_speaker else "utterances"
         raise InputError(f"{count} folds; required: from 2 to {len(groups)}, which is how many {what} there are")
     runner.check_opening(corpus, names)
-    mixed = runner.shuffle(groups, settings.seed)
+    mixed = runner.permute(groups, settings.seed)
     key = runner.PartKey(engine_named("trajectory"), names, others=f"{count} {by_speaker}")
     checkpoint, results = runner.open_parts(work, corpus, settings, key), []
     for fold, part in enumerate(runner.share_out(settings, [f"fold {fold + 1}" for fold in range(count)])):

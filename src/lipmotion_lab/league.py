@@ -187,11 +187,12 @@ def ask(
     if missing:
         content = _run(rival, command, [each for each, _ in missing], folder, limit_s)
         for each, _ in missing:
-            read_answers(rival, each, content.get(each.utterance.name))  # nothing is kept before it is checked
+            read_rival_answers(rival, each, content.get(each.utterance.name))  # nothing is kept before it is checked
         for each, file in missing:
             write_text(file, as_json(content[each.utterance.name]))
     by_recording = [
-        read_answers(rival, each, from_json(file.read_bytes())) for each, file in zip(recordings, files, strict=True)
+        read_rival_answers(rival, each, from_json(file.read_bytes()))
+        for each, file in zip(recordings, files, strict=True)
     ]
     tried = [list(answers) for answers in zip(*by_recording, strict=True)]
     if any(answer.names != answers[0].names for answers in tried for answer in answers):
@@ -233,7 +234,7 @@ def _run(
         raise RivalError(f"{rival.title}: no readable answer ({error}); see {folder / 'log.txt'}") from error
 
 
-def read_answers(rival: Rival, recording: Recording, content: Any) -> list[RivalAnswer]:
+def read_rival_answers(rival: Rival, recording: Recording, content: Any) -> list[RivalAnswer]:
     """Return the answers to a recording by settings, checked. Raises RivalError."""
     about, count = f"{rival.title}, {recording.utterance.name}", len(rival.list_settings())
     answers, needed_s = [], recording.utterance.audio.duration_s

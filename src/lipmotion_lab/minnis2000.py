@@ -93,34 +93,16 @@ def measure_velocity_change(curve: NDArray[np.floating[Any]]) -> Array:
 ENGINE = "selection"
 PRINTED, UNGUIDED, EVERYTHING = "as printed", "all additions but the guide", "all additions: the default"
 DEFAULTS = SelectionConfig().as_mapping()
-ADDITIONS: Mapping[str, tuple[str, ...]] = {
-    "300 candidates a bias, 25 searched": ("candidates", "beam"),
-    "guide from the sound": ("guide",),
-    "300 candidates and the guide": ("candidates", "beam", "guide"),
-    "joins cost what motions differ by": ("join",),
-    "300 candidates and this": ("candidates", "beam", "join"),
-    "durations count": ("duration",),
-    "own phone recogniser": ("joint_recogniser",),
-    "table of articulation": ("articulation",),
-    "t d g k one symbol, but played": ("suppressed",),
-}
+_TABLE = json.loads(Path(__file__).with_name("minnis2000.json").read_text(encoding="ascii"))
+ADDITIONS: Mapping[str, Sequence[str]] = _TABLE["additions"]
 """Options of the preset that take the value of the default, by the name of the row."""
-VARIANTS: Mapping[str, Mapping[str, Any]] = {
-    "one candidate a bias": {"candidates": 1},
-    "no phone invisible": {"suppressed": False, "invisible": ""},
-    "t d g k l suppressed": {"invisible": "t d g k l"},
-    "Table 1 symmetric: 73/27 for 77/23": {"overlap": "symmetric"},
-    "Table 1, forward is the phone after": {"overlap": "anticipatory"},
-    "overlaps half and half": {"overlap": "middle"},
-    "window N = 3": {"window": 3},
-    "window N = 7": {"window": 7},
-}
+VARIANTS: Mapping[str, Mapping[str, Any]] = _TABLE["variants"]
 """Other readings of the print, and what it leaves open."""
 _ROW, _SUMS, _OVERLAP = "row", "correlation", "overlap"
 WHAT_IS_SHOWN = ("acc", "nrmse", "global_variance", "jerk")
 
 
-def list_rows(*, guided: bool = True) -> dict[str, SelectionConfig]:
+def list_configurations(*, guided: bool = True) -> dict[str, SelectionConfig]:
     """Return the configuration of every row, by its name; closures are never pinned, so that units alone are judged.
 
     guided : with the rows whose models learn from the sound, a guide or phones of the speaker's own
@@ -151,7 +133,7 @@ def run_minnis2000(
     models : folder of the model ``selection.lipmotion`` (``train_engines``), so that a second run does not train
              again; None: it is trained and not kept
     quick  : only see that it runs: few epochs
-    guided : as of ``list_rows``; without, training takes a minute instead of twenty, and no model is kept
+    guided : as of ``list_configurations``; without, training takes a minute instead of twenty, and no model is kept
     work   : a folder for finished rows, and for the model if ``models`` is None, from which the same call goes on
              after a stop; None: none
     All rows use one model, with the default's inventory, guide and phone recogniser, of which each takes what it needs:
@@ -171,7 +153,7 @@ def run_minnis2000(
         seconds: float | None = perf_counter() - start_s
     else:
         model, seconds = train_engines(corpus, models or (work and work / "model"), training, [ENGINE])[ENGINE]
-    figures, systems = {}, list_rows(guided=guided)
+    figures, systems = {}, list_configurations(guided=guided)
     for (split, names), part in zip(lists.items(), runner.share_out(settings, [*lists], 0.6), strict=True):
         key = runner.PartKey(model.engine, names, model=model, others=str(systems))
         checkpoint = runner.open_parts(work and work / split, corpus, settings, key)

@@ -160,14 +160,14 @@ def check_opening(corpus: Corpus, names: Sequence[str]) -> tuple[str, ...]:
     return channels
 
 
-def shuffle(items: Sequence[ItemT], seed: int) -> tuple[ItemT, ...]:
+def permute(items: Sequence[ItemT], seed: int) -> tuple[ItemT, ...]:
     """Return the items in an order that depends on the seed alone."""
     return tuple(items[i] for i in np.random.default_rng(seed).permutation(len(items)))
 
 
 def take_quick_part(corpus: Corpus, seed: int) -> Corpus:
     """Return a corpus with a few utterances of each list: those of every quick run with this seed."""
-    return corpus.divided({split: shuffle(corpus.names(split), seed)[: QUICK_CLIPS[split]] for split in SPLITS})
+    return corpus.divided({split: permute(corpus.names(split), seed)[: QUICK_CLIPS[split]] for split in SPLITS})
 
 
 @dataclass(frozen=True)
@@ -329,7 +329,7 @@ def choose_training_names(
     Names of recordings that could not be prepared are left out with a warning, if they are few.
     Raises CorpusError: as ``check_training_names``.
     """
-    listed = tuple(order) if order is not None else shuffle(corpus.required("train"), seed)
+    listed = tuple(order) if order is not None else permute(corpus.required("train"), seed)
     missing = [name for name in listed if name not in corpus.names()]
     if 0 < len(missing) <= MAX_MISSING * len(listed):
         some = f"{len(missing)} of {len(listed)} names to train on ({shorten_list(missing)})"

@@ -317,7 +317,7 @@ class ProjectFolder:
             taken = {file_key(each.name) for each in self.project.lines.values()}
             taken |= {file_key(each.stem) for each in folder.iterdir()}  # also of what was removed
             number = self.project.next_number
-            recording = ProjectRecording(number, clean_name(Path(name).stem), "", digest, transcript)
+            recording = ProjectRecording(number, to_file_name(Path(name).stem), "", digest, transcript)
             recording = self._choose_name(recording, taken)
             recording = replace(recording, sound=f"{SOUNDS}/{recording.name}{suffix}")
             check_recordings(self.project.with_recordings([recording]))
@@ -452,10 +452,10 @@ def restore_copy(path: Path, copy: Path) -> None:
     LOG.warning("%s: was damaged, and is restored from %s", path, copy)
 
 
-def clean_name(name: str, default: str = "line") -> str:
+def to_file_name(name: str, default: str = "line") -> str:
     """Return a name that the page gives as the name of a file: letters, digits and a few signs.
 
-    >>> clean_name("../Anna's take"), clean_name("..", "voice")
+    >>> to_file_name("../Anna's take"), to_file_name("..", "voice")
     ('Anna_s take', 'voice')
     """
     plain = re.sub(r"[^\w .+()-]", "_", unicodedata.normalize("NFC", name)).strip(" ._")

@@ -258,7 +258,7 @@ def find_preset(name: str, files: tuple[str, ...]) -> Preset:
         if name not in PRESETS:
             raise InputError(f"no preset {shorten(repr(name))}; required one of: {', '.join(PRESETS)}")
         return PRESETS[name]
-    known = list_suffixes()
+    known = list_export_suffixes()
     for suffix in files:
         if suffix not in known or not _SUFFIX.fullmatch(suffix):
             raise InputError(f"nothing is written as {shorten(repr(suffix))}; required some of: {' '.join(known)}")
@@ -267,6 +267,6 @@ def find_preset(name: str, files: tuple[str, ...]) -> Preset:
     return Preset("", "", tuple(dict.fromkeys(files)))
 
 
-def list_suffixes() -> tuple[str, ...]:
+def list_export_suffixes() -> tuple[str, ...]:
     """Return the suffixes of all files that can be exported."""
     return tuple(filter(_SUFFIX.fullmatch, list_outputs(OutputSettings(shown_face("head")))))

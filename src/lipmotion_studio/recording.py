@@ -151,8 +151,8 @@ class OpenRecording:
     def keep_version(self, revision: int) -> dict[str, Any]:
         """Keep the edits as a version. Raises RevisionError: as ``edit``. InputError: there are too many."""
         with self.folder.check_out(self.number, revision) as recording:
-            kept = recording.with_version(self.file.edits.sentences)
-            self.folder.change_recording(self.number, lambda _: kept)
+            saved = recording.with_version(self.file.edits.sentences)
+            self.folder.change_recording(self.number, lambda _: saved)
         return {}
 
     def forget_version(self, revision: int, name: str) -> dict[str, Any]:
@@ -196,8 +196,8 @@ class OpenRecording:
         if is_other or keep_version:
             with self.folder.check_out(self.number, revision) as recording:
                 if keep_version:
-                    kept = recording.with_version(self.file.edits.sentences)
-                    self.folder.change_recording(self.number, lambda _: kept)
+                    saved = recording.with_version(self.file.edits.sentences)
+                    self.folder.change_recording(self.number, lambda _: saved)
                 if is_other:
                     self.folder.write_edits(recording, file)
                     self.file, self.summary = file, self.folder.summarise(recording)
@@ -223,7 +223,7 @@ class OpenRecording:
             "rate_hz": motion.rate_hz,
             "frames": len(motion.values),
             "words": rows,
-            "phones": list_phones(generation.units, self.session.units()),
+            "phones": describe_phones(generation.units, self.session.units()),
             "channels": [{"name": channel.name, "unit": channel.unit} for channel in motion.channels],
             "steps": list(self.file.edits.sentences),
             "edits_digest": digest_edits(self.file.edits.sentences),
@@ -331,7 +331,7 @@ def find_change(before: Motion, after: Motion) -> dict[str, float] | None:
     return {"start_s": float(frames[0] / after.rate_hz), "end_s": float(frames[-1] / after.rate_hz)}
 
 
-def list_phones(units: Timeline[Unit], plain: Timeline[Unit]) -> list[dict[str, Any]]:
+def describe_phones(units: Timeline[Unit], plain: Timeline[Unit]) -> list[dict[str, Any]]:
     """Return phones in time as objects of JSON; those that are not among ``plain`` were edited."""
 
     def identify(span: Span[Unit]) -> tuple[str, float, float]:

@@ -47,7 +47,7 @@ from lipmotion_studio.project import (
     Project,
     ProjectRecording,
     digest_edits,
-    list_suffixes,
+    list_export_suffixes,
 )
 from lipmotion_studio.recording import LONGEST_VIDEO_S, OpenRecording
 from lipmotion_studio.trainer import VOICES, Trainer
@@ -289,7 +289,7 @@ class Studio:
                 {"name": name, "title": each.title, "files": list(each.files)} for name, each in PRESETS.items()
             ],
             "preset": self.folder.project.preset,
-            "suffixes": list(list_suffixes()),
+            "suffixes": list(list_export_suffixes()),
             "edit_forms": list(FORMS),
             "controls": controls,
             "marks": list(MARKS),

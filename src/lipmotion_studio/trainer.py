@@ -22,7 +22,7 @@ from lipmotion.storage.locks import UNFINISHED, name_work_folder
 from lipmotion.storage.sources import VIDEO_SUFFIXES, read_text_file
 from lipmotion.types import values
 from lipmotion_faces.filmed.face import SUFFIX as FACE_SUFFIX
-from lipmotion_studio.folder import ProjectFolder, clean_name, set_aside
+from lipmotion_studio.folder import ProjectFolder, set_aside, to_file_name
 from lipmotion_studio.project import ProjectRecording
 from lipmotion_studio.training import FACE, KINDS, VOICE, TrainingOrder, TrainingRecording, VoiceOptions, run_training
 
@@ -106,7 +106,7 @@ class Trainer:
         """Begin to make a voice or a face. Raises InputError: busy; no such kind, name or videos. ExportError."""
         if kind not in KINDS:
             raise InputError(f"no kind {shorten(repr(kind))}; required {' or '.join(KINDS)}")
-        plain = clean_name(name, "")
+        plain = to_file_name(name, "")
         if "/" in name or "\\" in name:
             raise InputError(f"the name {shorten(repr(name))} has a slash; give it a name without one, as Anna")
         if not plain:
@@ -250,7 +250,7 @@ def _read_job(file: Path) -> tuple[TrainingRequest | None, dict[str, Any]]:
         LOG.warning("%s: cannot be read (%s), and is kept as %s; voices and faces stay", file, error, place.name)
         return None, {}
     state = INTERRUPTED if status["state"] == WORKING else status["state"]
-    return replace(request, name=clean_name(request.name)), {**_create_status(), **status, "state": state}
+    return replace(request, name=to_file_name(request.name)), {**_create_status(), **status, "state": state}
 
 
 _TEXT, _ANY = values.text(1 << 20), values.any_members(lambda value: value)

@@ -101,7 +101,7 @@ def run_training(order: TrainingOrder, report: Report) -> None:
         # the project is confined in this process
         with confine(order.work.parent), warnings_to(lambda text: report({"warning": text})):
             begun_s = time.monotonic()
-            with create_folders([order.target.parent, order.work]), gather_recordings(order) as recordings:
+            with create_folders([order.target.parent, order.work]), open_recordings(order) as recordings:
                 if order.kind == VOICE:
                     facts = _train_voice(order, recordings, monitor)
                 else:
@@ -117,7 +117,7 @@ def run_training(order: TrainingOrder, report: Report) -> None:
 
 
 @contextmanager
-def gather_recordings(order: TrainingOrder) -> Iterator[Path]:
+def open_recordings(order: TrainingOrder) -> Iterator[Path]:
     """Give a folder of the recordings: that of the order, or one that holds those of the project, with their words."""
     if isinstance(order.source, Path):
         yield order.source

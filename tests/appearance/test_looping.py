@@ -84,7 +84,9 @@ def test_a_motion_that_repeats_is_looped_forwards():
 def test_jumps_go_on_in_the_same_direction():
     path = np.abs(np.arange(240) % 80 - 40) * 0.2  # to and fro: the same places, in both directions
     order = looping.find_loop_order(background(path), 2000, RATE_HZ)
-    for at in (join.at for join in order.joins if join.kind == "jump"):
+    jumps = [join.at for join in order.joins if join.kind == "jump"]
+    assert len(jumps) > 9
+    for at in jumps:
         old, new = order.first[at - FADE_FRAMES], order.first[min(at + FADE_FRAMES, 1999)]
         way = 1 if old > order.first[at - FADE_FRAMES - 1] else -1
         is_near_turn = min(old % 40, 40 - old % 40) <= 2 * FADE_FRAMES  # of the path itself

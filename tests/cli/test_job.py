@@ -18,6 +18,7 @@ from lipmotion import Job, Outputs, Request, read_motion
 from lipmotion.cli import command_line
 from lipmotion.cli.arguments.declared import pick_part
 from lipmotion.pipeline.job import DETAILS
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import Delivery, Staging
 from meshes.heads import head, write_glb
 
@@ -39,33 +40,11 @@ SAME = Job(
     Delivery(offset_ms=-40.0, stepped=True),
     Staging(blinks=False, head=False, seed=3),
 )
-FILE = """[request]
-recording = "a.wav"
-transcript = "t.txt"
-model = "m.lipmotion"
-pauses = "natural"
-[outputs]
-files = ["a.json", "b.mp4", "c.vtt"]
-channels = ["opening", "width"]
-fps = 30
-face = "man"
-background = "#102030"
-jaw = "none"
-control_points = true
-kinds = ["csv", "mp4"]
-[delivery]
-offset_ms = -40
-stepped = true
-[staging]
-blinks = false
-head = false
-seed = 3
-"""
+FILE = Path(__file__).with_name("scene.toml").read_text(encoding="ascii")
 OTHERS = {
-    "corpus --channels",
-    "experiment --channels",
-    *("cues --fps", "measure --speaker", "train --units", "train --speaker", "face --speaker"),
-    *("corpus --offset-ms", "studio --model", "studio --character", "studio --face"),
+    *("corpus motion --channels", "hofer2008 --channels", "cues --fps", "corpus prepare --offset-ms", "train --units"),
+    *("evaluate --speaker", "train --speaker", "face build --speaker"),
+    *("studio --model", "studio --character", "studio --face"),
     *("live --model", "live --pauses", "live --rate", "live --to", "live --character"),
 }
 """Options of other verbs that have such a name, and another meaning or another default."""
@@ -106,17 +85,20 @@ def test_a_level_of_detail_is_behind_the_command_line():
 
 
 def test_each_option_is_declared_once():
-    """No flag stands twice in the parts of a job, and none of them in a module of the command line."""
+    """No flag stands twice in the parts of a job, and none of them in a module or a table of the command line."""
     parts = (Request, Outputs, Delivery, Staging)
     told = [each for part in parts for each in fields(part) if "help" in each.metadata and "still" not in each.metadata]
     flags = [flag for each in told for flag in each.metadata.get("flags", ("--" + each.name.replace("_", "-"),))]
     assert len(set(flags)) == len(flags) > 30
-    found = set()
+    known, found = {*flags} - {"-o", "--output", "speech"}, set()
     source = Path(command_line.__file__).parents[2]
     for path in [*(source / "lipmotion" / "cli").rglob("*.py"), *source.glob("lipmotion_*/verbs/*.py")]:
         calls = [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Call)]
         words = {str(word.value) for node in calls for word in node.args if isinstance(word, ast.Constant)}
-        found |= {f"{path.stem} {flag}" for flag in words & {*flags} - {"-o", "--output", "speech"}}
+        found |= {f"{path.stem} {flag}" for flag in words & known}
+    for package in ("lipmotion.cli.verbs", "lipmotion_faces.verbs", "lipmotion_lab.verbs", "lipmotion_studio.verbs"):
+        rows = read_shipped_table(package, "arguments.csv")
+        found |= {f"{row['verb']} {flag}" for row in rows for flag in {*row["name"].split()} & known}
     assert found == OTHERS
 
 

@@ -81,47 +81,7 @@ def logged() -> Iterator[None]:
     root.handlers = handlers
 
 
-LINES = """
-info m.lipmotion
-info EVIL
-info other.lipmotion
-info EVIL.wav
-info none-EVIL
-info m.lipmotion EVIL
-EVIL
-animate EVIL.wav --model m.lipmotion --recogniser own -o EVIL.json
-animate a.wav --model EVIL-none -o a.json
-animate a.wav --model m.lipmotion -o none-EVIL/a.json
-animate EVIL.wav --model m.lipmotion -o EVIL.wav
-animate a.wav --model m.lipmotion -o a.json --channels EVIL
-animate a.wav --model m.lipmotion -o a.json --recogniser EVIL
-animate a.wav --model m.lipmotion -o a.json --transcript words.txt
-animate a.wav --model m.lipmotion -o a.json --lexicon lexicon.txt
-animate a.wav --model m.lipmotion -o a.json --units none-EVIL.json
-animate a.wav --model m.lipmotion -o a.json --rate EVIL
-explain EVIL.mp4 --model m.lipmotion --at 0
-cues EVIL.wav --model m.lipmotion --recogniser own -f xml
-cues EVIL.wav --model m.lipmotion --recogniser own -f json
-cues a.wav --model m.lipmotion --shapes EVIL
-cues EVIL.mp4 --model m.lipmotion --machine-readable
-corpus info c
-corpus info damaged
-corpus sync c
-corpus prompts --text none-EVIL
-corpus prompts --text words.txt --lexicon lexicon.txt
-corpus prepare r -o new
-corpus prepare r -o new --machine-readable
-train c -o m --speaker EVIL-none
-train c -o m --set EVIL
-train c -o m --engine EVIL
-train c -o c/EVIL
-train c -o m --speaker EVIL-none --machine-readable
-adapt EVIL.wav -o EVIL.wav
-evaluate m.lipmotion c --split EVIL
-compare EVIL.csv EVIL.json
-experiment learning-curve c --sizes EVIL
-experiment xieliu2007 c --systems EVIL
-""".strip().splitlines()
+LINES = Path(__file__).with_name("printed_lines.txt").read_text(encoding="ascii").splitlines()
 NOT_SHOWN = {
     "corpus sync c",
     "cues EVIL.wav --model m.lipmotion --recogniser own -f xml",

@@ -23,16 +23,21 @@ LONG = pytest.mark.long
 
 def test_all_additions_together_are_the_default():
     """Each row has an option of its own; without a row, an addition would be hidden in another one."""
-    printed, everything = minnis2000.list_rows()[minnis2000.PRINTED], minnis2000.list_rows()[minnis2000.EVERYTHING]
+    printed, everything = (
+        minnis2000.list_configurations()[minnis2000.PRINTED],
+        minnis2000.list_configurations()[minnis2000.EVERYTHING],
+    )
     pair = ("candidates", "beam")
     options = {key for keys in minnis2000.ADDITIONS.values() if len(keys) == 1 or keys == pair for key in keys}
     alone = {key: getattr(everything, key) for key in options}
     assert replace(printed, **alone) == everything == SelectionConfig(closures=False)
-    assert len({str(config) for config in minnis2000.list_rows().values()}) == len(minnis2000.list_rows())
-    unguided = minnis2000.list_rows(guided=False)  # nothing is learned from the sound
+    assert len({str(config) for config in minnis2000.list_configurations().values()}) == len(
+        minnis2000.list_configurations()
+    )
+    unguided = minnis2000.list_configurations(guided=False)  # nothing is learned from the sound
     assert (minnis2000.PRINTED in unguided, minnis2000.EVERYTHING in unguided) == (True, False)
     assert {(config.guide, config.joint_recogniser) for config in unguided.values()} == {(0.0, False)}
-    assert unguided.items() <= minnis2000.list_rows().items()
+    assert unguided.items() <= minnis2000.list_configurations().items()
 
 
 def test_overlaps_count_where_table_1_leaves_the_middle():
@@ -82,7 +87,7 @@ def test_a_second_run_does_not_train(figures, toy_corpus, folder):
     again = minnis2000.run_minnis2000(toy_corpus, models=folder, settings=settings)
     conditions = {(split, c, 2) for split, found in again["lists"].items() for c in found["conditions"]}
     assert sorted(received) == sorted(
-        (split, c, row, n) for split, c, n in conditions for row in minnis2000.list_rows()
+        (split, c, row, n) for split, c, n in conditions for row in minnis2000.list_configurations()
     )
     assert (figures["seconds"] > 0, again["seconds"]) == (True, None)
     assert again["lists"] == figures["lists"]

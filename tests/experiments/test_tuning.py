@@ -55,7 +55,7 @@ def test_the_network_with_the_best_settings_is_chosen(validation, monkeypatch):
     best = systems.find_best_trial(found.tried)
     assert best.options["rate"] == found.engine.rate
     made = generate_clips(validation, "audio only", found.engine, found.model)
-    assert systems.measure_clips(made) == pytest.approx((best.acc, best.amse))
+    assert systems.measure_system(made) == pytest.approx((best.acc, best.amse))
 
 
 def test_gaussians_are_split_while_that_is_better():

@@ -5,7 +5,9 @@ themselves, counts by one such tolerance for every frame; in single precision by
 probability of a best path may be lower than that of the best of all by the rounding of single precision.
 """
 
+import json
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -257,16 +259,7 @@ def is_right(name: str, spread: float, number: int) -> bool:
         return RECURSIONS[name](draw, spread, number % 2 == 1)
 
 
-ONCE_WRONG = {
-    "network, double": [(30, 1), (300, 261), (1e4, 291), (1e5, 113)],
-    "network, single": [(30, 115), (300, 45), (300, 67), (1e5, 197)],
-    "products of 2 chains, double": [(100, 241), (300, 131), (1e3, 265), (1e4, 209)],
-    "products of 2 chains, single": [(30, 193), (100, 123), (1e3, 43), (1e5, 223)],
-    "network with a block, double": [(30, 135), (100, 57), (300, 53), (1e3, 219)],
-    "network with a block, single": [(30, 79), (100, 145), (300, 51), (1e4, 277)],
-    "factorial, double": [(1e4, 46), (1e5, 148)],
-    "factorial, single": [(30, 135), (100, 61), (300, 119), (1e3, 18)],
-}
+ONCE_WRONG = json.loads(Path(__file__).with_name("once_wrong.json").read_text(encoding="utf-8"))
 """Spreads and numbers of cases in which probabilities counted that compiled forms once set to 0, or raised."""
 
 

@@ -115,7 +115,7 @@ def test_written_weights_paint_the_same_binding_and_points_are_read(binding, mes
     again = paint_weights(binding, mesh, binding_files.read_weights(tmp_path / "weights.csv"))
     np.testing.assert_allclose(again.matrix.toarray(), binding.matrix.toarray(), atol=1e-5)
     binding_files.write_points(tmp_path / "points.csv", binding.placement)
-    named = binding_files.read_points(tmp_path / "points.csv")
+    named = binding_files.read_lip_points(tmp_path / "points.csv")
     assert [named[point] for point in binding.placement.points] == binding.placement.vertices.tolist()
 
 

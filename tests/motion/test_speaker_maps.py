@@ -104,11 +104,11 @@ def test_restfulness_grows_with_the_distance_from_speech_and_weights_of_visemes_
     assert found[far].min() > 1 - 1e-12
     assert np.diff(found[np.argsort(distance, kind="stable")]).min() > -1e-9
     assert (is_away_from_speech(times, speech_s, speaker_maps.FAR_FROM_SPEECH_S) == far).all()
-    weights = speaker_maps.weigh_visemes(units, 250)
+    weights = speaker_maps.weigh_viseme_classes(units, 250)
     assert np.abs(weights.sum(axis=1) + found - 1).max() < 1e-9
     assert 0 < np.abs(np.diff(weights, axis=0)).max() < 0.3
     unknown = Timeline((Span(0.0, 1.0, Unit("", "a group")),))
-    assert np.abs(speaker_maps.weigh_visemes(unknown, 100)).max() < 1e-12
+    assert np.abs(speaker_maps.weigh_viseme_classes(unknown, 100)).max() < 1e-12
 
 
 def test_points_share_a_gain_for_each_axis() -> None:
@@ -179,7 +179,7 @@ def test_habits_are_what_is_left_in_each_viseme() -> None:
     planted[speaker_maps.VISEME_NAMES.index("lr1"), 1], planted[speaker_maps.VISEME_NAMES.index("al"), 2] = 0.1, -0.2
     generated = [each.motion.values.copy() for each in mapped]
     for each, values in zip(mapped[6:], generated[6:], strict=True):
-        values[:] -= speaker_maps.weigh_visemes(each.speech.units, len(values)) @ planted
+        values[:] -= speaker_maps.weigh_viseme_classes(each.speech.units, len(values)) @ planted
     found = add_habits(maps, mapped, names, generated)
     np.testing.assert_allclose(found["anna"].habits, 0, atol=1e-12)
     habits = found["ben"].habits
@@ -187,7 +187,7 @@ def test_habits_are_what_is_left_in_each_viseme() -> None:
     assert -0.2 < habits[speaker_maps.VISEME_NAMES.index("al"), 2] < -0.05
     assert np.abs(habits[:, 0]).max() < 1e-12
     one = mapped[-1]
-    visemes = speaker_maps.weigh_visemes(one.speech.units, len(one.motion.values))
+    visemes = speaker_maps.weigh_viseme_classes(one.speech.units, len(one.motion.values))
     shift = found["ben"].shift(one.motion.values, visemes)
     assert np.abs(shift).max() > 0.03
     assert np.abs(shift[restful(one) >= 1]).max() < 1e-12

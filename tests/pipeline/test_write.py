@@ -17,7 +17,7 @@ from lipmotion.articulation.delivery import close_on_frame_grid
 from lipmotion.articulation.rest import LAUGH_GAP
 from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
-from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth
+from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth_poses
 from lipmotion.pipeline.outputs.motion_files import with_articulation
 from lipmotion.pipeline.outputs.output import OutputSettings, create_outputs, plan, shift_prosody
 from lipmotion.types import Audio, Generation, Prosody, Timeline
@@ -259,7 +259,7 @@ def test_closures_between_two_frames_of_a_slow_file_are_kept(generation, rate_hz
 def test_eyes_and_head_move_on_while_the_mouth_is_held(generation, tmp_path):
     smooth, delivery = with_curves(generation, "face")[0], Delivery(min_hold_ms=400)
     assert max(np.abs(smooth.motion[name]).max() for name in ("eyeBlinkLeft", "headYaw")) > 1e-3
-    steps = hold_mouth(smooth, delivery.hold_frames(100), [])
+    steps = hold_mouth_poses(smooth, delivery.hold_frames(100), [])
     for name in ("eyeBlinkLeft", "headYaw", "browInnerUp"):
         assert steps.motion[name] == pytest.approx(smooth.motion[name])
         assert name not in steps.stepped

@@ -1,3 +1,4 @@
+import json
 import os
 import shutil
 import struct
@@ -317,19 +318,8 @@ def test_any_name_is_a_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         assert read_audio(Path(name)).duration_s == 2
 
 
-FOREIGN = {
-    # name of the file, what it says; each names its neighbour, a good recording
-    "list.m3u8": "#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:2,\nneighbour.sub\n#EXT-X-ENDLIST\n",
-    "address.m3u8": "#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:2,\nhttp://localhost:9/a.ts\n",
-    "list.wav": "ffconcat version 1.0\nfile 'neighbour.sub'\n",
-    "late.wav": "# words\n" * 100 + "ffconcat version 1.0\nfile 'neighbour.sub'\n",
-    "list.mpd": '<?xml version="1.0"?>\n<MPD mediaPresentationDuration="PT2S"></MPD>\n',
-    "neighbour.idx": "# VobSub index file, v7\ntimestamp: 00:00:00:000, filepos: 000000000\n",
-    "session.sdp": "v=0\no=- 0 0 IN IP4 127.0.0.1\ns=x\nc=IN IP4 127.0.0.1\nt=0 0\nm=audio 5004 RTP/AVP 0\n",
-    "words.vtt": "WEBVTT\n\n00:00.000 --> 00:01.000\nhello\n",
-    "tones.sbg": "a: 200+10/20\nNOW a\n",
-    "page%03d.png": "neighbour of page001.png",
-}
+FOREIGN = json.loads(Path(__file__).with_name("foreign_files.json").read_text(encoding="utf-8"))
+"""Files by name, and what they say; each names its neighbour, a good recording."""
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="what is opened is asked of Linux")

@@ -1,3 +1,4 @@
+import json
 import os
 import signal
 from collections.abc import Iterator
@@ -113,19 +114,7 @@ def test_what_is_stopped_or_killed_goes_on(studio):
     assert not list((studio.folder.path / "voices").glob("*.unfinished"))
 
 
-REFUSED: list[tuple[dict[str, Any], str]] = [
-    ({"kind": "song", "name": "a"}, "voice or face"),
-    ({"kind": "voice", "name": "a", "lines": [1]}, "no video of this project"),
-    ({"kind": "voice", "name": "a", "lines": "all"}, "required a list"),
-    ({"kind": "voice", "name": "a", "options": {"engine": "../x"}}, "engine"),
-    ({"kind": "voice", "name": "a", "options": {"path": "/etc"}}, "no option 'path'"),
-    ({"kind": "voice", "name": "a", "options": []}, "options"),
-    ({"kind": "voice", "name": "a" * 300}, "at most 200"),
-    ({"kind": "voice", "name": " .. "}, "give it a name"),
-    ({"kind": "face"}, "give it a name"),
-    ({"kind": "voice", "name": "../Me"}, "slash"),
-    ({"kind": "voice", "name": "a\\b"}, "slash"),
-]
+REFUSED = json.loads(Path(__file__).with_name("refused_training.json").read_text(encoding="utf-8"))
 
 
 def test_what_cannot_be_made_is_refused(studio):
@@ -141,7 +130,7 @@ def test_what_cannot_be_made_is_refused(studio):
 
 def test_videos_of_the_project_are_gathered_with_their_words(tmp_path):
     """What the readers refuse is told as a sentence, and nothing is left of what was gathered."""
-    from lipmotion_studio.training import TrainingRecording, gather_recordings
+    from lipmotion_studio.training import TrainingRecording, open_recordings
 
     for name in ("take.mp4", "take.srt", "other.mp4"):
         (tmp_path / name).write_text(name, encoding="utf-8")
@@ -151,7 +140,7 @@ def test_videos_of_the_project_are_gathered_with_their_words(tmp_path):
         TrainingRecording(tmp_path / "other.mp4", "other", ""),
     )
     order = TrainingOrder("voice", tmp_path / "me.lipmotion", tmp_path / "work", lines, VoiceOptions(), None, 1)
-    with gather_recordings(order) as place:
+    with open_recordings(order) as place:
         found = {path.name: path.read_text(encoding="utf-8") for path in place.iterdir()}
     assert found == {
         "a-take.mp4": "take.mp4", "a-take.srt": "take.srt", "a-take-2.mp4": "take.mp4", "a-take-2.txt": "so typed",

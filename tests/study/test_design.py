@@ -13,7 +13,13 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion_faces.video import mp4, synthetic_mark
 from lipmotion_studio.study import answers, manifest
 from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED
-from lipmotion_studio.study.design import design_study, encode_video, make_condition, parse_conditions, read_sentences
+from lipmotion_studio.study.design import (
+    design_study,
+    encode_rated_video,
+    make_condition,
+    parse_conditions,
+    read_sentences,
+)
 from lipmotion_studio.study.manifest import VIDEO_NAME, VIDEOS, check_videos, read_study
 from lipmotion_studio.study.settings import StudySettings
 from study.small_study import CONDITIONS, SENTENCES, sha256_of, small_study
@@ -94,7 +100,7 @@ def test_motion_is_drawn_with_the_sound_of_the_sentence(here):
 
 def test_the_sound_of_an_anchor_is_late_and_its_length_stays(here):
     source = here / "said" / "one.mp4"
-    seconds = [encode_video(source, here / f"{ms}.mp4", source, ms) for ms in (0.0, 200.0)]
+    seconds = [encode_rated_video(source, here / f"{ms}.mp4", source, ms) for ms in (0.0, 200.0)]
     assert seconds[0] == seconds[1]
     begins = []
     for ms in (0, 200):
@@ -102,7 +108,7 @@ def test_the_sound_of_an_anchor_is_late_and_its_length_stays(here):
         begins.append(int(np.argmax(np.abs(audio.samples) > 0.2)) / audio.rate_hz)
     assert begins[1] - begins[0] == pytest.approx(0.2, abs=0.03)
     with pytest.raises(errors.InputError, match="longer sentences"):
-        encode_video(source, here / "late.mp4", source, 5000.0)
+        encode_rated_video(source, here / "late.mp4", source, 5000.0)
 
 
 def test_the_mark_of_a_synthetic_video_stays(here):
@@ -110,7 +116,7 @@ def test_the_mark_of_a_synthetic_video_stays(here):
     picture = np.zeros((48, 64, 3), np.uint8)
     mp4.write_mp4(here / "a.mp4", [picture] * 10, fps=25, audio=read_audio(source), tags=mark.tags, xmp=mark.xmp)
     for name, is_marked in (("a.mp4", True), ("said/one.mp4", False)):
-        encode_video(here / name, here / "shown.mp4", source)
+        encode_rated_video(here / name, here / "shown.mp4", source)
         with av.open(str(here / "shown.mp4")) as container:
             assert (container.metadata.get("comment") == synthetic_mark.STATEMENT) == is_marked
         assert (synthetic_mark.SOURCE_TYPE.encode() in (here / "shown.mp4").read_bytes()) == is_marked

@@ -1,8 +1,13 @@
+import json
+from pathlib import Path
+
 import pytest
 
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import Lexicon, group_words, phone_timelines
 from lipmotion.units.stress import NUCLEI, find_stress, find_stressed_vowel
+
+TEXTS = json.loads(Path(__file__).with_name("said_texts.json").read_text("utf-8"))
 
 
 def said(*words: tuple[str, str]) -> Timeline[Unit]:
@@ -16,13 +21,7 @@ def grouped(*words: tuple[str, str]) -> list[tuple[float, float, str]]:
 
 
 def test_a_word_that_is_said_again_is_another_one() -> None:
-    for word, phones, starts in (
-        ("big", "b ih g b ih g", [0, 3]), ("Big", "b ih g b ih g b ih g", [0, 3, 6]), ("the", "dh ax dh iy", [0, 2]),
-        ("tutu", "t uw t uw", [0]), ("tutu", "t uw t uw t uw t uw", [0, 4]), ("mama", "m aa m ax", [0]),
-        ("bigbig", "b ih g b ih g", [0]), ("big", "b ih b ih", [0, 2]), ("zero", "z iy r ow z iy r ow", [0, 4]),
-        ("blorp", "b l ao r p b l ao r p b l ao r p", [0, 5, 10]),
-        ("hahaha", "hh aa hh aa hh aa hh aa hh aa hh aa", [0, 6]), ("brrk", "r r r", [0]), ("", "b ih g b ih g", [0]),
-    ):  # fmt: skip
+    for word, phones, starts in TEXTS["said_again"]:
         ends = [*starts[1:], len(phones.split())]
         assert grouped((word, phones)) == list(zip(starts, ends, [word] * len(starts), strict=True))
 
@@ -40,27 +39,15 @@ def test_other_words_and_silence_are_apart() -> None:
 
 
 def test_words_of_the_dictionary() -> None:
-    for word, stressed in (
-        ("mother", 0), ("again", 1), ("banana", 1), ("before", 1), ("because", 1), ("beautiful", 0), ("nation", 0),
-        ("information", 2), ("electric", 1), ("university", 2), ("yesterday", 0), ("japanese", 2), ("animated", 0),
-        ("table", 0), ("bread", 0), ("the", None), ("them", None), ("your", None), ("media's", 0),
-    ):  # fmt: skip
+    for word, stressed in TEXTS["stressed_vowels"]:
         phones = Lexicon().pronunciations(word)[0]
         assert find_stressed_vowel(word, [phone for phone in phones if phone in NUCLEI]) == stressed
 
 
 def test_a_consonant_has_the_stress_of_its_syllable() -> None:
     """A syllable begins with one consonant, or with a glide and its lead."""
-    for word, phones, stress in (
-        ("information", "ih n f axr m ey sh ax n", (0, 0, 0, 0, 1, 1, 0, 0, 0)),
-        ("apply", "ax p l ay", (0, 1, 1, 1)),
-        ("handy", "hh ae n d iy", (1, 1, 1, 0, 0)),
-        ("singer", "s ih ng axr", (1, 1, 1, 0)),
-        ("psst", "p s t", (None, None, None)),
-        ("bye", "b ay b ay", (1, 1, 1, 1)),  # said twice
-        ("again", "ax g eh n ax g eh n", (0, 1, 1, 1, 0, 1, 1, 1)),
-    ):
-        assert find_stress(said((word, phones))) == stress
+    for word, phones, stress in TEXTS["stress"]:
+        assert find_stress(said((word, phones))) == tuple(stress)
     assert find_stress(said(("bye", "b ay"), ("", "sp"), ("bye", "b ay"))) == (1, 1, None, 1, 1)
 
 

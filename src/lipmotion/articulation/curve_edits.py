@@ -93,7 +93,7 @@ def check_drawn(edit: DrawnCurve, *, is_weight: bool) -> None:
         raise InputError(f"{edit.channel} is drawn between {drawn}, required 0 to 1")
 
 
-def apply_gain(generation: Generation, gain: Gain) -> Generation:
+def intensify_span(generation: Generation, gain: Gain) -> Generation:
     """Return a generation whose mouth moves more, or less, for a time; what is closed stays so (``intensify``)."""
     weight = weigh_span(generation.motion.time_s, gain.start_s, gain.end_s, GAIN_EDGE_S)
     return apply_stretch(generation, _cut_stretch(intensify(generation, gain.factor), weight))

@@ -129,13 +129,19 @@ def _put_positionals_first(parser: argparse.ArgumentParser, words: Sequence[str]
             taken, at = list(range(at + 1, behind)), behind
         elif option.nargs is None and is_apart:
             at += 1
-    wanted = next((action for action in parser._actions if not action.option_strings), None)
-    if at == len(words) and not moved and wanted is not None and taken and "--job" not in words:
-        last, end = words[taken[-1]], Path(words[taken[-1]]).suffix
-        if wanted.nargs != "?" or not end or " " in last:
-            alike = [each for each in taken if Path(words[each]).suffix == end and Path(words[each]).exists()]
-            moved = sorted({taken[-1], *(alike if wanted.nargs == "+" else ())})
+    positional = next((action for action in parser._actions if not action.option_strings), None)
+    if at == len(words) and not moved and positional is not None and taken and "--job" not in words:
+        moved = _find_recordings(positional, words, taken)
     return [*(words[each] for each in moved), *(word for each, word in enumerate(words) if each not in moved)]
+
+
+def _find_recordings(positional: argparse.Action, words: Sequence[str], taken: Sequence[int]) -> list[int]:
+    """Return the places of the words that an option took from its verb: the last one, and files of that suffix."""
+    last, end = words[taken[-1]], Path(words[taken[-1]]).suffix
+    if positional.nargs == "?" and end and " " not in last:
+        return []
+    alike = [each for each in taken if Path(words[each]).suffix == end and Path(words[each]).exists()]
+    return sorted({taken[-1], *(alike if positional.nargs == "+" else ())})
 
 
 def _is_option(word: str) -> bool:

@@ -138,7 +138,7 @@ def _ffmpeg() -> str:
 
 
 def _voices() -> str:
-    from lipmotion.speech.voices.installed import SYNTHESISERS, explain_install, explain_missing
+    from lipmotion.speech.voices.installed import SYNTHESISERS, explain_install, explain_missing_synthesiser
 
     found, others = [], []
     for each in SYNTHESISERS.values():
@@ -152,7 +152,7 @@ def _voices() -> str:
         else:
             others.append(f"no {each.name} ({explain_install(each)})")
     if not found:
-        raise _AbsentError(f"{EXTRAS['text']}; {explain_missing()}")
+        raise _AbsentError(f"{EXTRAS['text']}; {explain_missing_synthesiser()}")
     return "; ".join([*found, *others])
 
 

@@ -225,8 +225,8 @@ def _read_captions(root: Element, where: str) -> LabelTier:
             parts.append(TimedLabel(*times_s, text, place))
             glued = not f"{text}{child.tail or ''}"[-1:].isspace()
         content = "".join(element.itertext())
-        whole = "".join(content.split()) == "".join("".join(part.text for part in parts).split())
-        labels.append(TimedLabel(start_s, end_s, content, place, tuple(parts) if whole else ()))
+        same_words = "".join(content.split()) == "".join("".join(part.text for part in parts).split())
+        labels.append(TimedLabel(start_s, end_s, content, place, tuple(parts) if same_words else ()))
 
     visit(root, 0.0, math.inf)
     return LabelTier("captions", tuple(labels), LINES)

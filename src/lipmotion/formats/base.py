@@ -241,7 +241,7 @@ def _name_errors(path: Path) -> Iterator[None]:
         raise InputError(f"{path}: damaged, or of another program ({str(error)[:300]}); export it again") from error
 
 
-def read_units(path: Path) -> Timeline[Unit]:
+def read_motion_units(path: Path) -> Timeline[Unit]:
     """Return the units of a motion file, or of a ``.json`` of units alone. Raises InputError: as ``read_motion``."""
     read = _format_of(path).units if find_suffix(path) else None
     if read is not None and path.is_file() and path.stat().st_size <= LARGEST_UNITS_BYTES:

@@ -227,7 +227,7 @@ def _one_line(text: str) -> str:
     return text if is_line(text) else printable(text)
 
 
-def parse_project(text: str) -> CueSheet:
+def parse_papagayo(text: str) -> CueSheet:
     """Return the cues and the words of the first voice. Raises InputError: another version, cut short, or no shape."""
     numbered, number = enumerate(text.splitlines(), 1), 0
 
@@ -310,7 +310,7 @@ CUE_FORMATS = {
     "xml": CueFormat(format_xml, parse_xml),
     "json": CueFormat(format_json, parse_json),
     "dat": CueFormat(format_dat, parse_dat),
-    "pgo": CueFormat(format_project, parse_project),
+    "pgo": CueFormat(format_project, parse_papagayo),
     "spine.json": CueFormat(format_skeleton),
 }
 """Formats by name; the end of a file's name is that of its format, of several the longest."""

@@ -85,12 +85,12 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
             if len(values) != needed:
                 raise InputError(f"frame {frame} of {frames} has {len(values)} values, required {needed}")
             skipped = sum(MANY_VALUES[number] for number in marked if number in MANY_VALUES)
-            given = [int(value) for value in values[skipped:]]
-            if max(map(abs, given), default=0) > LARGEST_VALUE:
+            present = [int(value) for value in values[skipped:]]
+            if max(map(abs, present), default=0) > LARGEST_VALUE:
                 raise InputError(f"frame {frame} has a value over {LARGEST_VALUE}")
             current = current.copy()
             places = [number - 1 for number in marked if number not in MANY_VALUES]
-            current[places], used[places] = given, True
+            current[places], used[places] = present, True
             rows.append(current)
     numbers = np.flatnonzero(used) + 1
     channels = tuple(Channel(NAMES.get(int(number), f"fap{number}"), FAP) for number in numbers)

@@ -23,6 +23,7 @@ from lipmotion.formats.label_tiers import (
     WORDS,
     LabelTier,
     TimedLabel,
+    attach_words,
     holds_phones,
     map_to_inventory,
     merge_timelines,
@@ -30,7 +31,6 @@ from lipmotion.formats.label_tiers import (
     read_phone_tier,
     read_transcript_tier,
     split_speakers,
-    with_words,
 )
 from lipmotion.formats.subtitles import MARKS as SUBTITLES
 from lipmotion.formats.subtitles import convert_timecodes, is_subtitles, parse_subtitles, write_subtitles
@@ -194,7 +194,7 @@ def read_phones(path: Path, tier: str = "", speaker: str = "") -> Timeline[Unit]
         raise InputError(f"{where}: {held}required {wanted}")
     _name_speakers(phones, where)
     spoken = [(read_phone_tier(each, (), where, with_gaps=True), _choose_words(each, tiers)) for each in phones]
-    units = merge_timelines([with_words(*each) for each in spoken])
+    units = merge_timelines([attach_words(*each) for each in spoken])
     recognised = next((each.labels for each in tiers if each.role == RECOGNISED_PHONES), None)
     pairs = [(each, RECOGNISED_LABEL.fullmatch(each.text)) for each in recognised or ()]
     rows = (RecognisedPhone(each.start_s, each.end_s, match[1], float(match[2])) for each, match in pairs if match)

@@ -117,7 +117,7 @@ class Row:
 
 
 Place = tuple[str, ...]
-Found = dict[tuple[Place, bool], list[Row]]
+Lists = dict[tuple[Place, bool], list[Row]]
 """Items by the names of the members that lead to their list, and whether they are phones."""
 
 
@@ -272,7 +272,7 @@ def _find_text(value: Any) -> str | None:
 
 
 def _collect_rows(
-    value: Any, found: Found, where: str, place: str = "", path: Place = ("",), owner: Row | None = None, who: str = ""
+    value: Any, lists: Lists, where: str, place: str = "", path: Place = ("",), owner: Row | None = None, who: str = ""
 ) -> None:
     """Add the items with a text in a value, and in all its members, to those of the same lists; of alternatives one."""
     name = path[-1]
@@ -283,7 +283,7 @@ def _collect_rows(
             item = _read_stamp(each) or each
             if isinstance(item, dict):
                 at = f"{place}, {name or 'item'} {number}".strip(", ")
-                _collect_rows(item, found, where, at, path, owner, who)
+                _collect_rows(item, lists, where, at, path, owner, who)
             elif name in ("segments", "words"):
                 require(values.members({}), item, f"{where}: {name!r}, item {number}")
     if not isinstance(value, dict) or len(path) > DEEPEST or not _is_said(value):
@@ -295,18 +295,18 @@ def _collect_rows(
     if name == "words" and row is None:
         raise InputError(f"{where}: {place}: no text; required a member 'word'")
     if row is not None and (row.text or row.role != WORDS):
-        rows = found[path, row.role == PHONE_LABELS]
+        rows = lists[path, row.role == PHONE_LABELS]
         _add_row(rows, row, value, where)
         check_count(len(rows), where)
     timed = row is not None and not math.isnan(row.start)
     passed = {"tokens" if timed else "", "alignment" if isinstance(value.get("normalizedalignment"), dict) else ""}
     for member, each in value.items():
         if member not in passed:
-            _collect_rows(each, found, where, place, (*path, member), row if timed else owner, who)
+            _collect_rows(each, lists, where, place, (*path, member), row if timed else owner, who)
 
 
 def _list_items(item: dict[str, Any], where: str) -> dict[str, Any]:
-    """Return an object with lists of items for ``PARALLEL_LISTS``, and for the phones of Piper and Kokoro."""
+    """Return an object with lists of items for parallel ones: ``PARALLEL_LISTS``, words and their times, phones."""
     for name, members in PARALLEL_LISTS:
         lists: list[Any] = [item.get(member) for member in members]
         if not all(isinstance(each, list) for each in lists) or any(isinstance(each, dict) for each in lists[0]):
@@ -324,6 +324,11 @@ def _list_items(item: dict[str, Any], where: str) -> dict[str, Any]:
             raise InputError(f"{where}: {len(stamps)} times of {len(words)} words; required a time of each")
         items = [{"word": word, "start": start, "end": end} for word, (start, end) in zip(words, stamps, strict=True)]
         return {**{name: each for name, each in item.items() if name not in NAMES["stamps"]}, "words": items}
+    return _list_voice_phones(item, where)
+
+
+def _list_voice_phones(item: dict[str, Any], where: str) -> dict[str, Any]:
+    """Return an object of Piper or Kokoro with a list of its phones; another one as it is."""
     if isinstance(item.get("phonemealignments"), list):
         rate = require(values.number(1000, 1e6), item.get("samplerate"), f"{where}: the sample rate in hertz")
         phonemes = [each if isinstance(each, dict) else {} for each in item["phonemealignments"]]
@@ -347,8 +352,8 @@ def _join_characters(rows: list[Row]) -> list[Row]:
     starts = [*(row.start for row in rows[1:]), math.inf]
     lasting = [replace(row, end=after) if math.isnan(row.end) else row for row, after in zip(rows, starts, strict=True)]
     owner_of = [row for row in lasting for _ in row.text]
-    found = MARKS["SPOKEN_WORD"].finditer("".join(row.text for row in rows).replace("▁", " "))
-    edges = ((match[0], owner_of[match.start()], owner_of[match.end() - 1]) for match in found)
+    spoken = MARKS["SPOKEN_WORD"].finditer("".join(row.text for row in rows).replace("▁", " "))
+    edges = ((match[0], owner_of[match.start()], owner_of[match.end() - 1]) for match in spoken)
     return [replace(first, end=last.end, text=text, role=WORDS) for text, first, last in edges]
 
 
@@ -378,21 +383,21 @@ def _add_row(rows: list[Row], row: Row, item: dict[str, Any], where: str) -> Non
     rows.append(row)
 
 
-def _choose_rows(found: Found, *, phones: bool) -> list[Row]:
+def _choose_rows(lists: Lists, *, phones: bool) -> list[Row]:
     """Return the words, or else the lines, or the phones, of the lists that are known best; words in their lines."""
 
     def rank(path: Place) -> tuple[bool, int]:
-        has_words = any(row.role == WORDS for row in kept[path])
+        has_words = any(row.role == WORDS for row in rows_of[path])
         return not has_words, NAMES["lists"].index(path[-1]) if path[-1] in NAMES["lists"] else len(NAMES["lists"])
 
-    kept = {path: rows for (path, kind), rows in found.items() if kind == phones}
-    kept |= {path: _join_characters(rows) for path, rows in kept.items() if path[-1] in NAMES["characters"]}
-    timed = [path for path in kept if any(row.times.end or not math.isnan(row.start) for row in kept[path])]
-    rows = kept[min(timed, key=rank)] if timed else []
+    rows_of = {path: rows for (path, kind), rows in lists.items() if kind == phones}
+    rows_of |= {path: _join_characters(rows) for path, rows in rows_of.items() if path[-1] in NAMES["characters"]}
+    timed = [path for path in rows_of if any(row.times.end or not math.isnan(row.start) for row in rows_of[path])]
+    rows = rows_of[min(timed, key=rank)] if timed else []
     parts: dict[int, list[Row]] = defaultdict(list)
     for row in rows:
         parts[id(row.owner)].append(row)
-    around = (lines for (_, kind), lines in found.items() if not (kind or phones))
+    around = (lines for (_, kind), lines in lists.items() if not (kind or phones))
     lines = next((lines for lines in around if any(id(line) in parts for line in lines)), None)
     if lines is None:
         return rows
@@ -409,10 +414,10 @@ def _read_stamp(item: Any) -> dict[str, Any]:
 
 def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     """Return lists of items in time: the phones, and what each speaker says; None: there are none."""
-    found: Found = defaultdict(list)
+    lists: Lists = defaultdict(list)
     for place, item in objects:
-        _collect_rows(item, found, where, place if len(objects) > 1 else "")
-    begun = {row.place.partition(",")[0] for rows in found.values() for row in rows if row.times.kind == "sentence"}
+        _collect_rows(item, lists, where, place if len(objects) > 1 else "")
+    begun = {row.place.partition(",")[0] for rows in lists.values() for row in rows if row.times.kind == "sentence"}
     if len(objects) > 1 < len(begun):
         what = f"{len(begun)} pieces whose times each begin at 0; save the sound of each apart"
         raise InputError(f"{where}: holds {what}, and give those of one")
@@ -420,12 +425,12 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     missed = sum(isinstance(word, dict) and word.get("case") == MISSED for word in words)
     if missed and where:
         LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
-    spoken, phones = (_choose_rows(found, phones=kind) for kind in (False, True))
+    spoken, phones = (_choose_rows(lists, phones=kind) for kind in (False, True))
     if not (spoken or phones):
-        if not (any(found.values()) and all(item.keys() <= {*NAMES["text_alone"]} for _, item in objects)):
-            lists = [item[name] for _, item in objects for name in NAMES["lists"] if name in item]
-            return [] if lists and not any(lists) else None
-        spoken = next(filter(None, found.values()))
+        if not (any(lists.values()) and all(item.keys() <= {*NAMES["text_alone"]} for _, item in objects)):
+            known = [item[name] for _, item in objects for name in NAMES["lists"] if name in item]
+            return [] if known and not any(known) else None
+        spoken = next(filter(None, lists.values()))
     phones = _extend_to_next(phones, [])
     spoken = _extend_to_next(spoken, [row.start for row in phones if row.text == SILENCE])
     if not phones:
@@ -444,17 +449,21 @@ def _build_spoken_tiers(spoken: list[Row], where: str, *, may_be_phones: bool) -
         spoken = spoken[half:]
     if any(len({part.speaker for part in row.parts}) > 1 for row in spoken):
         spoken = [part for row in spoken for part in row.parts or (row,)]
-    counts = [len(find_words(extract_spoken_text(each.text[:LONGEST_JUDGED]))) for each in spoken]
-    check_word_count(sum(counts) + sum(len(each.parts) for each in spoken), where)
-    single = sum(each.role == WORDS or count < 2 for each, count in zip(spoken, counts, strict=True))
-    has_parts = any(each.parts for each in spoken)
-    role = WORDS if single >= SINGLE_SHARE * len(spoken) and not has_parts else LINES
+    role, has_parts = _choose_role(spoken, where), any(each.parts for each in spoken)
     by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
     for each, label in zip(spoken, _scale_rows(spoken, role, where), strict=True):
         by_speaker[each.speaker or (each.parts[0].speaker if each.parts else "")].append(label)
     if may_be_phones and not has_parts and not any(each.role == WORDS for each in spoken):
         role = PHONE_LABELS if all(holds_phones(LabelTier("", tuple(each))) for each in by_speaker.values()) else role
     return [LabelTier(who or role, tuple(labels), role, who) for who, labels in by_speaker.items()]
+
+
+def _choose_role(spoken: list[Row], where: str) -> str:
+    """Return whether rows are words or lines. Raises InputError: they hold more words than a recording has."""
+    counts = [len(find_words(extract_spoken_text(each.text[:LONGEST_JUDGED]))) for each in spoken]
+    check_word_count(sum(counts) + sum(len(each.parts) for each in spoken), where)
+    single = sum(each.role == WORDS or count < 2 for each, count in zip(spoken, counts, strict=True))
+    return LINES if single < SINGLE_SHARE * len(spoken) or any(each.parts for each in spoken) else WORDS
 
 
 def _extend_to_next(rows: list[Row], silences: Iterable[float]) -> list[Row]:

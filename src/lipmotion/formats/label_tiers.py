@@ -7,7 +7,7 @@ import math
 import re
 from bisect import bisect_left, bisect_right
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -190,7 +190,7 @@ def split_speakers(tiers: list[LabelTier]) -> list[LabelTier]:
     return [replace(tier, speaker=tier.name, role=LINES) if tier in unknown else tier for tier in tiers]
 
 
-def with_words(units: Timeline[Unit], labels: Sequence[TimedLabel]) -> Timeline[Unit]:
+def attach_words(units: Timeline[Unit], labels: Sequence[TimedLabel]) -> Timeline[Unit]:
     """Return phones in time with the words in which their middles lie; unknown phones only where they are all of it."""
     timed = [label for label in labels if not math.isnan(label.start_s + label.end_s)]
     starts_s = [label.start_s for label in timed]
@@ -396,16 +396,23 @@ def map_to_inventory(tier: LabelTier, where: str) -> LabelTier:
     texts = [label.text for label in labels if classify_label(label.text) is SpokenAs.SPEECH]
     if texts and all(map(str.isdecimal, texts)):
         raise InputError(f"{where}: tier {tier.name!r} holds numbers of phones, required their names")
-    spoken = [WITH_GLIDES.get(text, text) for text in texts]
-    known = 0 if find_spelling(spoken) else sum(to_phone(text) is not None for text in spoken)
-    in_xsampa = sum(bool(xsampa_to_ipa(text)) for text in spoken)
-    if known == len(spoken) or (known >= PHONES_SHARE * len(spoken) and in_xsampa < len(spoken)):
+    as_ipa = _find_ipa([WITH_GLIDES.get(text, text) for text in texts])
+    if as_ipa is None:
         return tier
-    as_ipa = find_spelling(spoken) or WITH_GLIDES
-    if as_ipa is WITH_GLIDES and all(map(str.isascii, spoken)) and in_xsampa >= PHONES_SHARE * len(spoken):
-        as_ipa = {text: xsampa_to_ipa(text) or text for text in spoken}
     symbols = [replace(label, text=as_ipa.get(label.text, label.text)) for label in labels]
     return replace(tier, labels=tuple(split_ipa(symbols, where)))
+
+
+def _find_ipa(texts: Sequence[str]) -> Mapping[str, str] | None:
+    """Return the symbols of phones that are written otherwise in IPA; None: the texts are phones of the inventory."""
+    if spelling := find_spelling(texts):
+        return spelling
+    known = sum(to_phone(text) is not None for text in texts)
+    in_xsampa = {text: ipa for text in texts if (ipa := xsampa_to_ipa(text))}
+    count = sum(text in in_xsampa for text in texts)
+    if known == len(texts) or (known >= PHONES_SHARE * len(texts) and count < len(texts)):
+        return None
+    return in_xsampa if all(map(str.isascii, texts)) and count >= PHONES_SHARE * len(texts) else WITH_GLIDES
 
 
 def add_pauses(phones: Sequence[TimedLabel]) -> tuple[TimedLabel, ...]:

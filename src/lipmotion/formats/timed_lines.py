@@ -88,17 +88,17 @@ def _read_form(lines: Lines, form: re.Pattern[str], where: str, role: str = "") 
         if match is None:
             names = " ".join(sorted(form.groupindex, key=form.groupindex.__getitem__)).replace("text", "label")
             raise InputError(f"{where}: {place} is {shorten(line)!r}; required, as in line 1: {names}")
-        found = match.groupdict(default="")
-        recording = recording or found.get("recording", "")
-        if found.get("recording", "") != recording:
-            names = f"{shorten(recording)!r} and {shorten(found['recording'])!r}"
+        fields = match.groupdict(default="")
+        recording = recording or fields.get("recording", "")
+        if fields.get("recording", "") != recording:
+            names = f"{shorten(recording)!r} and {shorten(fields['recording'])!r}"
             raise InputError(f"{where}: {place}: words of two recordings, {names}; keep those of one")
-        start, end = (require_time(found.get(name, "0"), place, where) for name in ("start", "end"))
-        if "duration" in found:
-            end = start + require_time(found["duration"], place, where)
+        start, end = (require_time(fields.get(name, "0"), place, where) for name in ("start", "end"))
+        if "duration" in fields:
+            end = start + require_time(fields["duration"], place, where)
             if end < start:
                 raise InputError(f"{where}: {place}: a duration of {end - start:g} s, required 0 or more")
-        by_speaker[found.get("speaker", "")].append(TimedLabel(start, end, found["text"].strip(), place))
+        by_speaker[fields.get("speaker", "")].append(TimedLabel(start, end, fields["text"].strip(), place))
     several = len(by_speaker) > 1
     in_time = {who: tuple(sorted(labels, key=lambda label: label.start_s)) for who, labels in by_speaker.items()}
     if "recording" not in form.groupindex:
@@ -110,8 +110,8 @@ def _read_nist(lines: Lines, where: str) -> list[LabelTier] | None:
     spoken = [line for line in lines if not line[1].startswith(COMMENT)]
     first = spoken[0][1][:1000] if spoken else ""
     matches = ((MARKS[name], MARKS[name].fullmatch(first)) for name in ("STM", "CTM"))
-    found = ((form, match) for form, match in matches if match and "." in match[3] + match[4])
-    form = next((form for form, match in found if not MARKS["BEGINS_NUMBER"].match(match["text"])), None)
+    fitting = ((form, match) for form, match in matches if match and "." in match[3] + match[4])
+    form = next((form for form, match in fitting if not MARKS["BEGINS_NUMBER"].match(match["text"])), None)
     role = "" if form is MARKS["CTM"] else LINES  # Kaldi writes phones in CTM, too
     return form and _read_form(spoken, form, where, role)
 
@@ -180,9 +180,9 @@ def _find_columns(line: str) -> dict[str, int]:
     return columns if {"start", "text"} <= columns.keys() and {"end", "duration"} & columns.keys() else {}
 
 
-def _read_table(lines: Lines, columns: dict[str, int], where: str, given: str = "") -> list[LabelTier]:
+def _read_table(lines: Lines, columns: dict[str, int], where: str, known_header: str = "") -> list[LabelTier]:
     """Return the tiers of a table, of the Montreal Forced Aligner or any; ``given``: its header."""
-    header = given or lines[0][1]
+    header = known_header or lines[0][1]
     delimiter = max(",;\t", key=header.count)
     kinds: dict[tuple[str, str], list[TimedLabel]] = defaultdict(list)
     named = re.split(r"[,;\t]", header)[columns["text"]].strip(' "').lower()
@@ -191,7 +191,7 @@ def _read_table(lines: Lines, columns: dict[str, int], where: str, given: str = 
         raise InputError(f"{where}: its times are frames, whose rate is not known; required seconds")
     check_count(len(lines), where)
     joined: Lines = []  # a text in quotes may have line ends
-    for number, line in lines[0 if given else 1 :]:
+    for number, line in lines[0 if known_header else 1 :]:
         first, before = joined.pop() if joined and joined[-1][1].count('"') % 2 else (number, "")
         joined.append((first, f"{before} {line}".strip()))
     for number, line in joined:
@@ -210,5 +210,5 @@ def _read_table(lines: Lines, columns: dict[str, int], where: str, given: str = 
         end_s += 0.0 if row.get("end") else start_s
         kinds[(row.get("kind", named), row.get("speaker", ""))].append(TimedLabel(start_s, end_s, row["text"], place))
     tiers = [find_tier(kind, labels, speaker) for (kind, speaker), labels in kinds.items()]
-    whole = all(label.start_s % 1 == 0 == label.end_s % 1 for tier in tiers for label in tier.labels)
-    return parse_seconds(tiers, where, 1000 if whole and header == "start\tend\ttext" else 0)  # Whisper's
+    all_whole = all(label.start_s % 1 == 0 == label.end_s % 1 for tier in tiers for label in tier.labels)
+    return parse_seconds(tiers, where, 1000 if all_whole and header == "start\tend\ttext" else 0)  # Whisper's

@@ -41,11 +41,11 @@ def expand_states(hmm: UnitHmm, units: Sequence[str]) -> StateSequence:
     neighbours = [silence, *(silence if unit in table.free else unit for unit in units), silence]
     names, densities, plain, positions = list[str](), list[int](), list[int](), list[int]()
     for i, unit in enumerate(units):
-        beside = {"<": neighbours[i], ">": neighbours[i + 2], "": ""}
+        context = {"<": neighbours[i], ">": neighbours[i + 2], "": ""}
         for state in range(table.count(unit)):
             names.append(table.name(neighbours[i], unit, neighbours[i + 2], state))
             plain.append(table.density(unit, state))
-            densities.append(table.density(unit, state, beside[table.side(unit, state)]))
+            densities.append(table.density(unit, state, context[table.side(unit, state)]))
             positions.append(i)
     return StateSequence(tuple(names), *(np.array(numbers, np.intp) for numbers in (densities, plain, positions)))
 

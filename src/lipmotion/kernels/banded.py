@@ -108,13 +108,13 @@ def _eliminate_rows(main: Rows, first: Rows, second: Rows, right: Rows) -> tuple
 def _back_substitute(inverse: Rows, lower1: Rows, lower2: Rows, x: Rows) -> tuple[Array, Array]:
     values, variances = Rows(), Rows()
     value = next_value = variance = next_variance = 0.0
-    beside = 0.0  # of the inverse, between the next row and the one after it
+    off_diagonal = 0.0  # of the inverse, between the next row and the one after it
     for one, l1, l2, wanted in zip(*map(reversed, (inverse, lower1, lower2, x)), strict=True):
         value, next_value = wanted * one - l1 * value - l2 * next_value, value
-        across = -(l1 * variance) - l2 * beside
-        far = -(l1 * beside) - l2 * next_variance
+        across = -(l1 * variance) - l2 * off_diagonal
+        far = -(l1 * off_diagonal) - l2 * next_variance
         variance, next_variance = one - l1 * across - l2 * far, variance
-        beside = across
+        off_diagonal = across
         values.append(value)
         variances.append(variance)
     return np.array(values[::-1]), np.array(variances[::-1])

@@ -92,8 +92,8 @@ def infer_factorial(
     ways: list[_Scaled | _InLogs] = []
     share = np.prod([np.mean(log > -np.inf) for log in (logs.audio, logs.visual)])
     probabilities = (p for loop in (audio, visual) for p in (*_moves(loop, DOUBLE), loop.initial, loop.final))
-    least = min(float(part.min(where=part > 0, initial=1.0)) for part in probabilities)
-    if least >= MIN_PROBABILITY and share > SPARSE_SHARE:
+    lowest = min(float(part.min(where=part > 0, initial=1.0)) for part in probabilities)
+    if lowest >= MIN_PROBABILITY and share > SPARSE_SHARE:
         ways += [_Scaled(audio, visual, logs, kind) for kind in OFF if kind in (DOUBLE, logs.audio.dtype)]
     results = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
     result = next(each for each in results if each is not None)
@@ -438,7 +438,7 @@ def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:
 @compile_to_rounding
 def _forward(
     before: Array, stay_0: Array, onward_0: Array, entering_0: Array, stay_1: Array, onward_1: Array, entering_1: Array,
-    density_0: Array, density_1: Array, pair: Array, pairs: Index, floor: float, whole: float,
+    density_0: Array, density_1: Array, pair: Array, pairs: Index, floor: float, mass: float,
     after: Array,
 ) -> float:  # fmt: skip
     """Fill in joint probabilities one frame on along both axes, times densities, normalised; return their sum before.
@@ -460,13 +460,13 @@ def _forward(
         for j in range(len(onward_1)):
             rest[j] = stay_rest[j] * moved_rest[j] + onward_1[j] * moved[j]
         p = _emit(prior, i, p, density_0, density_1, pair, pairs, floor, after[i])
-    return _share(after, whole)
+    return _share(after, mass)
 
 
 @compile_to_rounding
 def _backward(
     before: Array, moved: Array, stay: Array, onward: Array, left: Array,
-    density_0: Array, density_1: Array, pair: Array, pairs: Index, floor: float, whole: float,
+    density_0: Array, density_1: Array, pair: Array, pairs: Index, floor: float, mass: float,
     after: Array, posterior_0: Array, posterior_1: Array, posterior_pair: Array,
 ) -> float:  # fmt: skip
     """Fill in posteriors, not normalised, and backward probabilities times densities, normalised; return their sum.
@@ -491,7 +491,7 @@ def _backward(
         p = _emit(beta, i, p, density_0, density_1, pair, pairs, floor, after[i])
         for q in range(first, p):
             posterior_pair[q] = np.float64(alpha[pairs[q, 1]]) * beta[pairs[q, 1]]
-    return _share(after, whole)
+    return _share(after, mass)
 
 
 @compile_to_rounding
@@ -507,9 +507,9 @@ def _emit(
     into: Array,
 ) -> int:  # fmt: skip
     """Fill in row i times its densities; its pairs are from p on: return the first pair of the next row."""
-    own = density_0[i]
+    density = density_0[i]
     for j in range(len(prior)):
-        partly = np.float64(prior[j]) * own
+        partly = np.float64(prior[j]) * density
         product = (partly if partly > floor else 0.0) * density_1[j]
         into[j] = product if product > floor else 0.0
     while p < len(pairs) and pairs[p, 0] == i:
@@ -520,13 +520,13 @@ def _emit(
 
 
 @compile_to_rounding
-def _share(joint: Array, whole: float) -> float:
+def _share(joint: Array, mass: float) -> float:
     """Make probabilities sum to ``whole``, raised to 1 / ``whole`` at least; return their sum before, by ``whole``."""
     flat, total = joint.reshape(joint.size), np.float64(0)
     for j in range(len(flat)):
         total += flat[j]
-    scale, floor = whole / total if total > 0 else 0.0, 1 / whole
+    scale, floor = mass / total if total > 0 else 0.0, 1 / mass
     for j in range(len(flat)):
         share = flat[j] * scale
         flat[j] = share if share > floor else floor
-    return total / whole
+    return total / mass

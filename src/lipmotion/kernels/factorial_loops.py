@@ -186,14 +186,14 @@ def _fill_scores(
 @compiled
 def _take_best(scores: Array, weights: Array, best: Array) -> None:
     """Raise the best scores [shape=(M,)] to those of ways [shape=(U, M)] and their weights, four at a time."""
-    whole = len(scores) // 4 * 4
-    for u in range(0, whole, 4):
+    blocks_end = len(scores) // 4 * 4
+    for u in range(0, blocks_end, 4):
         a, b, c, d = scores[u], scores[u + 1], scores[u + 2], scores[u + 3]
         w, x, y, z = weights[u], weights[u + 1], weights[u + 2], weights[u + 3]
         for j in range(len(best)):
             one, other = max(a[j] + w, b[j] + x), max(c[j] + y, d[j] + z)
             best[j] = max(best[j], max(one, other))  # noqa: PLW3301 # faster than one call
-    for u in range(whole, len(scores)):
+    for u in range(blocks_end, len(scores)):
         a, w = scores[u], weights[u]
         for j in range(len(best)):
             best[j] = max(best[j], a[j] + w)

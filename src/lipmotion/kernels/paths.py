@@ -213,13 +213,13 @@ def _fill(
         for state in range(len(after)):
             a = b = c = d = IMPOSSIBLE  # four running maxima: a single one waits for itself
             stop = arc_stop[state]
-            whole = first + (stop - first) // 4 * 4
-            for arc in range(first, whole, 4):
+            blocks_end = first + (stop - first) // 4 * 4
+            for arc in range(first, blocks_end, 4):
                 a = max(a, before[arc_from[arc]] + arc_log[arc])
                 b = max(b, before[arc_from[arc + 1]] + arc_log[arc + 1])
                 c = max(c, before[arc_from[arc + 2]] + arc_log[arc + 2])
                 d = max(d, before[arc_from[arc + 3]] + arc_log[arc + 3])
-            for arc in range(whole, stop):
+            for arc in range(blocks_end, stop):
                 a = max(a, before[arc_from[arc]] + arc_log[arc])
             first = stop
             after[state] = max(a, b, c, d) + log_emission[t, emission[state]]

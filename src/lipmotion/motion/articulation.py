@@ -278,7 +278,7 @@ BREATH_RISE, LIP_CLOSING_S, SHUT = 0.2, 0.12, -1.5
 """Then it is more open by so many deviations; p, b or m shuts lips so long before it is heard (s1: 0.13 s), so far."""
 SURE_PHONES = 5000
 """Models of so many phones in training, some twelve minutes, know their own speaker; those of 50 sentences take his
-voice for 0.85 of a known one (docs/results/jerk.md), no more than the large model some strangers of the same studio."""
+voice for 0.85 of a known one (docs/results/jerk.md), no more than the large model other speakers of that studio."""
 INSET_S = 0.03
 """The lips of such a voice close in p, b and m further than this from both ends of the phone, or in its middle, so that
 short vowels beside it stay open."""

@@ -187,9 +187,9 @@ def predictor_from_arrays(arrays: Arrays, dimensions: int) -> Predictor | None:
     """
     names = {name.rpartition(".")[0] for name in select_arrays(arrays, ADDED)}
     added = {name: select_arrays(arrays, f"{ADDED}{name}.") for name in sorted(names)}
-    found = [name for name in PREDICTORS.built_in if arrays.keys() & PREDICTORS.load(name).ARRAYS]
-    inside = {part for name in found for part in PREDICTORS.load(name).CONTAINS}
-    stored = {name: arrays for name in found if name not in inside} | added
+    fitting = [name for name in PREDICTORS.built_in if arrays.keys() & PREDICTORS.load(name).ARRAYS]
+    inside = {part for name in fitting for part in PREDICTORS.load(name).CONTAINS}
+    stored = {name: arrays for name in fitting if name not in inside} | added
     if len(stored) > 1:
         raise ValueError(f"the predictors {' and '.join(stored)}, required one of them")
     if not stored:

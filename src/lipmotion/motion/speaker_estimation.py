@@ -19,7 +19,7 @@ from lipmotion.motion.speaker_maps import (
     SpeakerMap,
     SpeakerMaps,
     measure_restfulness,
-    weigh_visemes,
+    weigh_viseme_classes,
 )
 from lipmotion.types import FRAME_RATE_HZ, Channel, Example
 
@@ -47,7 +47,7 @@ def add_habits(
     counts = {name: np.full((len(VISEME_NAMES), 1), HABIT_PRIOR_FRAMES) for name in maps}
     for example, speaker, values in zip(examples, speakers, generated, strict=True):
         if speaker in maps:
-            weights = weigh_visemes(example.speech.units, len(values)) * example.valid[:, None]
+            weights = weigh_viseme_classes(example.speech.units, len(values)) * example.valid[:, None]
             sums[speaker] += weights.T @ np.where(example.valid[:, None], example.motion.values - values, 0)
             counts[speaker] += weights.sum(axis=0)[:, None]
     return {name: replace(person, habits=sums[name] / counts[name]) for name, person in maps.items()}

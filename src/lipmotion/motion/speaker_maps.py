@@ -44,7 +44,7 @@ class SpeakerMap:
         """Return by how much the mean person's poses are changed by this person's habits [shape=(T, P)].
 
         values  : all channels of the mean person [shape=(T, P)]
-        visemes : from ``weigh_visemes`` [shape=(T, V)]
+        visemes : from ``weigh_viseme_classes`` [shape=(T, V)]
         Lips that are closed stay closed.
         """
         change: Array = visemes @ self.habits
@@ -89,7 +89,7 @@ def measure_restfulness(units: Timeline[Unit], frames: int) -> Array:
     return share * share * (3 - 2 * share)
 
 
-def weigh_visemes(units: Timeline[Unit], frames: int) -> Array:
+def weigh_viseme_classes(units: Timeline[Unit], frames: int) -> Array:
     """Return the weights of visemes in frames at 100 Hz [shape=(frames, V)]; 0 far from speech and for no phone."""
     from scipy.ndimage import convolve1d
 

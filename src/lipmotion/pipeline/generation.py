@@ -20,7 +20,7 @@ from lipmotion.extensions import load_provided
 from lipmotion.motion.closure import clip_at_zero, is_never_negative
 from lipmotion.motion.generation import BLOCK_FRAMES, DOUBLE_FRAMES, bend_through_pins, find_pinned_frame
 from lipmotion.motion.network_steps import STEP
-from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, measure_restfulness, weigh_visemes
+from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, measure_restfulness, weigh_viseme_classes
 from lipmotion.pipeline.analysis.language import weigh_words
 from lipmotion.pipeline.analysis.read_request import read_lexicon
 from lipmotion.pipeline.analysis.speech_analysis import SpeechAnalysis
@@ -179,7 +179,7 @@ def _generate_one(
 
     mean = engine.generate(learned, speech, Constraints(tuple(map(to_mean_person, pins))))
     fitted = person.reorder(mean.motion.channels)
-    visemes = weigh_visemes(speech.units, len(restful))
+    visemes = weigh_viseme_classes(speech.units, len(restful))
     values = np.empty_like(mean.motion.values)
     for start in range(0, len(values), BLOCK_FRAMES):
         block = slice(start, start + BLOCK_FRAMES)
@@ -207,7 +207,7 @@ def map_explanation(person: SpeakerMap | None, explanation: Explanation, speech:
     channels = tuple(channel for channel in person.channels if channel.name in explanation.motion)
     fitted = person.reorder(channels)
     poses = np.array([[explanation.motion[channel.name].value for channel in channels]])
-    shift = fitted.shift(poses, weigh_visemes(speech.units, frames)[frame])
+    shift = fitted.shift(poses, weigh_viseme_classes(speech.units, frames)[frame])
     added = fitted.to_person(shift, measure_restfulness(speech.units, frames)[frame])[0]
     numbers = {channel.name: number for number, channel in enumerate(channels)}
 

@@ -132,7 +132,7 @@ def run(  # noqa: PLR0913
         curves=list_curve_names(curves) if curves else (),
     )
     drawing = sub_monitor(monitor, RECOGNITION, 1.0)
-    write_outputs(job, face, generation, recording, model=model, temporary=temporary, monitor=drawing)
+    write_job_outputs(job, face, generation, recording, model=model, temporary=temporary, monitor=drawing)
     return generation
 
 
@@ -195,7 +195,7 @@ def check_outputs(job: Job, face: ShownFace, speech: str | Path | Audio | None =
     return create_outputs(job.outputs.files, to_output_settings(job, face, speech))
 
 
-def write_outputs(
+def write_job_outputs(
     job: Job,
     face: ShownFace,
     generation: Generation,
@@ -210,7 +210,7 @@ def write_outputs(
     speech, model, temporary : as of ``write``
     """
     from lipmotion.pipeline.outputs.motion_files import with_articulation
-    from lipmotion.pipeline.outputs.output import Performance, write_files
+    from lipmotion.pipeline.outputs.output import Performance, write_performance
     from lipmotion.types import Audio
 
     if job.outputs.articulation:
@@ -218,7 +218,7 @@ def write_outputs(
     settings = replace(to_output_settings(job, face, speech), sounded=isinstance(speech, Audio))
     sound = speech if isinstance(speech, Audio) else None
     performance = Performance(generation, settings, sound, settings.recording, model, monitor)
-    write_files(performance, job.outputs.files, temporary=temporary)
+    write_performance(performance, job.outputs.files, temporary=temporary)
 
 
 NAME = "{name}"  # in the path of an output, the name of the recording without its suffix

@@ -215,7 +215,7 @@ def with_prior(prior: Model | None, speech: Speech) -> Speech:
     """Return speech with what another model makes of it; the same speech if there is no other model.
 
     The closures that the other engine would force are left to the engine that stands on it. The other model takes
-    everybody for a stranger, in training as in use: if it knew the voice in one of them only, it would differ there.
+    everybody for an unseen speaker, in training as in use: if it knew a voice in one of them only, it would differ.
     """
     if prior is None:
         return speech

@@ -337,7 +337,7 @@ class Session:
         phone_steps = tuple(step for step in steps if isinstance(step, PhoneStep | WordStep))
         if not edits:
             return self._with_pins(phone_steps, ())
-        from lipmotion.articulation.curve_edits import apply_curve_edits, apply_gain, hold_mouth, mark_edited
+        from lipmotion.articulation.curve_edits import apply_curve_edits, hold_mouth, intensify_span, mark_edited
         from lipmotion.articulation.phone_targets import GESTURES, with_gestures
         from lipmotion.pipeline.outputs.curve_sets import check_edit
 
@@ -351,7 +351,7 @@ class Session:
         generation = self._with_pins(phone_steps, modelled)
         for edit in edits:
             if isinstance(edit, Gain) and not edit.channel:
-                generation = apply_gain(generation, edit)
+                generation = intensify_span(generation, edit)
             elif isinstance(edit, Hold):
                 generation = hold_mouth(generation, edit)
         curves = [edit for edit in edits if not isinstance(edit, Hold) and edit.channel and edit not in modelled]

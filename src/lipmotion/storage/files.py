@@ -1,4 +1,4 @@
-"""Files and folders that are written whole or not at all, and without following links in folders of strangers.
+"""Files and folders that are written whole or not at all, and without following links in folders of other users.
 
 Everything is written under a temporary name beside its target, and renamed at the end.
 """
@@ -72,7 +72,7 @@ _BINARY = getattr(os, "O_BINARY", 0)
 
 @contextmanager
 def confine(folder: Path) -> Iterator[None]:
-    """Follow no link inside a folder that strangers may have filled, whatever writes there while the block lasts.
+    """Follow no link inside a folder that other users may have filled, whatever writes there while the block lasts.
 
     This holds for all functions of this module, in all threads of the process. The folder itself may be a link, which
     the user gave. Inside it, a link in the place of a file is replaced, and one in the place of a folder is refused.

@@ -147,9 +147,9 @@ def read_toml(path: Path, kind: str, instead: str) -> dict[str, Any]:
     if DEEP_KEY.search(text):
         raise InputError(f"{path}: a name of more than 100 parts, required one of a table in a table at most")
     try:
-        found = tomllib.loads(text, parse_float=finite)
-        _check_wholes(found)
-        return found
+        content = tomllib.loads(text, parse_float=finite)
+        _check_wholes(content)
+        return content
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: {error}") from error
 

@@ -59,14 +59,14 @@ def open_table(path: Path) -> Iterator[TextTable]:
     encoding = "utf-16" if start in {b"\xff\xfe", b"\xfe\xff"} else "utf-16-le" if start[1:] == b"\0" else "utf-8-sig"
     with path.open(encoding=encoding, newline="") as text:
         try:
-            yield read_table(iter(partial(text.readline, LONGEST_LINE), ""))
+            yield parse_text_table(iter(partial(text.readline, LONGEST_LINE), ""))
         except (ValueError, OverflowError) as error:
             if isinstance(error, InputError):
                 raise
             raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
 
 
-def read_table(lines: Iterable[str]) -> TextTable:
+def parse_text_table(lines: Iterable[str]) -> TextTable:
     """Return the table in some lines, with their ends. Raises ValueError, also from the rows: it is none."""
     lines = iter(lines)
     above, head, separator = 0, "", ""
@@ -110,7 +110,7 @@ def read_whole_table(path: Path, kind: str, largest: int, required: Sequence[str
     """Return columns and rows of a table; ``required``: columns for messages. Raises InputError: it is no table."""
     text = read_text_file(path, kind, largest)
     try:
-        table = read_table(io.StringIO(text, newline=""))
+        table = parse_text_table(io.StringIO(text, newline=""))
         return table.names, list(table.rows)
     except ValueError as error:
         raise InputError(f"{path}: no readable table ({shorten(str(error))}); required {','.join(required)}") from error

@@ -107,14 +107,14 @@ def check_exporter(exporter: MotionFormat) -> None:
     """
     require(isinstance(exporter, MotionFormat), f"found {exporter!r}, required a MotionFormat")
     one = example(("m", "aa"))
-    given = make_curves(one.motion, one.speech.units, exporter.curves) if exporter.curves else one.motion
-    if all(channel.unit == FAP for channel in given.channels):
-        given = replace(given, values=np.rint(given.values))
+    sent = make_curves(one.motion, one.speech.units, exporter.curves) if exporter.curves else one.motion
+    if all(channel.unit == FAP for channel in sent.channels):
+        sent = replace(sent, values=np.rint(sent.values))
     if exporter.fixed_rate and exporter.rate_hz:
-        given = given.resampled(exporter.rate_hz)
-    trace = StateTrace(("state",), np.zeros(len(given.values), np.intp))
-    result = Generation(given, np.zeros_like(given.values), one.speech.units, trace)
-    exporter.check(given)
+        sent = sent.resampled(exporter.rate_hz)
+    trace = StateTrace(("state",), np.zeros(len(sent.values), np.intp))
+    result = Generation(sent, np.zeros_like(sent.values), one.speech.units, trace)
+    exporter.check(sent)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "motion"
         exporter.write(path, result, {"file": "speech.wav"}, {"name": "model"})
@@ -125,11 +125,11 @@ def check_exporter(exporter: MotionFormat) -> None:
         if exporter.read is None:
             return
         motion, _ = exporter.read(path)
-    required = {channel.name for channel in given.channels if channel.unit != RADIAN} - {*ARKIT_OTHERS, CLOSED}
+    required = {channel.name for channel in sent.channels if channel.unit != RADIAN} - {*ARKIT_OTHERS, CLOSED}
     require(required <= {*motion.names}, f"channels {motion.names} come back, required {sorted(required)}")
-    require(abs(motion.rate_hz - given.rate_hz) < 1e-6, f"{motion.rate_hz} Hz come back, required {given.rate_hz}")
-    require(len(motion.values) == len(given.values), f"{len(motion.values)} frames come back")
-    difference = max(float(np.abs(motion[name] - given[name]).max()) for name in {*given.names} & {*motion.names})
+    require(abs(motion.rate_hz - sent.rate_hz) < 1e-6, f"{motion.rate_hz} Hz come back, required {sent.rate_hz}")
+    require(len(motion.values) == len(sent.values), f"{len(motion.values)} frames come back")
+    difference = max(float(np.abs(motion[name] - sent[name]).max()) for name in {*sent.names} & {*motion.names})
     require(difference < 1e-5, f"values come back that differ by {difference:g}")
 
 

@@ -126,7 +126,7 @@ UNFAMILIAR, UNFAMILIAR_MOVEMENT, UNFAMILIAR_DOUBT = 0.45, 0.75, 0.15
 """Squared error, in the variance of the curve, of a voice that training does not know at all: in every frame, for each
 unit of squared distance from the mean, and where no phone is sure."""
 OTHER_WORDS = 0.5
-"""Squared error that a transcript of something else adds: 0.5 on average of eight strangers, 0.2 for a known voice."""
+"""Squared error that a transcript of something else adds: 0.5 on average of eight unseen speakers, 0.2 of seen ones."""
 MIN_DEVIATION = 0.02  # a curve that moves less, in eye distances or as a weight, counts as moving so far
 
 

@@ -208,15 +208,15 @@ def if_fits(schema: Schema) -> Schema:
 
 def _checked(content: Mapping[Any, Any], schema_of: Callable[[Any], Schema]) -> dict[Any, Any]:
     """Return the members of an object, or the items of a list by their numbers, as their schemas do."""
-    kept = {}
+    checked = {}
     for key, member in content.items():
         try:
             one = schema_of(key)(member)
         except SchemaError as error:
             raise error.within(f"[{key}]" if type(key) is int else f".{shorten(key)}") from None
         if one is not _LEFT_OUT:
-            kept[key] = one
-    return kept
+            checked[key] = one
+    return checked
 
 
 def describe_value(value: Any) -> str:

@@ -156,9 +156,9 @@ class Lexicon:
         readings = list_readings(word)
         if readings == ((word,),) and word not in self.user:
             readings = expand_lengthened(word) or readings
-        own = tuple(reading for reading in readings if len(reading) == 1 and reading[0] in self.user)
+        user_readings = tuple(reading for reading in readings if len(reading) == 1 and reading[0] in self.user)
         forms: list[SpokenForm] = []
-        for reading in ((word,),) if word in self.user else own or readings:
+        for reading in ((word,),) if word in self.user else user_readings or readings:
             choices = [self._pronounce(each) for each in reading]
             several = len(readings) > 1 and len(reading) > 1  # then not in all their pronunciations
             for number in range(min(max(map(len, choices)), 2 if several else MAX_VARIANTS)):

@@ -75,8 +75,8 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
         return ""
 
     def leave_out_marks(name: str, text: str) -> str:
-        found = list(MARKS[name].finditer(text))
-        return MARKS[name].sub(leave_out, text) if found and _mark_lines(name, found, text) else text
+        matches = list(MARKS[name].finditer(text))
+        return MARKS[name].sub(leave_out, text) if matches and _mark_lines(name, matches, text) else text
 
     def leave_out_name(match: re.Match[str]) -> str:
         name = match[1] or match[2]
@@ -105,22 +105,22 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
     return text, [name for name in left_out if name]
 
 
-def _mark_lines(name: str, found: list[re.Match[str]], text: str) -> bool:
+def _mark_lines(name: str, matches: list[re.Match[str]], text: str) -> bool:
     """Return whether what was found of a pattern at the starts of lines are names, times or numbers of the lines."""
     if name == "RECORDING":
-        return len(found) == sum(map(bool, text.split("\n")))
+        return len(matches) == sum(map(bool, text.split("\n")))
     if name == "DATED":
-        return len(found) > 1 or any(each[1] or "T" in each[0] for each in found)
+        return len(matches) > 1 or any(each[1] or "T" in each[0] for each in matches)
     if name == "STAMP":
-        times_s = [parse_clock(stamp[1]) for stamp in found]
-        is_full = all(stamp[1].count(":") == 2 or "[" in stamp[0] for stamp in found)  # no time of day that is said
+        times_s = [parse_clock(stamp[1]) for stamp in matches]
+        is_full = all(stamp[1].count(":") == 2 or "[" in stamp[0] for stamp in matches)  # no time of day that is said
         rise = len(times_s) > 1 and times_s == sorted({*times_s})
         return times_s[0] == 0 or (rise and (is_full or times_s[0] < 60))
-    numbers = [int(line[1] or ord(line[2])) for line in found]
+    numbers = [int(line[1] or ord(line[2])) for line in matches]
     counted = len(numbers) > 1 and all(b in (a + 1, 1, ord("a")) for a, b in pairwise(numbers))
     if name == "NUMBER":
         return counted
-    padded = all(re.match(r"0\d\d", line[1]) and line[1] != "007" for line in found)
+    padded = all(re.match(r"0\d\d", line[1]) and line[1] != "007" for line in matches)
     return padded or (counted and numbers[0] < 2 and len(numbers) == len(text.split("\n")))
 
 
@@ -170,7 +170,7 @@ SYNONYMS: dict[str, tuple[str, float]] = {
     for mood, strength in [meaning.split()]
     for word in words.split()
 } | {name: (name, 1.0) for name in (NEUTRAL, *MOODS, PLAIN, *MANNERS)}
-"""The words of tags that are understood, and what they mean."""
+"""The known words of tags, and what they mean."""
 
 
 class TaggedText(NamedTuple):
@@ -217,7 +217,7 @@ MoodTag(share=0.4, mood='happy', strength=0.6), MoodTag(share=0.6, mood='neutral
 
 
 def remove_known_tags(text: str) -> str:
-    """Return a text without the tags that are understood."""
+    """Return a text without its known tags."""
     return MARKS["TAG"].sub(lambda tag: " " if _meaning(tag) else tag[0], text)
 
 

@@ -73,7 +73,7 @@ def describe_frames(frames: Iterable[NDArray[np.uint8]], face_to_image: Array) -
     face_to_image : affine map of each frame [shape=(T, 2, 3)], from px of a face that looks ahead to px of the frame
     Raises InputError: another number of frames, or frames of several sizes.
     """
-    whole, face, eyes = [], [], []
+    pictures, face, eyes = [], [], []
     lower: NDArray[np.bool_] | None = None
     cell = 1
     size: tuple[int, ...] = ()
@@ -92,14 +92,14 @@ def describe_frames(frames: Iterable[NDArray[np.uint8]], face_to_image: Array) -
         left, top, right, bottom = LOWER_FACE
         hidden = ((x > left) & (x < right) & (y > top) & (y < bottom)).reshape(thumbnail.shape)
         lower = hidden if lower is None else lower | hidden
-        whole.append(thumbnail)
+        pictures.append(thumbnail)
         face.append(_sample(grey, face_to_image[n], UPPER_FACE, FACE_STEP))
         eyes.append(_sample(grey, face_to_image[n], EYES, EYES_STEP))
-    if len(whole) != len(face_to_image) or lower is None:
-        raise InputError(f"{len(whole)} frames with {len(face_to_image)} maps, required as many, at least one")
+    if len(pictures) != len(face_to_image) or lower is None:
+        raise InputError(f"{len(pictures)} frames with {len(face_to_image)} maps, required as many, at least one")
     points = np.array([[-45.0, 0, 1], [45, 0, 1], [0, 76, 1]]).T
-    place = (face_to_image @ points).reshape(len(whole), 6)
-    shown = (np.stack(whole) * ~lower).reshape(len(whole), -1)
+    place = (face_to_image @ points).reshape(len(pictures), 6)
+    shown = (np.stack(pictures) * ~lower).reshape(len(pictures), -1)
     alike, eye_levels = np.stack(face).astype(np.float64), np.stack(eyes).astype(np.float64)
     return FrameDescriptors(shown.astype(np.float64), alike, eye_levels, place)
 

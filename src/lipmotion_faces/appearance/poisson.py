@@ -189,8 +189,8 @@ class CloningSystem:
         Cost: a product of K · B · 3 multiplications a picture, and about ten passes over the box.
         """
         self._check(source, background)
-        whole = background.dtype == np.uint8
-        result = background.astype(np.uint8) if whole else round_levels(background.astype(np.float32))
+        in_bytes = background.dtype == np.uint8
+        result = background.astype(np.uint8) if in_bytes else round_levels(background.astype(np.float32))
         new, old = (pictures[(slice(None), *self.box)] for pictures in (source, result))
         for frames, membrane in self._solve_membranes(source, background, largest_difference):
             np.add(membrane, new[frames], out=membrane, casting="same_kind")

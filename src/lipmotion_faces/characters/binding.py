@@ -281,7 +281,7 @@ def write_points(path: Path, placement: LipPlacement) -> None:
         )
 
 
-def read_points(path: Path) -> dict[int, int]:
+def read_lip_points(path: Path) -> dict[int, int]:
     """Return the vertices of lip points from a table ``point,vertex``, for ``place_lips_by_points``.
 
     Raises InputError: no such file, other columns, a row that is damaged, or a point that occurs twice.

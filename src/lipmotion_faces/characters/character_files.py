@@ -34,7 +34,7 @@ from lipmotion_faces.characters.binding import (
     bind,
     load_binding,
     paint_weights,
-    read_points,
+    read_lip_points,
     read_weights,
 )
 from lipmotion_faces.characters.file_limits import Budget
@@ -398,7 +398,7 @@ def load_character(
             stored = load_binding(binding, mesh)
             return PosedCharacter(mesh, stored.placement, None, table, path, stored)
         if points is not None:
-            named = read_points(points)
+            named = read_lip_points(points)
             surface = separate_named_lips(mesh, named)
             placement = place_lips_by_points(mesh, surface, named)
         else:

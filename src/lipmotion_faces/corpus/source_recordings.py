@@ -10,7 +10,7 @@ from pathlib import Path
 from lipmotion.corpora import SPLITS
 from lipmotion.errors import CorpusError, InputError, shorten
 from lipmotion.storage.sources import AUDIO_SUFFIXES, VIDEO_SUFFIXES, read_text_file
-from lipmotion.storage.text_table import read_table
+from lipmotion.storage.text_table import parse_text_table
 from lipmotion.types import Channel, Timeline, Unit
 
 
@@ -170,7 +170,7 @@ def read_offsets(path: Path) -> dict[str, float]:
     Raises CorpusError: other columns, a row that is damaged, or a name twice.
     """
     try:
-        table = read_table(io.StringIO(read_text_file(path, "table of offsets", LARGEST_TABLE_BYTES), newline=""))
+        table = parse_text_table(io.StringIO(read_text_file(path, "table of offsets", LARGEST_TABLE_BYTES), newline=""))
         if table.names != COLUMNS:
             raise InputError(f"{path}: the columns are {shorten(','.join(table.names))!r}, required name,offset_ms")
         offsets: dict[str, float] = {}

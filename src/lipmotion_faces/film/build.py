@@ -282,13 +282,13 @@ def _film(take: Take) -> _Filmed | str:
         footage = track_footage(take.file, take.span)
         used = np.flatnonzero(footage.track.seen)[:: _step(footage)]
         pictures = _cut_lower_faces(footage, used, 1)
-        sound = read_sound(take)
+        sound = read_take_sound(take)
     except (InputError, CorpusError) as error:
         return str(error)
     return _Filmed(footage, used, pictures, sound)
 
 
-def read_sound(take: Take) -> Audio | None:
+def read_take_sound(take: Take) -> Audio | None:
     """Return the sound of a take; None if the video has none, or only silence."""
     try:
         audio = read_audio(take.file, warn=False)

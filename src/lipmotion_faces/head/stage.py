@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from functools import cache, lru_cache
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,36 +23,15 @@ from lipmotion_faces.rendering.drawn_surface import Camera, Canvas, fill
 
 Real = NDArray[np.float64]
 
-POSES = {
-    "jawOpen": CharacterPose(gap=0.3, upper_rise=0.03, jaw=0.23),
-    "mouthClose": CharacterPose(jaw=0.23),
-    "mouthFunnel": CharacterPose(gap=0.1, upper_rise=0.042, jaw=0.05, width=0.8, roundness=1, protrusion=0.09),
-    "mouthPucker": CharacterPose(gap=0.02, upper_rise=0.01, width=0.7, roundness=1, protrusion=0.1, fullness=1.1),
-    "mouthRollLower": CharacterPose(gap=0.054, upper_rise=0.054, tuck=1),
-    "tongueOut": CharacterPose(tongue_out=1),
-    "tongueUp": CharacterPose(tongue_up=1),
-    "browInnerUp": CharacterPose(brows=FULL_BROW_RISE),
-}
+_TABLE = json.loads(Path(__file__).with_name("poses.json").read_text(encoding="ascii"))
+POSES = {name: CharacterPose(**pose) for name, pose in _TABLE["both"].items()}
+POSES["browInnerUp"] = CharacterPose(brows=FULL_BROW_RISE)
 """The poses of the shapes that are the same on both sides."""
-SIDED_POSES = {
-    "mouthSmile": CharacterPose(smile=0.05, width=1.05),
-    "mouthStretch": CharacterPose(width=1.25, spread=1),
-    "mouthUpperUp": CharacterPose(gap=0.05, upper_rise=0.05),
-    "mouthLowerDown": CharacterPose(gap=0.08),
-    "mouthPress": CharacterPose(press=1),
-    "eyeBlink": CharacterPose(shut=1),
-}
+SIDED_POSES = {name: CharacterPose(**pose) for name, pose in _TABLE["sided"].items()}
 """The poses of the shapes that are one each for the left and the right side."""
 MOOD_POSES = {"browInnerUp": CharacterPose(mood=UpperFace(inner=1))}
-SIDED_MOOD_POSES = {
-    "browDown": CharacterPose(mood=UpperFace(lowered=1)),
-    "browOuterUp": CharacterPose(mood=UpperFace(outer=1)),
-    "eyeSquint": CharacterPose(mood=UpperFace(squint=1)),
-    "eyeWide": CharacterPose(mood=UpperFace(wide=1)),
-    "cheekSquint": CharacterPose(mood=UpperFace(cheek=1)),
-    "noseSneer": CharacterPose(mood=UpperFace(sneer=1)),
-    "mouthFrown": CharacterPose(smile=-0.05),
-}
+SIDED_MOOD_POSES = {name: CharacterPose(mood=UpperFace(**pose)) for name, pose in _TABLE["moods"].items()}
+SIDED_MOOD_POSES["mouthFrown"] = CharacterPose(smile=-0.05)
 """The poses of the shapes that moods need, instead of those above and beside them; other files do not have these."""
 _GAZES = {"Out": (FULL_LOOK_RAD, 0.0), "In": (-FULL_LOOK_RAD, 0.0)}
 _GAZES |= {"Up": (0.0, FULL_LOOK_RAD), "Down": (0.0, -FULL_LOOK_RAD)}

@@ -113,7 +113,7 @@ def report_cost(path: Path, pictures: Iterable[NDArray[np.uint8]], count: int) -
         yield picture
 
 
-def count_frames(generation: Generation, fps: float) -> int:
+def count_pictures(generation: Generation, fps: float) -> int:
     """Return the number of pictures of a motion."""
     return int(generation.motion.time_s[-1] * fps + 1e-9) + 1
 

@@ -21,7 +21,7 @@ from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves, eye_and_brow_weights
 from lipmotion.meshes.model.mesh import Blendshape, turn_head
 from lipmotion.pipeline.outputs.curve_sets import apply_weight_edits
-from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth, with_drawn_channels
+from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth_poses, with_drawn_channels
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_recorded_prosody
 from lipmotion.storage.files import sound_reference
 from lipmotion.types import Channel, Generation, Motion, Prosody, Span, StateTrace, Timeline, Unit
@@ -80,7 +80,7 @@ def build_scene(performance: Performance, frames: slice | None = None) -> Scene:
         return scene
     states = StateTrace(("",), np.zeros(len(weights.values), np.intp))
     held = Generation(weights, np.zeros(weights.values.shape), moved.units, states)
-    steps = hold_mouth(held, delivery.hold_frames(weights.rate_hz), find_closed_times(moved))
+    steps = hold_mouth_poses(held, delivery.hold_frames(weights.rate_hz), find_closed_times(moved))
     return replace(scene, weights=steps.motion, stepped=steps.stepped)
 
 

@@ -73,7 +73,7 @@ class ShownDrawing(_WithHead):
         seen, prosody = performance.cached(_deliver), performance.cached(_measure_played_prosody)
         staged = stage_face(self.face, settings.staging, prosody or measure_prosody(played))
         fps = _find_rate(settings)
-        count = drawn_video.count_frames(seen, fps)
+        count = drawn_video.count_pictures(seen, fps)
         drawn = drawn_video.report_cost(path, staged.render(seen.motion, seen.units, fps=fps), count)
         shown = with_progress(drawn, filmed_video.RENDERING, performance.monitor, count, REPORT_INTERVAL)
         drawn_video.write_frames(path, shown, fps, played)
@@ -123,7 +123,7 @@ class ShownCutOut(_WithHead):
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
         settings, generation, fps = performance.settings, performance.generation, _find_rate(performance.settings)
         sheet = cues(generation, fps=fps, shapes=self._optional, delivery=settings.delivery)
-        count = drawn_video.count_frames(generation, fps)
+        count = drawn_video.count_pictures(generation, fps)
         shown = list_frame_shapes(sheet)[:count]
         frames = self.face.draw([*shown, *[shown[-1]] * (count - len(shown))], settings.staging)
         sound = performance.cached(drawn_video.load_track)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, cast
 
-from lipmotion.cli.arguments.declared import add_input, add_options, add_output, pick_part
+from lipmotion.cli.arguments.declared import add_options, pick_part
+from lipmotion.cli.arguments.options import add_arguments
 from lipmotion.cli.terminal.printing import print_line, print_lines
 from lipmotion.errors import InputError, shorten
 from lipmotion.pipeline.request import Outputs
@@ -19,11 +20,7 @@ if TYPE_CHECKING:
     from lipmotion.meshes.model.rig_tables import RigRow
     from lipmotion_faces.characters.binding import PosedCharacter
 
-CALIBRATION = {
-    "open": "values at which the mouth is as wide open as speech opens it: A=0.8",
-    "closed": "values at which the lips are closed: A=0.02,M=1",
-    "rounded": "values at which the lips are rounded, as in OO: U=0.9",
-}
+POSES = ("open", "closed", "rounded")  # in which values of controls are stated
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -31,28 +28,15 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = verbs.add_parser(
         "character", help="look into a character's files: lip points, blendshapes, control points"
     )
-    kinds = "FILE.glb .gltf .vrm .obj, or a folder of .obj files; or a rig's table (.csv), to calibrate"
-    add_input(parser, "character", what="character", metavar="FILE", help=kinds)
+    add_arguments(parser, __package__, "character")
     add_options(parser, Outputs, "lip_points", "binding", "control_points")
-    points = "write the vertex of each lip point, to correct and give back: point,vertex"
-    add_output(parser, "--write-points", metavar="FILE.csv", help=points)
-    weights = "write the weights of control points, to paint and give back: vertex,point,weight"
-    add_output(parser, "--write-weights", metavar="FILE.csv", help=weights)
-    add_output(parser, "--write-binding", metavar="FILE.binding", help="write the binding, which is computed once")
-    table = (
-        "write which curve moves which blendshape, with gain and offset, beside the character: head.glb.character.csv"
-    )
-    parser.add_argument("--write-table", action="store_true", help=table)
-    for pose, says in CALIBRATION.items():
-        parser.add_argument(f"--{pose}", default="", metavar="NAME=X,NAME=X", help=f"{says}; written to the table")
-    add_output(parser, "--picture", metavar="FILE.png", help="draw it at rest")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Print what was found; write what was asked for."""
     from lipmotion.extensions import load_provided
-    from lipmotion.meshes.fitting.driven import list_rows
+    from lipmotion.meshes.fitting.driven import list_rig_rows
     from lipmotion.meshes.model.rig_tables import find_table, read_rig_table
     from lipmotion.pipeline.job import open_character
     from lipmotion.storage.sources import is_file
@@ -73,7 +57,7 @@ def run(options: argparse.Namespace) -> None:
     except InputError:
         table = find_table(path)
         if options.write_table and not is_file(table):  # the mouth was not found: the table is to be filled in
-            write_rig_table(table, list_rows(read_character(path), None, {}))
+            write_rig_table(table, list_rig_rows(read_character(path), None, {}))
             print_line(table)
         raise
     print_lines("\n".join(describe_character(character)))
@@ -109,7 +93,7 @@ def _write_table(
 def _read_values(options: argparse.Namespace) -> dict[str, dict[str, float]]:
     """Return what options say of controls in poses. Raises InputError: something that states no value."""
     stated: dict[str, dict[str, float]] = {}
-    for pose in CALIBRATION:
+    for pose in POSES:
         for part in filter(None, getattr(options, pose).split(",")):
             name, _, text = part.rpartition("=")
             value = parse_number(text, f"--{pose}: the value in {shorten(part)!r} is", "NAME=X, as A=0.8")

@@ -4,63 +4,25 @@ from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli.arguments.declared import add_input, add_options, add_output
-from lipmotion.cli.arguments.options import add_machine_readable, add_workers, list_or_all
+from lipmotion.cli.arguments.declared import add_options
+from lipmotion.cli.arguments.options import add_arguments, add_machine_readable, add_workers, list_or_all
 from lipmotion.cli.terminal.printing import print_error, print_json, print_line
 from lipmotion.errors import shorten_list
 from lipmotion.pipeline.request import Request
-
-LINES = 12
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb and its actions to the parser of the command line."""
     parser = verbs.add_parser("corpus", help="prepare recordings for training")
     actions = parser.add_subparsers(title="actions", required=True, metavar="ACTION")
-    prepare = actions.add_parser("prepare", help="make a corpus of recordings")
-    layouts = "folder of videos, or of sounds with motion; or one video (docs/corpora.md)"
-    add_input(prepare, "recordings", what="folder of recordings", help=layouts)
-    add_output(prepare, "-o", "--output", is_folder=True, required=True, metavar="CORPUS")
-    add_workers(prepare)
-    prepare.add_argument("--no-crops", dest="crops", action="store_false", help="do not store mouth pictures")
-    late = "the sound of every recording is MS milliseconds late against its motion (default: in step, or found)"
-    prepare.add_argument("--offset-ms", type=float, metavar="MS", help=late)
-    add_machine_readable(prepare)
-    prepare.set_defaults(run=run_prepare)
-    action = actions.add_parser("info", help="print what a corpus contains")
-    add_input(action, "corpus", what="corpus")
-    action.set_defaults(run=run_info)
-    action = actions.add_parser("motion", help="write tracked motion as files: to draw, or for a study")
-    add_input(action, "corpus", what="corpus")
-    add_output(action, "-o", "--output", is_folder=True, required=True, metavar="FOLDER")
-    action.add_argument("--split", default="test", help="of the list test, val, train or all (default: test)")
-    channels = "these channels alone, as opening,width (default: all)"
-    action.add_argument("--channels", default="", metavar="NAME,NAME", help=channels)
-    action.set_defaults(run=run_motion)
-    action = actions.add_parser("sync", help="correct the offset between sound and lips of a corpus")
-    add_input(action, "corpus", what="corpus")
-    action.set_defaults(run=run_sync)
-    action = actions.add_parser("offset", help="measure by how much a separate recording of the sound is late")
-    add_input(action, "camera", what="recording", help="the recording that is in step with the motion: video or sound")
-    add_input(action, "recorder", what="recording", help="the separate recording of the same sound")
-    action.set_defaults(run=run_offset)
-    action = actions.add_parser("prompts", help="print sentences to record, those that cover most sounds first")
-    action.add_argument("--count", type=int, default=50, metavar="N", help="at most N sentences (default: 50)")
-    sentences = "choose from the sentences of this file, one per line"
-    add_input(action, "--text", what="text", metavar="FILE", help=sentences)
-    covered = "do not count what this corpus covers already"
-    add_input(action, "--have", what="corpus", metavar="CORPUS", help=covered)
-    add_options(action, Request, "lexicon")
-    action.set_defaults(run=run_prompts)
-    action = actions.add_parser("coverage", help="print which sounds a corpus lacks, and what is nearest to them")
-    add_input(action, "corpus", what="corpus")
-    sentences = "the sentences whose sounds are needed, one per line (default: those of lipmotion corpus prompts)"
-    add_input(action, "--text", what="text", metavar="FILE", help=sentences)
-    add_options(action, Request, "lexicon")
-    most = f"at most N lines each of phones, diphones and triphones (default: {LINES})"
-    action.add_argument("--count", type=int, default=LINES, metavar="N", help=most)
-    action.add_argument("--json", action="store_true", help="print one JSON object, with everything that is missing")
-    action.set_defaults(run=run_coverage)
+    for name, (run, text) in ACTIONS.items():
+        action = actions.add_parser(name, help=text)
+        add_arguments(action, __package__, f"corpus {name}")
+        action.set_defaults(run=run)
+    add_workers(actions.choices["prepare"])
+    add_machine_readable(actions.choices["prepare"])
+    add_options(actions.choices["prompts"], Request, "lexicon")
+    add_options(actions.choices["coverage"], Request, "lexicon")
 
 
 def run_prepare(options: argparse.Namespace) -> None:
@@ -171,3 +133,15 @@ def run_coverage(options: argparse.Namespace) -> None:
         print_error(f"warning: left out {len(result.left_out)} sentences for their words (--json has them)")
     if result.unknown and not options.json:
         print_error(f"warning: {result.unknown} utterances without known words or phones were not counted")
+
+
+ACTIONS = {
+    "prepare": (run_prepare, "make a corpus of recordings"),
+    "info": (run_info, "print what a corpus contains"),
+    "motion": (run_motion, "write tracked motion as files: to draw, or for a study"),
+    "sync": (run_sync, "correct the offset between sound and lips of a corpus"),
+    "offset": (run_offset, "measure by how much a separate recording of the sound is late"),
+    "prompts": (run_prompts, "print sentences to record, those that cover most sounds first"),
+    "coverage": (run_coverage, "print which sounds a corpus lacks, and what is nearest to them"),
+}
+"""What each action runs, and does; its arguments stand in ``arguments.csv``."""

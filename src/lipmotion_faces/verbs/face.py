@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli.arguments.declared import add_input, add_output
-from lipmotion.cli.arguments.options import add_execution
+from lipmotion.cli.arguments.options import add_arguments, add_execution
 from lipmotion.cli.terminal.printing import print_line
 
 
@@ -14,17 +13,11 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = verbs.add_parser("face", help="make a video-realistic face from footage of a person")
     actions = parser.add_subparsers(title="actions", required=True, metavar="ACTION")
     build = actions.add_parser("build", help="make a face from a video, a folder of videos or a corpus")
-    footage = "a video of the person speaking, a folder of videos, or a prepared corpus; a minute or more is good"
-    add_input(build, "footage", what="footage", metavar="VIDEO|FOLDER|CORPUS", help=footage)
-    add_output(build, "-o", "--output", force=True, required=True, metavar="FILE.face")
-    videos = "of a corpus, the folder of the videos that it was prepared from"
-    add_input(build, "--recordings", what="folder of recordings", metavar="FOLDER", help=videos)
-    build.add_argument("--speaker", default="", metavar="NAME", help="whose face, where there are several people")
-    build.add_argument("--name", default="", help="of the face (default: the speaker's or the file's)")
+    add_arguments(build, __package__, "face build")
     add_execution(build)
     build.set_defaults(run=run_build)
     info = actions.add_parser("info", help="describe a face")
-    add_input(info, "face", what="face", metavar="FILE.face")
+    add_arguments(info, __package__, "face info")
     info.set_defaults(run=run_info)
 
 

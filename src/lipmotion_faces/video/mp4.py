@@ -88,7 +88,7 @@ def write_mp4(
     """
     import av
 
-    rate = check_rate(path, fps, audio)
+    rate = check_rate_and_sound(path, fps, audio)
     if unknown := set(tags or ()) - TAGS:
         raise ExportError(f"{path}: unknown tags {', '.join(sorted(unknown))}; known: {', '.join(sorted(TAGS))}")
     converter = av.video.reformatter.VideoReformatter()  # to make one for every frame takes as long as to use it
@@ -116,7 +116,7 @@ def write_mp4(
             append_xmp(temporary, xmp)
 
 
-def check_rate(path: Path, fps: float, audio: Audio) -> Fraction:
+def check_rate_and_sound(path: Path, fps: float, audio: Audio) -> Fraction:
     """Return the exact frame rate. Raises ExportError: not positive, or there is no sound."""
     if not 0 < fps < np.inf:
         raise ExportError(f"{path}: the frame rate is {fps}, required more than 0")
@@ -222,7 +222,7 @@ def write_with_alpha(path: Path, frames: Iterable[Frame], *, fps: float, audio: 
     codecs = _CONTAINERS.get(path.suffix.lower())
     if codecs is None:
         raise ExportError(f"{path}: required one of: {' '.join(_CONTAINERS)}")
-    rate, checked = check_rate(path, fps, audio), check_frames(frames, path)
+    rate, checked = check_rate_and_sound(path, fps, audio), check_frames(frames, path)
     with atomic_file(path) as temporary:
         first = next(checked)
         has_alpha = first.shape[2] == 4

@@ -21,8 +21,8 @@ def format_figures(figures: Mapping[str, Any]) -> str:
     lines = [f"split {figures['split']}: {figures['clips']} clips"]
     lines[0] += f"; closed under {closed:.4f}" if closed is not None else ""
     lines += [f"left out, for they do not move: {', '.join(still)}"] if still else []
-    strangers = [name or "speakers without a name" for name in figures.get("strangers", ())]
-    lines += [f"unknown to the model, compared with the mean person: {', '.join(strangers)}"] if strangers else []
+    unseen = [name or "speakers without a name" for name in figures.get("strangers", ())]
+    lines += [f"unknown to the model, compared with the mean person: {', '.join(unseen)}"] if unseen else []
     lines += [SEEN] if figures.get("seen_in_training") else []
     silent = figures.get("without_words", 0)
     lines += [f"no figures with transcript: {silent} of {figures['clips']} clips have no words"] if silent else []

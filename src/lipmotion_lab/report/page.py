@@ -200,7 +200,7 @@ def _write_part(part: FinishedPart) -> Html:
         if content is not None
     }
     figures = element("a", "all figures as JSON", href=f"{part.name}/figures.json")
-    beside = element("p", "Beside this page: ", figures, ".")
+    links = element("p", "Beside this page: ", figures, ".")
     return element(
         "section",
         element("h2", section.title, id=heading),
@@ -211,7 +211,7 @@ def _write_part(part: FinishedPart) -> Html:
         *more,
         *([element("h3", part.record["clip"]), element("div", *videos, class_="videos")] if videos else []),
         *([element("h3", "Pictures"), element("div", *pictures, class_="pictures")] if pictures else []),
-        element("details", element("summary", "How this was made"), _list(made_with), beside),
+        element("details", element("summary", "How this was made"), _list(made_with), links),
         id=part.name,
         aria_labelledby=heading,
     )

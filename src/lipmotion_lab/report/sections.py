@@ -99,12 +99,12 @@ def build_minnis_section(figures: Mapping[str, Any]) -> Section:
             with_joins = {}
             for system, row in rows.items():
                 joins, overlap = row["joins"], row.get("overlap", {"error": None})
-                own = {f"joins_{key}": joins.get(key) for key in ("per_clip", "candidates")}
-                own |= {f"joins_{key}": joins[key] and 100 * joins[key] for key in ("hard", "smooth")}
-                own |= {f"overlap_{key}": each for key, each in overlap.items()}
+                joined = {f"joins_{key}": joins.get(key) for key in ("per_clip", "candidates")}
+                joined |= {f"joins_{key}": joins[key] and 100 * joins[key] for key in ("hard", "smooth")}
+                joined |= {f"overlap_{key}": each for key, each in overlap.items()}
                 for channel, each in row["channels"].items():
-                    own |= {f"{channel}_{ratio}": each[ratio] for ratio in ("global_variance", "jerk")}
-                with_joins[system] = {**row, **own}
+                    joined |= {f"{channel}_{ratio}": each[ratio] for ratio in ("global_variance", "jerk")}
+                with_joins[system] = {**row, **joined}
             tables[split, condition] = Table(name.replace(" ", "-"), caption, columns, with_joins, PRINTED)
     split, last = list(figures["lists"].items())[-1]
     main = tables[split, AUDIO_ONLY]

@@ -9,14 +9,14 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from lipmotion.cli.arguments.declared import add_input, add_options, add_output
+from lipmotion.cli.arguments.declared import add_input, add_options
 from lipmotion.cli.arguments.options import (
+    add_arguments,
     add_execution,
     add_figures_arguments,
     add_workers,
     count_workers,
     list_or_all,
-    numbers,
     report_figures,
 )
 from lipmotion.pipeline.request import Request
@@ -33,26 +33,18 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb and its experiments to the parser of the command line."""
     parser = verbs.add_parser("experiment", help="train and compare systems on a corpus, as in the papers")
     actions = parser.add_subparsers(title="experiments", required=True, metavar="EXPERIMENT")
-    for add_one in (_add_hofer2008, _add_learning_curve, _add_folds, _add_xieliu2007, _add_minnis2000):
-        add_one(actions)
-    _add_engines(actions)
-    _add_all(actions)
-
-
-def add_experiment_arguments(parser: argparse.ArgumentParser, *, quick: str = "") -> None:
-    """Add the corpus, ``--workers``, the figures, and, if it is said what is small then, ``--quick``."""
-    add_input(parser, "corpus", what="corpus")
-    if quick:
-        help_text = f"see that it runs: 20 recordings to train on, at most 6 to compare, {quick}"
-        parser.add_argument("--quick", action="store_true", help=help_text)
-    add_workers(parser)
-    add_figures_arguments(parser)
-
-
-def add_blocks(parser: argparse.ArgumentParser) -> None:
-    """Add ``--blocks``, for corpora too small for a list ``test``."""
-    help_text = "for a small corpus: divide it into K blocks of time; each is test once, the next val, the rest train"
-    parser.add_argument("--blocks", type=int, metavar="K", help=help_text)
+    for name, (run_one, text) in EXPERIMENTS.items():
+        action = actions.add_parser(name, help=text)
+        add_arguments(action, __package__, name)
+        add_input(action, "corpus", what="corpus")
+        add_workers(action)
+        add_figures_arguments(action)
+        action.set_defaults(run=run_one)
+    action = actions.add_parser("all", help="the papers' experiments and ours, and one page of what they found")
+    add_arguments(action, __package__, "all")
+    add_options(action, Request, "lexicon")
+    add_execution(action)
+    action.set_defaults(run=run_all)
 
 
 def run_experiment(
@@ -96,19 +88,6 @@ def run_experiment(
     report_figures(options, compute, lambda figures: section(figures).as_text())
 
 
-def _add_hofer2008(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = actions.add_parser(
-        "hofer2008", help="which unit set predicts closings of the mouth, by the paper's own system (Table 1)"
-    )
-    parser.add_argument("--split", default="test", help="compare on test, val, train or all (default: test)")
-    channels = "model these channels of motion alone; opening,width: the two features of the paper (default: all)"
-    parser.add_argument("--channels", default="", metavar="NAME,NAME", help=channels)
-    parser.add_argument("--states", type=numbers, metavar="N,N", help="states of a unit (default: 3,5; quick: 5)")
-    add_experiment_arguments(parser, quick="one or two Gaussians")
-    add_blocks(parser)
-    parser.set_defaults(run=_run_hofer2008)
-
-
 def _run_hofer2008(options: argparse.Namespace) -> None:
     from lipmotion_lab.hofer2008 import FULL, QUICK, REFERENCE_SET, run_hofer2008
 
@@ -117,19 +96,6 @@ def _run_hofer2008(options: argparse.Namespace) -> None:
     references = [f"{REFERENCE_SET}, {states} states" for states in chosen.states]
     experiment = partial(run_hofer2008, options=chosen, split=list_or_all(options.split))
     run_experiment(options, experiment, "hofer2008", references=references)
-
-
-def _add_learning_curve(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = actions.add_parser("learning-curve", help="quality of models trained on the first N recordings")
-    order = "names of recordings, one per line (default: the training list, shuffled with seed 0)"
-    add_input(parser, "--order", what="list", replaceable=True, metavar="FILE", help=order)
-    sizes = "numbers of recordings to train on (default: 20,50,100,200 and all)"
-    parser.add_argument("--sizes", type=numbers, metavar="N,N,...", help=sizes)
-    parser.add_argument("--split", default="test", help="compare on val or test (default: test)")
-    rival = "train also a BLSTM on the same recordings, its settings chosen on val, and compare"
-    parser.add_argument("--rival", action="store_true", help=rival)
-    add_experiment_arguments(parser)
-    parser.set_defaults(run=_run_learning_curve)
 
 
 def _run_learning_curve(options: argparse.Namespace) -> None:
@@ -144,47 +110,10 @@ def _run_learning_curve(options: argparse.Namespace) -> None:
     run_experiment(options, run, "learning-curve")
 
 
-def _add_folds(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = actions.add_parser(
-        "folds", help="cross-validation: generate each part of the training list by a model of the others"
-    )
-    parser.add_argument("--by-speaker", action="store_true", help="leave whole speakers out: strangers to the model")
-    count = "number of parts (default: 5; by speaker: one each)"
-    parser.add_argument("--folds", type=int, metavar="K", help=count)
-    add_experiment_arguments(parser)
-    parser.set_defaults(run=_run_folds)
-
-
 def _run_folds(options: argparse.Namespace) -> None:
     from lipmotion_lab.folds import cross_validate
 
     run_experiment(options, partial(cross_validate, count=options.folds, by_speaker=options.by_speaker), "folds")
-
-
-def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = actions.add_parser(
-        "xieliu2007",
-        help="which structure of chains predicts lips best, as printed and chosen on val (Xie & Liu 2007, Table 3)",
-    )
-    parser.add_argument("--split", default="test", help="compare on test, or another list (default: test)")
-    order = "names of recordings, one per line (default: train, shuffled)"
-    add_input(parser, "--order", what="list", replaceable=True, metavar="FILE", help=order)
-    parser.add_argument(
-        "--sizes", type=numbers, metavar="N,N,...", help="numbers of recordings to train on (default: all)"
-    )
-    systems = "these systems, separated by semicolons (default: those of the paper, and baselines)"
-    parser.add_argument("--systems", type=lambda text: text.split(";"), metavar="NAME;NAME", help=systems)
-    parser.add_argument("--visual", default="geometry", metavar="KIND", help="geometry, eigenlips or both")
-    parser.add_argument("--transcripts", action="store_true", help="compare also with known transcripts")
-    others = "recordings of others, for systems named with two stages, as in train"
-    add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=others)
-    parser.add_argument("--voices", action="store_true", help="as --recordings, synthetic voices")
-    add_output(parser, "--plots", metavar="FOLDER", help="write pictures like Figs. 7, 10 and 11 there")
-    add_experiment_arguments(
-        parser, quick="the paper's systems, four also with Gaussians chosen on val; not with --order"
-    )
-    add_blocks(parser)
-    parser.set_defaults(run=_run_xieliu2007)
 
 
 def _run_xieliu2007(options: argparse.Namespace) -> None:
@@ -215,33 +144,11 @@ def _run_xieliu2007(options: argparse.Namespace) -> None:
     run_experiment(options, run, "xieliu2007", references=(REFERENCE_SYSTEM, "ph-HMM", BLSTM))
 
 
-def _add_minnis2000(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = actions.add_parser("minnis2000", help="unit selection as Minnis & Breen 2000 print it, and each addition")
-    text = "keep the model there, so that a run that was stopped goes on and a second one does not train"
-    add_output(parser, "--models", is_folder=True, metavar="FOLDER", help=text)
-    unguided = (
-        "leave out the rows that learn from the sound: the paper's system and its readings, in a tenth of the time"
-    )
-    parser.add_argument("--no-guide", dest="guided", action="store_false", help=unguided)
-    add_experiment_arguments(parser, quick="few epochs; the model is not kept")
-    add_blocks(parser)
-    parser.set_defaults(run=_run_minnis2000)
-
-
 def _run_minnis2000(options: argparse.Namespace) -> None:
     from lipmotion_lab.minnis2000 import PRINTED, run_minnis2000
 
     chosen = {"models": options.models, "quick": options.quick, "guided": options.guided}
     run_experiment(options, partial(run_minnis2000, **chosen), "minnis2000", references=(PRINTED,))
-
-
-def _add_engines(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = actions.add_parser("engines", help="all engines in one table")
-    parser.add_argument("--split", default="val", help="compare on val or test (default: val)")
-    text = "the engines' models: what is not there yet is trained and kept (default: train all, keep none)"
-    add_output(parser, "--models", is_folder=True, metavar="FOLDER", help=text)
-    add_experiment_arguments(parser)
-    parser.set_defaults(run=_run_engines)
 
 
 def _run_engines(options: argparse.Namespace) -> None:
@@ -253,17 +160,18 @@ def _run_engines(options: argparse.Namespace) -> None:
     run_experiment(options, run, "engines", has_parts=False)
 
 
-def _add_all(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = actions.add_parser("all", help="the papers' experiments and ours, and one page of what they found")
-    add_input(parser, "corpus", what="corpus")
-    report = "folder of the report; run it again to go on after a stop"
-    add_output(parser, "-o", "--output", is_folder=True, required=True, metavar="REPORT", help=report)
-    only = "these alone: hofer2008, xieliu2007, minnis2000, engines, learning-curve, folds (default: all)"
-    parser.add_argument("--only", type=lambda text: text.split(","), metavar="NAME,NAME", help=only)
-    parser.add_argument("--quick", action="store_true", help="20 recordings, small models: see that it runs")
-    add_options(parser, Request, "lexicon")
-    add_execution(parser)
-    parser.set_defaults(run=run_all)
+EXPERIMENTS: dict[str, tuple[Callable[[argparse.Namespace], None], str]] = {
+    "hofer2008": (_run_hofer2008, "which unit set predicts closings of the mouth, by the paper's own system (Table 1)"),
+    "learning-curve": (_run_learning_curve, "quality of models trained on the first N recordings"),
+    "folds": (_run_folds, "cross-validation: generate each part of the training list by a model of the others"),
+    "xieliu2007": (
+        _run_xieliu2007,
+        "which structure of chains predicts lips best, as printed and chosen on val (Xie & Liu 2007, Table 3)",
+    ),
+    "minnis2000": (_run_minnis2000, "unit selection as Minnis & Breen 2000 print it, and each addition"),
+    "engines": (_run_engines, "all engines in one table"),
+}
+"""What each experiment runs, and what it finds; its arguments stand in ``arguments.csv``."""
 
 
 def run_all(options: argparse.Namespace) -> None:

@@ -6,8 +6,14 @@ import argparse
 import os
 from pathlib import Path
 
-from lipmotion.cli.arguments.declared import add_input, add_options, add_output
-from lipmotion.cli.arguments.options import add_figures_arguments, add_machine_readable, list_or_all, report_figures
+from lipmotion.cli.arguments.declared import add_input, add_options
+from lipmotion.cli.arguments.options import (
+    add_arguments,
+    add_figures_arguments,
+    add_machine_readable,
+    list_or_all,
+    report_figures,
+)
 from lipmotion.pipeline.request import Request
 
 ADAPTERS = "LIPMOTION_LEAGUE"  # variable of the environment: the folder of adapters
@@ -36,10 +42,7 @@ def run_compare(options: argparse.Namespace) -> None:
 def add_evaluate(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("evaluate", help="compare generated with recorded motion")
-    add_input(parser, "model", what="model", replaceable=True)
-    add_input(parser, "corpus", what="corpus")
-    parser.add_argument("--split", default="test", help="train, val, test or all (default: test)")
-    parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="only this speaker (repeatable)")
+    add_arguments(parser, __package__, "evaluate")
     add_options(parser, Request, "recogniser")
     add_figures_arguments(parser)
     parser.set_defaults(run=run_evaluate)
@@ -69,19 +72,11 @@ def run_evaluate(options: argparse.Namespace) -> None:
 def add_league(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("league", help="compare rivals and our engines on the same filmed recordings")
-    add_input(parser, "recordings", what="corpus", help="filmed recordings, as corpus prepare made them")
-    add_output(parser, "-o", "--output", is_folder=True, required=True, metavar="REPORT", help="folder of the page")
+    add_arguments(parser, __package__, "league")
     where = f"folder of adapters, extras/league of the sources (default: that of {ADAPTERS})"
     add_input(
         parser, "--adapters", what="folder of adapters", default=os.environ.get(ADAPTERS, "extras/league"), help=where
     )
-    choice = "corpus on whose list val settings are chosen (default: lists or folds of the recordings)"
-    add_input(parser, "--choose", what="corpus", metavar="CORPUS", help=choice)
-    parser.add_argument("--only", action="append", default=[], metavar="RIVAL", help="only this one (repeatable)")
-    sync = "each recording may be moved by so much to fit best, alike for all (default: 60)"
-    parser.add_argument("--sync", type=float, default=60.0, metavar="MS", help=sync)
-    limit = "longest time of a rival with all recordings (default: 600)"
-    parser.add_argument("--limit", type=float, default=600.0, metavar="SECONDS", help=limit)
     add_machine_readable(parser)
     parser.set_defaults(run=run_league)
 

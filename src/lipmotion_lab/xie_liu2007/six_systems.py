@@ -313,8 +313,8 @@ def _compare_paper_pairs(
         for better, worse in pairs:
             row: dict[str, Any] = {"better": better, "worse": worse}
             for key in ("acc", "amse"):
-                own, other = statistics[better][key], statistics[worse][key]
-                row |= {key: own.value - other.value, f"{key}_95": own.compute_gain(other, seed)}
+                better_value, other = statistics[better][key], statistics[worse][key]
+                row |= {key: better_value.value - other.value, f"{key}_95": better_value.compute_gain(other, seed)}
             rows.append(row)
     return rows
 

@@ -86,10 +86,10 @@ def judge_systems(
     for system in systems:
         made = held_out.generate_clips(validation, AUDIO_ONLY, system.engine, system.model)
         options, parameters = system.engine.config.as_mapping(), system.model.chains.parameters
-        yield Trial(options, *measure_clips(made), parameters), system
+        yield Trial(options, *measure_system(made), parameters), system
 
 
-def measure_clips(made: Sequence[ComparedClip]) -> tuple[float, float]:
+def measure_system(made: Sequence[ComparedClip]) -> tuple[float, float]:
     """Return ACC and AMSE of what a system makes of recordings."""
     both = [clip.generated for clip in made], [clip.original for clip in made]
     return sum_correlations(*both).value, sum_distances(*both).value
@@ -108,7 +108,7 @@ def tune_network(examples: Sequence[Example], validation: HeldOutRecordings, mon
             model = engine.fit(examples, monitor).model
             size = sum(array.size for array in model.learned.network.parameters)
             made = held_out.generate_compared(validation, speech, engine, model)
-            trial = Trial(options, *measure_clips(made), size)
+            trial = Trial(options, *measure_system(made), size)
             candidates.append((trial, TrainedSystem(engine, model, process_time() - start_s)))
     return choose_best(candidates)
 

@@ -152,7 +152,7 @@ def open_server(to: str, port: int, server: Server | None = None) -> Iterator[Se
 
     Raises InputError: no such address, or it is taken. MissingDependencyError: websockets is not installed.
     """
-    check_installed(to)
+    check_websockets(to)
     server = server or Server()
     host, number = read_address(to, port)
     try:
@@ -189,7 +189,7 @@ def run_in_background(work: Coroutine[Any, Any, None]) -> Iterator[asyncio.Abstr
         thread.join(3 * CLOSE_S)
 
 
-def check_installed(to: str) -> None:
+def check_websockets(to: str) -> None:
     """Raise MissingDependencyError unless websockets is installed."""
     try:
         import websockets.asyncio.server  # noqa: F401

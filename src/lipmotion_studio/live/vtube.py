@@ -24,7 +24,7 @@ from lipmotion.live.face import LiveFrame
 from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import catch_errors, from_json
-from lipmotion_studio.live.servers import CLOSE_S, check_installed, run_in_background
+from lipmotion_studio.live.servers import CLOSE_S, check_websockets, run_in_background
 
 PORT = 8001
 PLUGIN = {"pluginName": "lipmotion", "pluginDeveloper": "lipmotion"}
@@ -110,7 +110,7 @@ class VTubeStudio:
                 finally:
                     try:
                         await connection.close()
-                    finally:  # where it is cancelled meanwhile
+                    finally:  # where it is cancelled before
                         connection.transport.abort()
             except (OSError, WebSocketException, TimeoutError, asyncio.TimeoutError, InputError):
                 if not was_warned:
@@ -180,7 +180,7 @@ def open_vtube(to: str, sound: LiveSound) -> Iterator[Consumer]:  # noqa: ARG001
 
     Raises InputError: no such address. MissingDependencyError: websockets is not installed.
     """
-    check_installed(to)
+    check_websockets(to)
     host, port = read_address(to, PORT)
     studio = VTubeStudio(f"ws://{f'[{host}]' if ':' in host else host}:{port}", find_cache() / "vtube-studio.token")
     with studio.connect():

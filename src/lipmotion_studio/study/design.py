@@ -158,7 +158,7 @@ def _animate_sentences(job: Job, made: dict[str, str]) -> Condition:
     return condition
 
 
-def encode_video(source: Path, target: Path, sound: Path, late_ms: float = 0.0) -> float:
+def encode_rated_video(source: Path, target: Path, sound: Path, late_ms: float = 0.0) -> float:
     """Write a video as raters see it (H.264, AAC), and return how long it lasts, in seconds.
 
     sound   : the recording whose sound a video without sound gets
@@ -229,7 +229,7 @@ def design_study(
             is_anchor = name == base and recording.stem in late
             for shown_as in (name, ANCHOR) if is_anchor else (name,):  # named by their content
                 late_ms, file = settings.anchor_ms if shown_as == ANCHOR else 0.0, folder / manifest.VIDEOS / "made.mp4"
-                seconds = encode_video(video, file, recording, late_ms)
+                seconds = encode_rated_video(video, file, recording, late_ms)
                 digest = hash_file(file)
                 file.replace(file.with_name(f"{digest[:32]}.mp4"))
                 about = made | ({"sound_late_ms": f"{late_ms:g}"} if late_ms else {})

@@ -27,19 +27,7 @@ SCHEMA_VERSION = 1
 MAX_RATERS = 100_000
 MAX_TOGETHER = 256  # most pieces of work that are committed together
 BUSY_S = 30.0  # how long another process, such as ``forget``, is waited for
-_SCHEMA = """
-CREATE TABLE study (manifest_sha256 TEXT NOT NULL);
-CREATE TABLE raters (number INTEGER PRIMARY KEY AUTOINCREMENT, token_sha256 TEXT NOT NULL UNIQUE);
-CREATE TABLE answers (
-  rater INTEGER NOT NULL REFERENCES raters (number) ON DELETE CASCADE,
-  trial INTEGER NOT NULL,
-  item INTEGER NOT NULL,
-  value TEXT NOT NULL,
-  seconds REAL NOT NULL,
-  plays INTEGER NOT NULL,
-  PRIMARY KEY (rater, trial, item)
-) WITHOUT ROWID;
-"""
+_SCHEMA = Path(__file__).with_name("answers.sql").read_text(encoding="ascii")
 _INSERT = """INSERT INTO answers SELECT :rater, :trial, :item, :value, :seconds, :plays
 WHERE EXISTS (SELECT 1 FROM raters WHERE number = :rater) ON CONFLICT DO NOTHING"""
 

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from lipmotion.cli.arguments.declared import add_input, add_output
+from lipmotion.cli.arguments.options import add_arguments
 from lipmotion.cli.terminal.printing import flush_output, print_line
 
 TOKEN_BYTES = 24
@@ -16,23 +16,7 @@ NAMES = ("127.0.0.1", "localhost")  # what browsers on this machine may call the
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("studio", help="see, edit, approve and export motion on a page of this machine")
-    source = "a recording, a folder or a list of recordings, or a project; NAME.studio: made if it is not there "
-    source += "(default: an empty project)"
-    add_input(parser, "source", what="recording", nargs="?", metavar="FILE|FOLDER|PROJECT", help=source)
-    project = "folder of a new project (default: beside the source, its name and .studio)"
-    add_output(parser, "-o", "--output", metavar="PROJECT", help=project)
-    model = "trained model of the project from now on (default: the one that ships with the package)"
-    add_input(parser, "--model", what="model", metavar="FILE", help=model)
-    character = "your own character, as a face of the project: FILE.glb .vrm .obj (repeatable)"
-    add_input(parser, "--character", what="character", action="append", default=[], metavar="FILE", help=character)
-    recordings = "folder of videos that a voice or a face can be made of on the page (docs/studio.md)"
-    add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=recordings)
-    face = "a filmed face, as a face of the project: FILE.face (repeatable)"
-    add_input(parser, "--face", what="face", action="append", default=[], metavar="FILE", help=face)
-    against = "another model, whose motion is compared with the project's on the page"
-    add_input(parser, "--against", what="model", metavar="FILE", help=against)
-    parser.add_argument("--port", type=int, default=0, help="0: any that is free (default: 0)")
-    parser.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
+    add_arguments(parser, __package__, "studio")
     parser.set_defaults(run=run)
 
 

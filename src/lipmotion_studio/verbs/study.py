@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli.arguments.declared import add_input, add_options, add_output, pick_part
-from lipmotion.cli.arguments.options import add_figures_arguments, add_machine_readable, report_figures
+from lipmotion.cli.arguments.declared import add_options, pick_part
+from lipmotion.cli.arguments.options import add_arguments, add_figures_arguments, add_machine_readable, report_figures
 from lipmotion.cli.terminal.printing import flush_output, print_line
 from lipmotion.printable import printable
 from lipmotion_studio.study.answers import MOS, PAIRED
@@ -27,47 +27,15 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     kinds = design.add_mutually_exclusive_group(required=True)
     for kind, meaning in KINDS.items():
         kinds.add_argument(f"--{kind}", dest="kind", action="store_const", const=kind, help=meaning)
-    source = "a model, a job file, or a folder of videos or motion; or 'recording' alone; once for each condition"
-    design.add_argument(
-        "--condition", action="append", required=True, default=[], metavar="NAME=SOURCE", help=source, dest="conditions"
-    )
-    recordings = "recordings, or folders of them; the names of the files are those of the sentences"
-    add_input(design, "--sentence", what="recording", nargs="+", required=True, metavar="FILE|FOLDER", help=recordings)
-    add_output(design, "-o", "--output", is_folder=True, required=True, metavar="STUDY")
+    add_arguments(design, __package__, "design")
     add_options(design, StudySettings)
     add_machine_readable(design)
     design.set_defaults(run=run_design)
-
-    serve = actions.add_parser("serve", help="show a study to raters as a web page, and store their answers")
-    add_input(serve, "study", what="study", metavar="STUDY")
-    host = "address to listen at (default: 127.0.0.1, which only this machine reaches; see docs/study.md)"
-    serve.add_argument("--host", default="127.0.0.1", help=host)
-    serve.add_argument("--port", type=int, default=8000, help="0: any that is free (default: 8000)")
-    name = "name by which raters reach the server through another one, as study.example.org; may be repeated"
-    serve.add_argument("--name", action="append", default=[], metavar="HOST", help=name)
-    serve.set_defaults(run=run_serve)
-
-    export = actions.add_parser("export", help="write the answers as CSV, one row for each judgement")
-    add_input(export, "study", what="study", metavar="STUDY")
-    add_output(export, "-o", "--output", required=True, metavar="FILE.csv")
-    export.add_argument("--rater", metavar="NAME", help="the answers of this rater alone, as r007 (default: all)")
-    export.set_defaults(run=run_export)
-
-    analyse = actions.add_parser("analyse", help="print what the answers of a study say, and how sure it is")
-    add_input(analyse, "answers", what="table of answers", metavar="ANSWERS.csv", help="of lipmotion study export")
-    relative = "condition to which improvement is relative (default: that with the lowest mean)"
-    analyse.add_argument("--baseline", metavar="CONDITION", help=relative)
-    planned = "probability with which a planned study shall tell a difference (default: 0.8)"
-    analyse.add_argument("--power", type=float, default=0.8, metavar="P", help=planned)
-    count = "sentences of a planned study (default: as many as in this one)"
-    analyse.add_argument("--sentences", type=int, metavar="N", help=count)
-    add_figures_arguments(analyse, lexicon=False)
-    analyse.set_defaults(run=run_analyse)
-
-    forget = actions.add_parser("forget", help="delete all answers of one rater")
-    add_input(forget, "study", what="study", metavar="STUDY")
-    forget.add_argument("rater", help="name of the rater in the exported answers, as r007")
-    forget.set_defaults(run=run_forget)
+    for name, (run, text) in ACTIONS.items():
+        action = actions.add_parser(name, help=text)
+        add_arguments(action, __package__, name)
+        action.set_defaults(run=run)
+    add_figures_arguments(actions.choices["analyse"], lexicon=False)
 
 
 def run_design(options: argparse.Namespace) -> None:
@@ -143,3 +111,12 @@ def run_forget(options: argparse.Namespace) -> None:
 
     count = forget_rater(options.study, options.rater)
     print_line(f"{options.rater}: {count} answers deleted; files that were exported before still have them")
+
+
+ACTIONS = {
+    "serve": (run_serve, "show a study to raters as a web page, and store their answers"),
+    "export": (run_export, "write the answers as CSV, one row for each judgement"),
+    "analyse": (run_analyse, "print what the answers of a study say, and how sure it is"),
+    "forget": (run_forget, "delete all answers of one rater"),
+}
+"""What each action runs, and does; its arguments stand in ``arguments.csv``."""

@@ -251,5 +251,5 @@ def test_what_is_left_of_the_seconds_may_be_less_than_a_frame(tmp_path):
 )
 def test_silence_is_no_sound(tmp_path, count, level, expected_s):
     wavfile.write(tmp_path / "a.wav", 16_000, np.full(count, 32_767 * level, np.int16))
-    found = build.read_sound(Take("a", tmp_path / "a.wav", VideoSpan(1.0, 3.0), "", "", ()))
+    found = build.read_take_sound(Take("a", tmp_path / "a.wav", VideoSpan(1.0, 3.0), "", "", ()))
     assert (0 if found is None else found.duration_s) == pytest.approx(expected_s)

@@ -383,18 +383,7 @@ def test_what_is_written_is_read_again(tmp_path):
     assert (found.named, found.sha256) == (file.named, "ab")
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("[]", "not a file of edits"),
-        ("{", "not a file of edits"),
-        ('{"format": "lipmotion.edits", "version": 9}', "edits of version 9, required 1"),
-        ('{"format": "lipmotion.edits", "version": 1, "stops": []}', "unknown member 'stops'"),
-        ('{"format": "lipmotion.edits", "version": 1, "steps": "lock"}', "required a list"),
-        ('{"format": "lipmotion.edits", "version": 1, "steps": ["jump"]}', "'jump' is no edit"),
-        ('{"format": "lipmotion.edits", "version": 1, "units": [{"phone": "p"}]}', "start_s"),
-    ],
-)
+@pytest.mark.parametrize(("text", "message"), SENTENCES["refused_files"])
 def test_files_that_are_refused(tmp_path, text, message):
     path = tmp_path / "a.json"
     path.write_text(text)

@@ -11,7 +11,7 @@ from lipmotion import errors, types
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.speech.voices import espeak
 from lipmotion.speech.voices.installed import find_voice, speak_sentences
-from lipmotion.speech.voices.inventory_phones import convert_phones, with_words
+from lipmotion.speech.voices.inventory_phones import assign_words, convert_phones
 from lipmotion.speech.voices.synthesiser import ARPABET_PHONES, ESPEAK_PHONES
 from lipmotion.types import Audio, Span, Timeline, languages
 from lipmotion.units import PHONES, Lexicon, is_silent
@@ -172,7 +172,7 @@ def test_unstressed_vowels_are_reduced_and_words_known() -> None:
     said = "b ah dh t er ih z ih t".split()  # dh: nobody's
     wanted = {"butter": "b ah dh t axr", "is": "ix z", "it": "ih t"}
     units = [types.Unit(phone, word=word) for word, phones in wanted.items() for phone in phones.split()]
-    assert with_words(said, [*wanted], LEXICON) == units
+    assert assign_words(said, [*wanted], LEXICON) == units
 
 
 def test_a_word_that_is_said_again_is_known_as_such() -> None:
@@ -180,7 +180,7 @@ def test_a_word_that_is_said_again_is_known_as_such() -> None:
         ("ih t ih z ix t", ["it", "is", "it"], [False] * 6),
         ("ih t ax t", ["it", "it"], [False, False, True, False]),
     ):
-        assert [unit.again for unit in with_words(phones.split(), words, LEXICON)] == again
+        assert [unit.again for unit in assign_words(phones.split(), words, LEXICON)] == again
 
 
 def test_pauses_are_named_by_place_and_length() -> None:

@@ -1,4 +1,4 @@
-"""Options that several verbs have, and figures that a verb computes."""
+"""Arguments of verbs from tables, options that several verbs have, and figures that a verb computes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lipmotion.cli.arguments.declared import add_options, add_output, is_pipe
+from lipmotion.cli.arguments.declared import add_input, add_options, add_output, is_pipe
 from lipmotion.cli.terminal.printing import print_line, print_lines
 from lipmotion.cli.terminal.progress import Report, describe_outcome, report_progress
 from lipmotion.errors import InputError, LipMotionError
@@ -18,6 +18,7 @@ from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
 from lipmotion.storage.files import atomic_file, check_target, create_folders
 from lipmotion.storage.json_text import as_json, replace_nan
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types.progress import Item, Monitor, sub_monitor
 
 if TYPE_CHECKING:
@@ -66,6 +67,46 @@ def numbers(text: str) -> list[int]:
         return [int(part) for part in text.split(",")]
     except ValueError as error:
         raise argparse.ArgumentTypeError(f"{text!r}; required: numbers with commas between them") from error
+
+
+KINDS: dict[str, dict[str, Any]] = {
+    "flag": {"action": "store_true"},
+    "off": {"action": "store_false"},
+    "optional": {"nargs": "?"},
+    "any": {"nargs": "*"},
+    "many": {"nargs": "+"},
+    "append": {"action": "append"},
+    "repeated": {"action": "append", "default": []},
+    "whole": {"type": int},
+    "number": {"type": float},
+    "numbers": {"type": numbers},
+    "word": {"type": str},
+    "text": {"type": str, "default": ""},
+    "names": {"type": lambda text: text.split(",")},
+    "systems": {"type": lambda text: text.split(";")},
+    **{name: {name: True} for name in ("required", "force", "keeps_work", "replaceable")},
+}
+"""Kinds of arguments in tables, and what they mean for ``add_argument``, ``add_input`` and ``add_output``."""
+
+
+def add_arguments(parser: argparse.ArgumentParser, package: str, verb: str) -> None:
+    """Add the arguments of a verb, as ``arguments.csv`` of a package lists them.
+
+    A row may say what input it names (``reads``, a noun), or that it names a file or a folder to be written. Its kind
+    has words of ``KINDS``, or the values that are allowed, as ``rest|natural``.
+    """
+    for row in read_shipped_table(package, "arguments.csv"):
+        if row["verb"] != verb:
+            continue
+        given: dict[str, Any] = {name: row[name] for name in ("metavar", "default", "dest", "help") if row[name]}
+        for kind in row["kind"].split():
+            given |= KINDS[kind] if kind in KINDS else {"choices": kind.split("|")}
+        if row["reads"]:
+            add_input(parser, *row["name"].split(), what=row["reads"], **given)
+        elif row["writes"]:
+            add_output(parser, *row["name"].split(), is_folder=row["writes"] == "folder", **given)
+        else:
+            parser.add_argument(*row["name"].split(), **given)
 
 
 Figures = dict[str, Any]

@@ -95,7 +95,7 @@ class _MachineReport(Report):
 
 @contextmanager
 def report_progress(options: argparse.Namespace) -> Iterator[Report]:
-    """Yield the report of a command; meanwhile the package's warnings go to it, too."""
+    """Yield the report of a command, to which the package's warnings go, too."""
     report = (_MachineReport if options.machine_readable else Report)(options)
     with warnings_to(report.warn, propagate=False), closing(report):
         yield report

@@ -10,8 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from lipmotion.cli.arguments.declared import add_input, add_output
-from lipmotion.cli.arguments.options import add_machine_readable
+from lipmotion.cli.arguments.options import add_arguments, add_machine_readable
 from lipmotion.cli.terminal.printing import print_line, print_lines
 from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.errors import InputError, LipMotionError
@@ -71,8 +70,7 @@ OF_PRIOR = ("engine", "corpus", "split", "utterances", "minutes", "licence", "at
 def add_addon(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb that writes the add-on for another program, as a file that it installs."""
     parser = verbs.add_parser("addon", help="write the add-on for Blender, which keys characters from motion files")
-    parser.add_argument("program", metavar="PROGRAM", help="blender")
-    add_output(parser, "-o", "--output", type=Path, required=True, metavar="FILE.zip", help="the file to install")
+    add_arguments(parser, __package__, "addon")
     parser.set_defaults(run=_run_addon)
 
 
@@ -86,8 +84,7 @@ def _run_addon(options: argparse.Namespace) -> None:
 def add_cite(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb that prints what to cite, as BibTeX."""
     parser = verbs.add_parser("cite", help="print what to cite, as BibTeX: lipmotion, an engine's papers, a corpus")
-    what = "a model file, an engine, or a citation key; default: the model that ships with the package"
-    parser.add_argument("name", nargs="?", metavar="NAME", help=what)
+    add_arguments(parser, __package__, "cite")
     parser.set_defaults(run=_run_cite)
 
 
@@ -164,8 +161,7 @@ def _run_doctor(options: argparse.Namespace) -> None:
 def add_info(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb that prints the header of a model, or its decision trees."""
     parser = verbs.add_parser("info", help="print what a model is, and whose recordings it was trained on")
-    add_input(parser, "model", what="model", nargs="?", help="default: the model that ships with the package")
-    parser.add_argument("--structure", action="store_true", help="print only its decision trees")
+    add_arguments(parser, __package__, "info")
     parser.set_defaults(run=run_info)
 
 

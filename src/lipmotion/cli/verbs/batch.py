@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from lipmotion.cli.arguments.declared import add_detail, add_input, add_job_file, add_options, add_output, pick_part
-from lipmotion.cli.arguments.options import add_machine_readable
+from lipmotion.cli.arguments.declared import add_detail, add_job_file, add_options, pick_part
+from lipmotion.cli.arguments.options import add_arguments, add_machine_readable
 from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Outputs, Request
@@ -18,17 +18,9 @@ from lipmotion.types.progress import Item
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("batch", help="turn thousands of recordings into lip motion, with a report")
-    listed = "a folder of recordings, or a list: a path a line, or a table with columns file,transcript,output,speaker"
-    add_input(parser, "source", what="list or folder of recordings", metavar="LIST|DIR", help=listed)
-    add_output(parser, "--out", is_folder=True, metavar="DIR", help="folder of the outputs")
-    checked = "only compare the recordings with their script: missing, silent, of the wrong length, twice there ..."
-    parser.add_argument("--check", action="store_true", help=checked)
+    add_arguments(parser, __package__, "batch")
     kinds = "what animate writes (json csv glb mp4 ...) and cues.tsv .xml .json .dat .pgo .spine.json (default: json)"
     add_options(parser, Outputs, "kinds", kinds={"help": kinds})
-    marked = "approved lines and those to be done again, as the report saves them (default: DIR/marks.csv)"
-    add_input(parser, "--marks", what="file of marks (no option needed there)", metavar="FILE.csv", help=marked)
-    parser.add_argument("--jobs", type=int, metavar="N", help="number of processes (default: one per core)")
-    parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler, as tcp://HOST:8786")
     add_options(parser, Request, "recogniser", "model", "lexicon", "language", "speaker", "pauses", "asymmetry")
     changed: dict[str, Any] = {
         "rate_hz": {"help": "rate of motion files (default: --fps, or 100)"},

@@ -45,11 +45,11 @@ def _dialogue(path: str) -> str | None:
 
 def _find_words(recording: Path) -> list[Source]:
     """Return the words beside a recording, which outputs replace by --force only; none: they are cues of it."""
-    beside = recording.parent / f"{recording.stem}.txt"
-    if not is_file(beside):
+    sibling = recording.parent / f"{recording.stem}.txt"
+    if not is_file(sibling):
         return []
-    with beside.open("rb") as file:
-        return [] if SHEET.match(file.read(64)) else [Source(beside, "transcript", replaceable=True)]
+    with sibling.open("rb") as file:
+        return [] if SHEET.match(file.read(64)) else [Source(sibling, "transcript", replaceable=True)]
 
 
 def _name_file(text: str) -> Path:

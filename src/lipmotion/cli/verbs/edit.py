@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli.arguments.declared import add_input, add_options, add_output, pick_part
-from lipmotion.cli.arguments.options import add_machine_readable
+from lipmotion.cli.arguments.declared import add_options, pick_part
+from lipmotion.cli.arguments.options import add_arguments, add_machine_readable
 from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Request
@@ -15,14 +15,9 @@ from lipmotion.printable import printable
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("edit", help="change words, phones, curves of a recording's motion, in a file of edits")
-    add_output(parser, "file", metavar="FILE", help="file of edits, .json")
-    sentence = "'phone 12 ends 1.24', 'word 3 is blue', 'pin jawOpen 0.1 at 1.2', ... (docs/edit.md)"
-    parser.add_argument("sentences", nargs="*", metavar="EDIT", help=sentence)
-    add_input(parser, "--of", what="recording", metavar="RECORDING", help="begin a file of edits of this recording")
+    add_arguments(parser, __package__, "edit")
     known = ("transcript", "lexicon", "language", "model", "recogniser", "speaker", "pauses", "manner", "asymmetry")
     add_options(parser, Request, *known)
-    parser.add_argument("--undo", type=int, default=0, metavar="N", help="take back the last N edits first")
-    parser.add_argument("--list", action="store_true", help="print the edits, and the phones with their numbers")
     add_machine_readable(parser)
     parser.set_defaults(run=run)
 

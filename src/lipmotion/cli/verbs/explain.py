@@ -7,23 +7,17 @@ from dataclasses import asdict
 from typing import Any
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output, pick_part
-from lipmotion.cli.arguments.options import add_execution, count_workers
+from lipmotion.cli.arguments.options import add_arguments, add_execution, count_workers
 from lipmotion.cli.terminal.printing import print_json, print_lines
 from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.pipeline.request import Request
-
-RUNS = 2000
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("explain", help="print which states and Gaussians the motion of a frame comes from")
     add_options(parser, Request, but=("edits",))
-    times = "time of a frame (repeatable; default: list the states of the whole recording)"
-    parser.add_argument("--at", type=float, action="append", metavar="SECONDS", help=times)
-    most = f"without --at: print at most N lines (default: {RUNS})"
-    parser.add_argument("--count", type=int, default=RUNS, metavar="N", help=most)
-    parser.add_argument("--json", action="store_true", help="print one JSON object per time, with all channels, or run")
+    add_arguments(parser, __package__, "explain")
     parser.set_defaults(run=run)
 
 

@@ -11,7 +11,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from lipmotion.cli.arguments.declared import add_input
+from lipmotion.cli.arguments.options import add_arguments
 from lipmotion.cli.terminal.printing import flush_output, print_line
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.storage.sources import is_recording
@@ -22,23 +22,9 @@ CHUNK_S = 0.02  # sound is taken in pieces of so many seconds
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("live", help="move a mouth while somebody speaks: a microphone, a pipe, a file")
-    add = parser.add_argument
-    text = "a microphone by name or number (default: the usual one), a sound file, or - for raw sound of 16 bits"
-    add("-i", "--input", default="", metavar="DEVICE|FILE|-", help=text)
-    add("input", nargs="?", default=argparse.SUPPRESS, metavar="DEVICE|FILE|-", help="the same")
-    text = "what takes the frames, perhaps several (default: -, JSON lines); vmc:HOST:PORT, the others alike"
-    metavar = "-|FILE.csv|window|vmc|osc|livelink|vtube|websocket|talkinghead"
-    add("--to", action="append", metavar=metavar, help=text)
-    text = "how late a frame may be known, 0 to 640; more is better (default: 160)"
-    add("--look-ahead", type=float, default=160.0, metavar="MS", help=text)
-    add("--rate", type=int, default=16_000, metavar="HZ", help="of sound on standard input (default: 16000)")
-    add("--model", help="a trained model (default: the one that ships)")
-    text = "lips close in pauses (default), or stay as people's"
-    add("--pauses", choices=("rest", "natural"), default="rest", help=text)
-    text = "a character, or a rig's table (.csv), whose own curves the frames have, too"
-    add_input(parser, "--character", what="character", type=Path, metavar="FILE", help=text)
-    add("--still", action="store_true", help="only the mouth moves: no blinks, glances, brows, head")
-    add("--as-fast-as-possible", action="store_true", help="do not wait for a file's own time")
+    add_arguments(parser, __package__, "live")
+    again: dict[str, Any] = {"nargs": "?", "default": argparse.SUPPRESS, "metavar": "DEVICE|FILE|-"}
+    parser.add_argument("input", help="the same", **again)
     parser.set_defaults(run=run)
 
 

@@ -7,12 +7,12 @@ import logging
 from dataclasses import replace
 from pathlib import Path
 
-from lipmotion.cli.arguments.declared import add_input, add_options, add_outputs, add_pipe_format, pick_part, write_pipe
-from lipmotion.cli.arguments.options import add_machine_readable
+from lipmotion.cli.arguments.declared import add_options, add_outputs, add_pipe_format, pick_part, write_pipe
+from lipmotion.cli.arguments.options import add_arguments, add_machine_readable
 from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.errors import InputError
 from lipmotion.extensions import load_provided
-from lipmotion.pipeline.job import Job, check_outputs, open_face, write_outputs
+from lipmotion.pipeline.job import Job, check_outputs, open_face, write_job_outputs
 from lipmotion.pipeline.job import run as run_job
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
@@ -25,12 +25,7 @@ SILENT_HZ = 16_000  # rate of the silence of videos without a sound
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("render", help="draw edited or imported motion, or write it in another form")
-    motion = "motion file: .json .csv .npz, or another that can be read; or edits (docs/edit.md)"
-    add_input(parser, "motion", what="motion file", replaceable=True, help=motion)
-    sound = "the sound of videos (default: the one that a .glb names; without one the video is silent)"
-    add_input(parser, "--sound", what="recording", metavar="FILE", help=sound)
-    rate = "frames a second of the motion, where its file says none (.dat, else 24), or counts 29.97 as 30"
-    parser.add_argument("--motion-rate", type=float, metavar="HZ", help=rate)
+    add_arguments(parser, __package__, "render")
     phones = "phones in time for motion without them: they move tongue and lips where the channels do not"
     add_options(parser, Request, "units", units={"help": phones})
     add_outputs(parser, "FILE.mp4 .webm .mov %%05d.png .json .csv .npz .TextGrid .vtt, ... (docs/formats.md)")
@@ -74,7 +69,7 @@ def run(options: argparse.Namespace) -> None:
                 elif any(output.draws for output in planned):
                     samples = round(float(generation.motion.time_s[-1]) * SILENT_HZ)
                     sound = Audio(np.zeros(samples, np.float32), SILENT_HZ)
-                write_outputs(job, face, generation, sound, monitor=report.receive)
+                write_job_outputs(job, face, generation, sound, monitor=report.receive)
         written = [] if pipe else list(files)
         report.finish("\n".join(map(printable, written)), files=written)
 

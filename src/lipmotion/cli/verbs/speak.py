@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from lipmotion.cli.arguments.declared import add_input, add_options, add_outputs, pick_part
-from lipmotion.cli.arguments.options import add_machine_readable
+from lipmotion.cli.arguments.declared import add_options, add_outputs, pick_part
+from lipmotion.cli.arguments.options import add_arguments, add_machine_readable
 from lipmotion.cli.terminal.progress import Report, report_progress
-from lipmotion.pipeline.job import Job, check_outputs, open_face, write_outputs
+from lipmotion.pipeline.job import Job, check_outputs, open_face, write_job_outputs
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
 from lipmotion.storage.sources import is_file, read_text_file
@@ -17,12 +17,7 @@ from lipmotion.storage.sources import is_file, read_text_file
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("speak", help="turn text into speech, and into lip motion or an animated face")
-    parser.add_argument("words", nargs="?", metavar="TEXT", help="what to say")
-    add_input(parser, "--text", what="text", replaceable=True, metavar="FILE", help="what to say, as a UTF-8 text file")
-    named = "as flite:slt, espeak-ng:de, its name alone, or corpus (default: espeak-ng:en-us+f2)"
-    parser.add_argument("--voice", metavar="NAME", help=named)
-    add_input(parser, "--corpus", what="corpus", metavar="FOLDER", help="whose recordings speak, for --voice corpus")
-    parser.add_argument("--voices", action="store_true", help="list the installed voices")
+    add_arguments(parser, __package__, "speak")
     add_options(parser, Request, "lexicon", "model", "speaker", "onto", "onto_speaker", "pauses", "asymmetry")
     suffixes = "FILE.mp4 .webm .mov %%05d.png .wav .flac .ogg .json .csv .npz .TextGrid .vtt, ... (docs/formats.md)"
     add_outputs(parser, suffixes, required=False)
@@ -75,5 +70,5 @@ def _speak(options: argparse.Namespace, report: Report) -> None:
         pauses=request.pauses,
         asymmetry=request.asymmetry,
     )
-    write_outputs(job, face, result, sound, model=model, monitor=report.receive)
+    write_job_outputs(job, face, result, sound, model=model, monitor=report.receive)
     report.finish("\n".join(map(printable, options.output)), files=options.output, seconds=round(sound.duration_s, 3))

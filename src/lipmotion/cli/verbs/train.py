@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
-from lipmotion.cli.arguments.declared import add_input, add_options, add_output
-from lipmotion.cli.arguments.options import add_machine_readable, count_workers, list_or_all
+from lipmotion.cli.arguments.declared import add_options
+from lipmotion.cli.arguments.options import add_arguments, add_machine_readable, count_workers, list_or_all
 from lipmotion.cli.terminal.printing import print_line
 from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Request
 from lipmotion.storage.files import check_target
 
-FROM = "stand on this model (default: the one that ships), or 'none' (docs/own-model.md)"
 NONE = "none"
-ENGINE = "trajectory (default), coupled (chains of states), joint (one model, five streams) or selection (recordings)"
-PRESET = (
-    "a system of a paper, which names its engine: hofer2008, minnis2000, xieliu2007, or also, or instead, one of the "
-    "last one's six, ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM, ph-vi-CHMM"
-)
-VISUAL = "geometry (default), eigenlips (default of xieliu2007 and its systems) or both"
-UNITS = "modelled units: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
 WORKERS = "number of processes (default: one per core), or a Dask scheduler (docs/long-work.md)"
-OTHERS = "also train on transcribed recordings without motion (coupled)"
 
 
 def count_or_address(text: str) -> int | str:
@@ -34,21 +24,8 @@ def count_or_address(text: str) -> int | str:
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("train", help="train a model on a prepared corpus; run it again to go on after a stop")
-    add_input(parser, "corpus", what="corpus")
-    add_output(parser, "-o", "--output", force=True, keeps_work=True, required=True, metavar="MODEL")
-    parser.add_argument("--split", default="train", help="train, val, test or all (default: train)")
-    parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="only this speaker (repeatable)")
+    add_arguments(parser, __package__, "train")
     add_options(parser, Request, "lexicon")
-    parser.add_argument("--engine", help=ENGINE)
-    parser.add_argument("--preset", "--system", action="append", metavar="NAME", help=PRESET)
-    add_input(parser, "--units", what="table of units", replaceable=True, type=str, metavar="SET", help=UNITS)
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="engine option (repeatable)")
-    parser.add_argument("--visual", metavar="KIND", help=VISUAL)
-    parser.add_argument("--voices", action="store_true", help="also train on synthetic voices (coupled)")
-    add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=OTHERS)
-    add_input(
-        parser, "--from", what="model to start from", dest="start", default="", type=str, metavar="MODEL", help=FROM
-    )
     parser.add_argument("--workers", type=count_or_address, metavar="N|tcp://HOST:PORT", help=WORKERS)
     add_machine_readable(parser)
     parser.set_defaults(run=run)
@@ -99,10 +76,8 @@ def run(options: argparse.Namespace) -> None:
 def add_adapt(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("adapt", help="adapt a model to a voice, from recordings without transcripts")
-    recordings: dict[str, Any] = {"nargs": "+", "metavar": "RECORDING", "help": "audio or video of this voice"}
-    add_input(parser, "recordings", what="recording", **recordings)
+    add_arguments(parser, __package__, "adapt")
     add_options(parser, Request, "model")
-    add_output(parser, "-o", "--output", force=True, required=True, metavar="MODEL")
     parser.set_defaults(run=run_adapt)
 
 

@@ -165,7 +165,7 @@ VISUAL_REGRESSION = {
 
 def _transitions(arrays: Arrays, structure: Structure) -> Transitions | FactorialTransitions:
     of_chains = [select_arrays(arrays, f"chain_{number}/") for number in range(len(structure.chains))]
-    chains = [check_arrays(own, CHAIN, U=len(units)) for own, units in zip(of_chains, structure.units, strict=True)]
+    chains = [check_arrays(each, CHAIN, U=len(units)) for each, units in zip(of_chains, structure.units, strict=True)]
     for chain in chains:
         check_sums_to_one("first", chain["first"].sum(keepdims=True))
         check_sums_to_one("bigram", chain["bigram"].sum(axis=1))
@@ -180,7 +180,7 @@ def _transitions(arrays: Arrays, structure: Structure) -> Transitions | Factoria
             check_index(f"pairs of chain {number}", own_density_states[:, number], count)
         return FactorialTransitions(FactorialProduct(structure, grammar), (first, second), own_density_states)
     product = find_reachable(structure, grammar)
-    rows = tuple(check_arrays(own, ROWS, J=len(product.joint_states))["rows"] for own in of_chains)
+    rows = tuple(check_arrays(each, ROWS, J=len(product.joint_states))["rows"] for each in of_chains)
     for number, row in enumerate(rows):
         blocks = 1 << number if structure.moves_together else 1
         if len(advance[number]) % blocks:
@@ -229,7 +229,7 @@ def _regression(
     for number, stream in enumerate(visual):
         count = structure.state_counts[structure.chain_of(number + 1)]
         sizes = {"N": count, "F": checked.sizes["F"] + 1, "D": len(stream.mean)}
-        own = check_arrays(select_arrays(arrays, f"following_{number}/"), VISUAL_REGRESSION, **sizes)
-        check_index(f"following_{number}/kind", own["kind"], own.sizes["E"])
-        regressions.append(VisualRegression(own["kind"], own["coefficients"], own["variances"]))
+        stored = check_arrays(select_arrays(arrays, f"following_{number}/"), VISUAL_REGRESSION, **sizes)
+        check_index(f"following_{number}/kind", stored["kind"], stored.sizes["E"])
+        regressions.append(VisualRegression(stored["kind"], stored["coefficients"], stored["variances"]))
     return inputs, tuple(regressions)

@@ -67,15 +67,15 @@ def explain_frames(
 
 def list_chain_states(chains: Chains, posteriors: LatticePosteriors, row: int) -> tuple[ChainStates, ...]:
     """Return the most probable states of each chain in a frame, and the probabilities of its asynchrony."""
-    found = []
+    ranked_chains = []
     for number, units in enumerate(infer_units(chains, posteriors, slice(None))):
         probability = posteriors.chains[number][row]
         best = np.argsort(-probability, kind="stable")[:MAX_STATES].tolist()
         named = [NamedProbability(chains.structure.state_name(number, i), float(probability[i])) for i in best]
         ranked = (named[0], *(state for state in named[1:] if state.probability >= MIN_PROBABILITY))
         ahead = dict(zip(units.leads, units.lead[row].tolist(), strict=True))
-        found.append(ChainStates(units.name, ranked, ahead))
-    return tuple(found)
+        ranked_chains.append(ChainStates(units.name, ranked, ahead))
+    return tuple(ranked_chains)
 
 
 def find_joint_state(chains: Chains, posteriors: LatticePosteriors, row: int) -> NamedProbability | None:
@@ -90,7 +90,7 @@ def find_joint_state(chains: Chains, posteriors: LatticePosteriors, row: int) ->
 
 def infer_units(chains: Chains, posteriors: LatticePosteriors, frames: slice) -> list[ChainPosteriors]:
     """Return the posteriors of the units of each chain, and of its leads over the first chain, in some frames."""
-    structure, product, found = chains.structure, chains.transitions.product, []
+    structure, product, by_chain = chains.structure, chains.transitions.product, []
     for chain, units in enumerate(structure.units):
         probability = posteriors.chains[chain][frames].reshape(-1, len(units), structure.states).sum(axis=2)
         leads = () if structure.limit is None or chain == 0 else range(-structure.limit, structure.limit + 1)
@@ -99,8 +99,8 @@ def infer_units(chains: Chains, posteriors: LatticePosteriors, frames: slice) ->
             states, of_states = posteriors.joint
             ahead = product.lead[chain][states, None] == np.array(leads, np.intp)
             lead = (of_states @ ahead.astype(np.float32))[frames]
-        found.append(ChainPosteriors(structure.chains[chain].name, units, probability, tuple(leads), lead))
-    return found
+        by_chain.append(ChainPosteriors(structure.chains[chain].name, units, probability, tuple(leads), lead))
+    return by_chain
 
 
 def _find_dominant_gaussian(model: CoupledModel, inference: Inference, row: int, stream: int) -> DominantGaussian:

@@ -99,11 +99,11 @@ def recogniser_to_arrays(recogniser: OwnPhoneRecogniser) -> dict[str, NDArray[An
 
 def recogniser_from_arrays(arrays: Arrays) -> OwnPhoneRecogniser | None:
     """Deserialise a recogniser; None: there is none. Raises ModelFormatError, KeyError, ValueError: a wrong array."""
-    own = select_arrays(arrays, JOINT_PREFIX)
-    if not own:
+    joint = select_arrays(arrays, JOINT_PREFIX)
+    if not joint:
         return None
-    (score,) = check_arrays(own, SCORE)["typical"].tolist()
-    hmm = joint_from_arrays({name: array for name, array in own.items() if name not in SCORE}, CONFIG)
+    (score,) = check_arrays(joint, SCORE)["typical"].tolist()
+    hmm = joint_from_arrays({name: array for name, array in joint.items() if name not in SCORE}, CONFIG)
     if set(hmm.inventory.names) != set(PHONES.units):
         raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(PHONES.units)}")
     return OwnPhoneRecogniser(hmm, score)

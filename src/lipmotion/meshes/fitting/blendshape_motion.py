@@ -192,7 +192,7 @@ def with_mouth(motion: Motion) -> Motion:
 def arkit_weights(motion: Motion) -> dict[str, Array]:
     """Return the curves of a motion that are blendshapes, by ARKit's names, 0 to 1 [each shape=(T,)].
 
-    Names are understood as files spell them; of two spellings of one, the first. Blendshapes of other sets are
+    Names are known in the spellings of files; of two spellings of one, the first. Blendshapes of other sets are
     converted (``convert_to_arkit``).
     """
     weights: dict[str, Array] = {}

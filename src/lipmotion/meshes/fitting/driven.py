@@ -56,7 +56,7 @@ def make_plain_row(control: str, source: str) -> RigRow:
     return RigRow(control, source, low=0.0, high=1.0)
 
 
-def list_rows(mesh: Mesh, shapes: FaceShapes | None, others: Mapping[str, str]) -> Iterator[RigRow]:
+def list_rig_rows(mesh: Mesh, shapes: FaceShapes | None, others: Mapping[str, str]) -> Iterator[RigRow]:
     """Yield a row that changes nothing for every blendshape of a mesh: its curve, or an empty source."""
     for shape in mesh.shapes:
         solved = None if shapes is None else _find_solved_name(shape, shapes)
@@ -101,7 +101,7 @@ class DrivenCharacter:
         known = {shape.name: shape.called.lower() for shape in self.mesh.shapes}
         others = {name: called for name, called in known.items() if called in VRM_EMOTIONS}
         others |= {row.control: row.source for row in self.other_rows}
-        return tuple(self.table.get(row.control, row) for row in list_rows(self.mesh, self.shapes, others))
+        return tuple(self.table.get(row.control, row) for row in list_rig_rows(self.mesh, self.shapes, others))
 
     @cached_property
     def mouth_rows(self) -> tuple[tuple[RigRow, ...], Array]:

@@ -211,10 +211,10 @@ def fit_bounded_curves(
     square = matrix @ matrix.T + costs.ridge * np.eye(len(matrix))
     if ties is not None:
         square = square + ties.T @ ties
-    own = np.sqrt(np.diag(square))
+    norms = np.sqrt(np.diag(square))
     if opposed is not None:
-        square = np.where(opposed, OPPOSITION * np.outer(own, own), square)
-    scale = np.sqrt(own**2 + 6 * costs.smooth)  # with that of the second differences: shapes that move little converge
+        square = np.where(opposed, OPPOSITION * np.outer(norms, norms), square)
+    scale = np.sqrt(norms**2 + 6 * costs.smooth)  # with the second differences: shapes that move little converge
     wanted = targets @ matrix.T / scale
     square = square / np.outer(scale, scale)
     smooth, low, high = costs.smooth / scale**2, limits[0] * scale, limits[1] * scale

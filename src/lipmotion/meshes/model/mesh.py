@@ -117,7 +117,7 @@ class Blendshape:
 
     @property
     def called(self) -> str:
-        """The name by which it is understood: that of its source, or its own."""
+        """The name by which it is known: that of its source, or its own."""
         return self.name if self.source is None else self.source
 
     @classmethod

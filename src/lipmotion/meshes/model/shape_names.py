@@ -61,7 +61,7 @@ def find_spoken_name(name: str) -> str | None:
 
 
 def is_known(name: str) -> bool:
-    """Return whether a blendshape has a name that is understood."""
+    """Return whether a blendshape has a known name."""
     return to_arkit(name) is not None or find_viseme(name) is not None or find_vowel(name) is not None
 
 
@@ -91,7 +91,7 @@ def convert_to_arkit(motion: Motion) -> dict[str, Array]:
     """Return the weights of ARKit's blendshapes that those of another set in a motion stand for [each shape=(T,)].
 
     The sets are FACEGOOD's, Audio2Face's, visemes and vowels; of several the first that opens the jaw. Names of
-    visemes and vowels are understood as files spell them. Empty: there is none.
+    visemes and vowels are known in the spellings of files. Empty: there is none.
     """
     named = {name: name for name in motion.names}
     for name in motion.names:

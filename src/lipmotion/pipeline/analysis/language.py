@@ -105,7 +105,7 @@ def warn_of_another_language(recognition: Recognition) -> None:
     """Log a warning where English words were recognised in what is hardly English."""
     confidence = weigh_words(recognition)
     if recognition.word_s >= MIN_TOLD_S and confidence < MIN_CONFIDENCE:
-        unsure = f"the words are hardly understood (confidence {confidence:.2f}, required {MIN_CONFIDENCE:.1f})"
+        unsure = f"the words are hardly recognised (confidence {confidence:.2f}, required {MIN_CONFIDENCE:.1f})"
         LOG.warning("%s: give their --language, if it is not English, or the words (--transcript)", unsure)
 
 

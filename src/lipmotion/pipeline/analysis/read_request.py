@@ -140,15 +140,14 @@ def read_units(path: str | Path, tier: str = "", speaker: str = "") -> Timeline[
     tier, speaker : of labels, which tier and whose phones (``read_phones``)
     Raises InputError: no such file, not one of these, or without phones.
     """
-    from lipmotion.formats.base import find_suffix
-    from lipmotion.formats.base import read_units as read_units_of_motion
+    from lipmotion.formats.base import find_suffix, read_motion_units
     from lipmotion.formats.label_files import holds_timings, read_phones
 
     path = Path(path)
     check_kind(path, "motion file", "units file")
     is_label = path.suffix.lower() in LABEL_SUFFIXES
     if find_suffix(path) and not (is_label and holds_timings(path)):
-        return read_units_of_motion(path)
+        return read_motion_units(path)
     if is_label:
         return read_phones(path, tier, speaker)
     required = "use one of .json, .npz, .TextGrid, .eaf, .lab, .txt, .jsonl, .marks"

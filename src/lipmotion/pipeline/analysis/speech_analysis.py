@@ -144,25 +144,25 @@ def analyse_speech(
     if recognition is not None and request.language == ENGLISH:
         warn_of_another_language(recognition)
     is_given = request.units is not None or analysis.fit is not None
-    speech = with_voice(model.phones, audio, speech, recognition, given=is_given)
+    speech = with_voice(model.phones, audio, speech, recognition, phones_given=is_given)
     return replace(analysis, speech=with_prior(model.prior, speech))
 
 
 def with_voice(
-    phones: UnitHmm, audio: Audio, speech: Speech, recognition: Recognition | None, *, given: bool = False
+    phones: UnitHmm, audio: Audio, speech: Speech, recognition: Recognition | None, *, phones_given: bool = False
 ) -> Speech:
     """Return speech that says how well a model knows its voice, 0 to 1, that of the recording and of each passage.
 
-    phones      : the model's own phone models
-    recognition : of the speech; None: words or phones were given, or the engine recognised the speaker
-    given       : whether the phones in time were given
+    phones       : the model's own phone models
+    recognition  : of the speech; None: words or phones were given, or the engine recognised the speaker
+    phones_given : whether the phones in time were given
     It is 1 where the engine recognised the speaker, and for silence.
     """
-    by_engine, parts = recognition is None and not given and not speech.units_known, speech.parts
+    by_engine, parts = recognition is None and not phones_given and not speech.units_known, speech.parts
     voice = 1.0 if by_engine or not speech.features.values.any() else rate_knowledge(phones, analysed(audio))
     if parts is not None:
         sounds = {passage.first: analysed(passage.audio) for passage in analysed(audio).passages}
-        is_recognised = not given and not speech.units_known
+        is_recognised = not phones_given and not speech.units_known
         parts = tuple(
             part
             if is_recognised and part.speech.voice == 1
@@ -429,10 +429,10 @@ def _complete_units(
     """Return the given phones, unknown ones aligned with their word or recognised, and where they are recognised."""
     from lipmotion.pipeline.analysis.transcribe import format_places
 
-    given = cast("Timeline[Unit]", request.units)  # of ``read_request``
-    _check_units(given, audio.duration_s)
+    requested = cast("Timeline[Unit]", request.units)  # of ``read_request``
+    _check_units(requested, audio.duration_s)
     spans, aligned, guessed = list[Span[Unit]](), list[str](), list[tuple[float, float]]()
-    for span in (_name_phone(span) for span in given if span.start_s < audio.duration_s):
+    for span in (_name_phone(span) for span in requested if span.start_s < audio.duration_s):
         end_s = min(span.end_s, audio.duration_s)
         if span.label.phone or span.label.unit != UNKNOWN_PHONES:
             spans.append(replace(span, end_s=end_s) if span.end_s > audio.duration_s + LATE_S else span)

@@ -15,7 +15,7 @@ from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import list_suffixes
 from lipmotion.storage.files import make_portable
 from lipmotion.storage.sources import check_listable, is_recording, read_text_file
-from lipmotion.storage.text_table import read_table
+from lipmotion.storage.text_table import parse_text_table
 
 LOG = logging.getLogger("lipmotion")
 FILE_COLUMNS = ("file", "path", "recording", "audio", "wav")
@@ -157,7 +157,7 @@ def _check_count(source: Path, count: int) -> None:
 def _read_table(source: Path, text: str) -> list[dict[str, str]] | None:
     """Return the rows of a table with a header by the names of its columns; None: it has no header."""
     try:
-        table = read_table(io.StringIO(text, newline=""))
+        table = parse_text_table(io.StringIO(text, newline=""))
         header = [name.lower() for name in table.names]
         file = next((name for name in header if name in FILE_COLUMNS), None)
         if file is None:

@@ -48,7 +48,7 @@ from lipmotion.pipeline.batch.ledger import (
 from lipmotion.pipeline.batch.lines import MAX_NAMED_LINES, BatchLine, check_names, read_lines
 from lipmotion.pipeline.batch.report import APPROVE, MARKS, REDO, Mark, is_due, read_marks, write_marks, write_reports
 from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.job import Job, check_outputs, open_face, run, write_outputs
+from lipmotion.pipeline.job import Job, check_outputs, open_face, run, write_job_outputs
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.output import ShownFace
 from lipmotion.pipeline.request import Request
@@ -256,7 +256,7 @@ def check_line_job(job: Job, of_run: str) -> None:
     with open_temporary() as folder:
         files = tuple(str(folder / f"line.{kind}") for kind in kinds)
         early = replace(job, delivery=replace(job.delivery, offset_ms=0.0), outputs=replace(job.outputs, files=files))
-        write_outputs(early, face, animate(request, model=model), silence)
+        write_job_outputs(early, face, animate(request, model=model), silence)
 
 
 @contextmanager
@@ -350,12 +350,12 @@ def batch(
             raise ExportError(f"{place.out}: holds the recording {line.recording}; give another folder for the outputs")
     marks_file = Path(place.out) / MARKS
     earlier = read_marks(marks_file) if marks_file.is_file() else {}
-    later = read_marks(Path(marks)) if marks is not None else {}
+    new_marks = read_marks(Path(marks)) if marks is not None else {}
     names = {line.name for line in lines}
-    if unknown := [name for name in later if name not in names]:
+    if unknown := [name for name in new_marks if name not in names]:
         some = shorten_list(unknown, MAX_NAMED_LINES)
         LOG.warning("%s: %d marks of lines that are not in this batch: %s", marks, len(unknown), some)
-    chosen = {name: mark for name, mark in (earlier | later).items() if mark.kind}  # the others were taken back
+    chosen = {name: mark for name, mark in (earlier | new_marks).items() if mark.kind}  # the others were taken back
     check_line_job(job, place.run)
     of_settings = fingerprint_job(job)
     with open_ledger(place, lines) as ledger:

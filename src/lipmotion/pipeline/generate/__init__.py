@@ -1,1 +1,1 @@
-"""Understood speech, or text, to motion."""
+"""Analysed speech, or text, to motion."""

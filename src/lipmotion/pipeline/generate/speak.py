@@ -70,9 +70,9 @@ def speak_from_corpus(
         name: np.asarray(utterance.features.values)[:, :FEATURES] for name, utterance in utterances.items()
     }
     stand_ins = engine.stand_ins(model.learned)
-    absent = dict.fromkeys(span.label.phone for span in target if span.label.phone in stand_ins)
-    if absent:
-        instead = ", ".join(f"{phone} ({stand_ins[phone]})" for phone in absent)
+    replaced = dict.fromkeys(span.label.phone for span in target if span.label.phone in stand_ins)
+    if replaced:
+        instead = ", ".join(f"{phone} ({stand_ins[phone]})" for phone in replaced)
         LOG.warning("phones without recordings, and what is said instead: %s; see lipmotion corpus coverage", instead)
     pieces, units = engine.source_pieces(model.learned, target, recorded_features)
     sounds = [np.asarray(utterances[piece.recording].audio.samples) for piece in pieces]

@@ -36,10 +36,10 @@ LAUGHING: Final = "happy"
 """The mood of a face that laughs: cheeks and corners of the lips are raised; ``articulation.rest`` opens the jaw."""
 
 
-def with_detected(asked: Sequence[MoodKey], events: Sequence[VoiceEvent]) -> tuple[MoodKey, ...]:
+def with_detected(requested: Sequence[MoodKey], events: Sequence[VoiceEvent]) -> tuple[MoodKey, ...]:
     """Return moods and manners over time: those that are asked for, and where no mood is, that of laughter."""
-    keys = list(asked)
-    for event in events if all(key.is_manner for key in asked) else ():
+    keys = list(requested)
+    for event in events if all(key.is_manner for key in requested) else ():
         if event.kind == LAUGHTER:
             keys += [MoodKey(event.start_s, LAUGHING), MoodKey(event.end_s, NEUTRAL)]
     return sort_moods(keys)
@@ -106,7 +106,7 @@ def deliver_to_face(
     closed_s, shown = find_closed_times(shown), close_on_frame_grid(shown, fps)
     if solved is not None:
         shown = with_curves(shown, solved)[0]
-    return hold_mouth(shown.resampled(fps), frames, closed_s)
+    return hold_mouth_poses(shown.resampled(fps), frames, closed_s)
 
 
 def with_drawn_channels(generation: Generation) -> Generation:
@@ -114,7 +114,7 @@ def with_drawn_channels(generation: Generation) -> Generation:
     return generation.with_motion(with_mouth(generation.motion)) if is_of_blendshapes(generation.motion) else generation
 
 
-def hold_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -> Generation:
+def hold_mouth_poses(generation: Generation, frames: int, closed_s: Sequence[float]) -> Generation:
     """Return a generation whose mouth is held (``hold_poses``); eyes, brows, cheeks and head move as before.
 
     frames : 0: everything moves as before; 1: every frame is a pose, which formats that can say so hold

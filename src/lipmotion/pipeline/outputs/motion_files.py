@@ -43,7 +43,7 @@ from lipmotion.pipeline.outputs.curve_sets import (
     make_curves,
     with_curves,
 )
-from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth
+from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth_poses
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_recorded_prosody
 from lipmotion.storage.files import as_text, sound_reference
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, Prosody, StateTrace, Timeline, Unit
@@ -87,7 +87,7 @@ class MotionOutput(Output):
             file = f"{self.path.name}: {find_suffix(self.path)}"
             LOG.warning("%s holds channels of its own, none of those that were asked for", file)
         frames = settings.delivery.hold_frames(held.motion.rate_hz)
-        held = hold_mouth(held, frames, performance.cached(_find_closed_s))
+        held = hold_mouth_poses(held, frames, performance.cached(_find_closed_s))
         if form.keyed and settings.delivery.key_tolerance:
             held = thin_keys(held, Thinning(settings.delivery.key_tolerance, tuple(find_closed_times(held))))
         check_motion(self.path, held.motion)

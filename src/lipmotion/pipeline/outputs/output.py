@@ -342,10 +342,10 @@ def write(  # noqa: PLR0913
         delivery or Delivery(),
     )
     performance = Performance(generation, settings, sound, settings.recording, model, monitor)
-    write_files(performance, [outputs] if isinstance(outputs, str | Path) else outputs, temporary=temporary)
+    write_performance(performance, [outputs] if isinstance(outputs, str | Path) else outputs, temporary=temporary)
 
 
-def write_files(performance: Performance, outputs: Sequence[str | Path], *, temporary: bool = False) -> None:
+def write_performance(performance: Performance, outputs: Sequence[str | Path], *, temporary: bool = False) -> None:
     """Write what is performed to files; ``temporary``: as of ``write``. Raises as that."""
     planned = create_outputs(outputs, performance.settings)
     end_s = len(performance.generation.motion.values) / performance.generation.motion.rate_hz

@@ -22,7 +22,7 @@ from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.acoustic_conditions import mix_noise
 from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.voices.installed import explain_missing, list_installed, speak_sentences
+from lipmotion.speech.voices.installed import explain_missing_synthesiser, list_installed, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.storage.sources import AUDIO_SUFFIXES, check_listable
 from lipmotion.types import Audio, Item, Monitor, Span, Timeline, Unit, silent_monitor
@@ -76,7 +76,7 @@ def synthesise_sentences(
     """
     chosen = list_installed() if voices is None else tuple(voices)
     if not chosen:
-        raise explain_missing()
+        raise explain_missing_synthesiser()
     texts = [prompt.text for prompt in prompts(count=SENTENCES).chosen] if texts is None else texts
     for voice in chosen:
         for number, (audio, units, _) in enumerate(speak_sentences(texts, voice, lexicon), start=1):

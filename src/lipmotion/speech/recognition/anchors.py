@@ -45,12 +45,12 @@ def find_anchors(transcript: TimedTranscript) -> Anchors:
     """
     rows: list[tuple[float | None, float | None, float]] = []
     for line in transcript.lines:
-        own = any(word.start_s is not None or word.end_s is not None for word in line.words)
+        has_times = any(word.start_s is not None or word.end_s is not None for word in line.words)
         for place, word in enumerate(line.words):
             timed = word.start_s is not None or word.end_s is not None
-            start_s = line.start_s if word.start_s is None and (not own or place == 0) else word.start_s
+            start_s = line.start_s if word.start_s is None and (not has_times or place == 0) else word.start_s
             last = place == len(line.words) - 1
-            end_s = line.end_s if word.end_s is None and (not own or last) else word.end_s
+            end_s = line.end_s if word.end_s is None and (not has_times or last) else word.end_s
             rows.append((start_s, end_s, WORD_TOLERANCE_S if timed else LINE_TOLERANCE_S))
     table = np.array(rows, float).reshape(-1, 3)  # None becomes NaN
     differs = ~np.isclose(table[1:, :2], table[:-1, :2], equal_nan=True).all(axis=1)

@@ -113,11 +113,11 @@ FORMS = tuple(sorted({find_form(phone) for phone in PHONES}))  # the phones that
 LabelT = TypeVar("LabelT")
 
 CONFIDENCES = (0.25, 0.4)
-"""Words confirm nothing at the first confidence, all at the second one. Five-second pieces of a fluent stranger had
+"""Words confirm nothing at the first confidence, all at the second one. Five seconds of a fluent unseen speaker had
 0.40 to 0.67; sentences in noise of 10 and 20 dB, in which words are found that nobody said, 0.00 to 0.28."""
 WORD_POSTERIORS, PHONE_POSTERIORS = (0.7, 0.9), (0.5, 0.65)
 """A phone recogniser decides on English words from the first mean posterior on, and is relied on fully from the second
-one on; the other two are for phones without words, of any language. Clear speech of strangers has 0.77 to 0.98, in
+one on; the other two are for phones without words, of any language. Clear unseen speech has 0.77 to 0.98, in
 noise of 20 dB 0.70 to 0.95, other languages 0.58 to 0.64."""
 RANGE_PERCENTILES = (5, 95)
 NOISY_DB = 20.0

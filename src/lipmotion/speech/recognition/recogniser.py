@@ -30,7 +30,7 @@ from lipmotion.speech.recognition.recognised_speech import (
     splice,
     time_phones,
 )
-from lipmotion.speech.recognition.word_search import decode_network, find_words, list_phones, list_wordless, match_words
+from lipmotion.speech.recognition.word_search import decode_network, list_phones, list_wordless, match_words, scan_words
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.speaker_similarity import OWN_SCORE, STRANGER_SCORE, SpeakerSimilarity, speaker_similarity
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Timeline, Unit
@@ -100,7 +100,7 @@ class Recogniser:
             stretches = find_stretches(audio, each)
             if mean_posterior(stretches) >= WORD_POSTERIORS[0] or not english:
                 return self._network_recognition(audio, similarity, english=english)
-        spoken = find_words(audio, each) if self.kind == "auto" and not known else None
+        spoken = scan_words(audio, each) if self.kind == "auto" and not known else None
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
         path = self._loop.network.best_path(log_likelihoods)
         labels, recognised = self._free_labels(audio, features, path), list[RecognisedWord]()
@@ -221,14 +221,14 @@ class Recogniser:
             similarity = similarity or speaker_similarity(self.own, audio)
             warp, weight = similarity.warp, weigh_own_model(similarity.score)
         if weight <= 0 and not own_alone:  # not evaluated: any features will do; those of an hour are large
-            own = audio.mfcc().values
+            cepstra = audio.mfcc().values
         else:
-            own = audio.mfcc(warp).values if self.adaptation is None else self.adaptation.own_features(audio)
+            cepstra = audio.mfcc(warp).values if self.adaptation is None else self.adaptation.own_features(audio)
         if own_alone:
-            hmm, log_likelihoods = self.own, compute_log_likelihoods(self.own, own)
+            hmm, log_likelihoods = self.own, compute_log_likelihoods(self.own, cepstra)
         else:
             general = audio.general_features if self.adaptation is None else self.adaptation.general_features(audio)
-            hmm, log_likelihoods = self.combined.hmm, combine_likelihoods(self.combined, own, weight, general)
+            hmm, log_likelihoods = self.combined.hmm, combine_likelihoods(self.combined, cepstra, weight, general)
         audio.forget_warps()
         return hmm, penalise(hmm, log_likelihoods, find_quiet_frames(audio.log_energy), silent=False)
 

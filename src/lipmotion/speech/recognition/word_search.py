@@ -117,7 +117,7 @@ SHORT_FRAMES = 3000
 DICTIONARY = Lexicon()  # words that were recognised are in the dictionary
 
 
-def find_words(audio: AnalysedAudio, each: ParallelMap = map) -> Iterable[tuple[Stretch, Sequence[FoundWord]]]:
+def scan_words(audio: AnalysedAudio, each: ParallelMap = map) -> Iterable[tuple[Stretch, Sequence[FoundWord]]]:
     """Return all stretches of sound of a recording, with the words in them as soon as they are known.
 
     Where ``each`` starts processes, they begin now. Raises MissingDependencyError: as ``spot_words``.
@@ -142,7 +142,7 @@ def match_words(
     aligning   : log likelihoods for the alignment of words
     path       : the density of every frame on the best path of phones without words [shape=(T,)]
     loud       : frames that are too loud for silence [shape=(T,)]
-    spoken     : of ``find_words``, whose errors it raises
+    spoken     : of ``scan_words``, whose errors it raises
     """
     parts, recognised = list[LabelledStretch](), list[RecognisedWord]()
     for stretch, words in spoken:

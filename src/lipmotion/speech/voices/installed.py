@@ -183,7 +183,7 @@ def find_voice(name: str) -> SyntheticVoice:
         raise InputError(f"unknown synthesiser {shorten(maker)!r}; required one of: {', '.join(SYNTHESISERS)}")
     synthesisers = [SYNTHESISERS[maker]] if colon else [each for each in SYNTHESISERS.values() if _works(each)]
     if not colon and not any(synthesiser.voices() for synthesiser in synthesisers):
-        raise explain_missing()
+        raise explain_missing_synthesiser()
     matches = []
     for synthesiser in synthesisers:
         listed = {voice.name: voice for voice in (*synthesiser.others(), *synthesiser.voices())}
@@ -209,11 +209,11 @@ def choose_voice() -> SyntheticVoice:
     voices = ((voice, name) for maker, name in DEFAULT_VOICES for voice in SYNTHESISERS[maker].voices())
     voice = next((voice for voice, name in voices if voice.name == name), None) or next(iter(list_voices()), None)
     if voice is None:
-        raise explain_missing()
+        raise explain_missing_synthesiser()
     return voice
 
 
-def explain_missing() -> MissingDependencyError:
+def explain_missing_synthesiser() -> MissingDependencyError:
     """Return the error that says how to install a synthesiser."""
     debian = " ".join(filter(None, (synthesiser.package for synthesiser in SYNTHESISERS.values())))
     return MissingDependencyError(

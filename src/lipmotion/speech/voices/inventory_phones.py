@@ -54,7 +54,7 @@ def convert_phones(
     if isinstance(words, Timeline):
         named = iter(_with_written_words(spoken, words, lexicon))
     else:
-        named = iter(with_words([phone for phone, _, _ in spoken], words, lexicon or Lexicon()))
+        named = iter(assign_words([phone for phone, _, _ in spoken], words, lexicon or Lexicon()))
     last = len(phones) - 1
     spans = [
         Span(start, end, Unit(PAUSE if 0 < place < last and end - start < SHORT_PAUSE_S else SILENCE))
@@ -65,7 +65,7 @@ def convert_phones(
     return Timeline(tuple(spans))
 
 
-def with_words(phones: Sequence[str], words: Sequence[str], lexicon: Lexicon) -> list[Unit]:
+def assign_words(phones: Sequence[str], words: Sequence[str], lexicon: Lexicon) -> list[Unit]:
     """Return phones with their words; AH, ER and IH are reduced where the dictionary reduces them.
 
     Both follow from the cheapest match with the words' first pronunciations; other phones belong to the word before.
@@ -100,7 +100,7 @@ def _with_written_words(phones: Phones, written: Timeline[str], lexicon: Lexicon
         text = written[number].label
         words = find_words(text)
         if lexicon is not None and words:
-            named = with_words(names, words, lexicon)
+            named = assign_words(names, words, lexicon)
         else:
             named = [Unit(name, word=WRITTEN_EDGES.sub("", normalise_text(text))) for name in names]
         again = bool(units) and named[0].word == units[-1].word

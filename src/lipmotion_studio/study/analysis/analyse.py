@@ -47,8 +47,8 @@ def screen(answers: Sequence[Answer]) -> Figures:
             "sides": _check_sides([each for each in mine if each.kind == PAIRED]),
         }
         left_out += [{"rater": rater, "rule": rule, "found": text} for rule, text in texts.items() if text]
-    kept = len(raters) - len({row["rater"] for row in left_out})
-    return {"rules": dict(RULES), "raters": len(raters), "kept": kept, "left_out": left_out}
+    counted = len(raters) - len({row["rater"] for row in left_out})
+    return {"rules": dict(RULES), "raters": len(raters), "kept": counted, "left_out": left_out}
 
 
 def _check_anchor(mine: Sequence[Answer]) -> str:
