@@ -15,8 +15,9 @@ def shorten(text: str) -> str:
 
 
 def shorten_list(names: list[str] | tuple[str, ...], count: int = 5) -> str:
-    """Return the first names of a list, each shortened, and ``...`` if there are more, for a message."""
-    return ", ".join(map(shorten, names[:count])) + ", ..." * (len(names) > count)
+    """Return the first names of a list, each shortened, and how many more there are, for a message."""
+    more = f" and {len(names) - count} more" if len(names) > count else ""
+    return ", ".join(map(shorten, names[:count])) + more
 
 
 class LipMotionError(Exception):

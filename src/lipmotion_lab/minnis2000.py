@@ -94,7 +94,7 @@ ENGINE = "selection"
 PRINTED, UNGUIDED, EVERYTHING = "as printed", "all additions but the guide", "all additions: the default"
 DEFAULTS = SelectionConfig().as_mapping()
 _TABLE = json.loads(Path(__file__).with_name("minnis2000.json").read_text(encoding="ascii"))
-ADDITIONS: Mapping[str, Sequence[str]] = _TABLE["additions"]
+ADDITIONS = {name: tuple(options) for name, options in _TABLE["additions"].items()}
 """Options of the preset that take the value of the default, by the name of the row."""
 VARIANTS: Mapping[str, Mapping[str, Any]] = _TABLE["variants"]
 """Other readings of the print, and what it leaves open."""

@@ -35,7 +35,7 @@ def binding(mesh):
 def _moved(binding, mesh, chosen, way):
     displacements = np.zeros((len(binding.placement.points), 3))
     displacements[chosen] = way
-    return (binding.moved(mesh, displacements) - mesh.vertices) / binding.placement.scale
+    return (binding.move_vertices(mesh, displacements) - mesh.vertices) / binding.placement.scale
 
 
 def test_the_lower_lip_does_not_drag_the_upper_and_teeth_follow_the_jaw(binding, mesh):
@@ -70,7 +70,7 @@ def test_skinning_is_the_weighted_sum_of_the_transformed_vertices(binding, mesh)
     matrices = np.tile(np.eye(3, 4), (len(binding.placement.points), 1, 1)) + 0.1 * rng.normal(size=(52, 3, 4))
     rows = binding.rows[:40]
     slow = skinned_vertex_by_vertex(binding.matrix[:40].toarray(), matrices, mesh.vertices[rows])
-    np.testing.assert_allclose(binding.transformed(mesh, matrices)[rows], slow, atol=1e-9)
+    np.testing.assert_allclose(binding.transform_vertices(mesh, matrices)[rows], slow, atol=1e-9)
 
 
 def test_a_stored_binding_is_the_same_and_of_its_mesh_and_a_damaged_one_is_refused(binding, mesh, tmp_path):

@@ -73,7 +73,7 @@ def test_the_word_that_is_not_said_is_left_out_where_another_is() -> None:
     (other,) = found.others
     assert (other.first, other.stop) == (2, 3)
     assert (other.start_s, other.end_s) == pytest.approx((0.50, 0.60), abs=0.03)
-    assert found.said_share == pytest.approx(10 / 13)
+    assert found.spoken_share == pytest.approx(10 / 13)
     assert not found.is_doubtful
 
 

@@ -12,7 +12,7 @@ from lipmotion.stats.constrained_mllr import (
     identity,
     improve_transform,
     log_determinant,
-    transformed,
+    transform_features,
 )
 from lipmotion.stats.mixture import Mixtures
 from oracles import statistics as oracle
@@ -78,12 +78,12 @@ def test_a_known_distortion_is_undone() -> None:
     mixtures = random_mixtures(draw, (8, 2, SIZE))
     clean, densities = spoken(draw, mixtures, 4000)
     distortion = random_transform(draw)
-    features, transform = transformed(clean, distortion), identity(SIZE)
+    features, transform = transform_features(clean, distortion), identity(SIZE)
     _, before = collect_transform_statistics(mixtures, features, densities, transform)
     for _ in range(30):
         statistics, _ = collect_transform_statistics(mixtures, features, densities, transform)
         transform = improve_transform(transform, statistics, ALL)
-    restored = transformed(features, transform)
+    restored = transform_features(features, transform)
     assert np.abs(restored - clean).mean() < 0.1 < np.abs(features - clean).mean()
     _, after = collect_transform_statistics(mixtures, features, densities, transform)
     assert after > before + 1000

@@ -10,7 +10,7 @@ from io import StringIO
 from itertools import islice
 from pathlib import Path
 
-from lipmotion.errors import ExportError, InputError, shorten
+from lipmotion.errors import ExportError, InputError, shorten, shorten_list
 from lipmotion.formats.annotations import MARKS as DOCUMENTS
 from lipmotion.formats.annotations import parse_interval_tiers, read_xml_tiers, write_textgrid
 from lipmotion.formats.label_services import DamagedJsonError, describe_json, is_json, parse_service_tiers
@@ -299,7 +299,7 @@ def _choose_tiers(tiers: list[LabelTier], where: str, tier: str = "", speaker: s
 
 
 def _refuse(kind: str, name: str, known: list[str], where: str) -> list[LabelTier]:
-    names = ", ".join(map(repr, list(dict.fromkeys(filter(None, known)))[:NAMED_TIERS])) or "none with a name"
+    names = shorten_list([repr(each) for each in dict.fromkeys(filter(None, known))], NAMED_TIERS) or "none with a name"
     raise InputError(f"{where}: has no {kind} {shorten(name)!r}; it has: {names}")
 
 
@@ -327,7 +327,7 @@ def _choose_transcript(tiers: list[LabelTier], where: str, tier: str = "", speak
     first = best.get("")
     others = [each.name for each in chosen if first and not first.role and each is not first and each.labels]
     if first and others:
-        names = ", ".join(map(repr, others[:NAMED_TIERS]))
+        names = shorten_list(list(map(repr, others)), NAMED_TIERS)
         LOG.warning("%s: the words of tier %r are read; others are %s; --tier chooses", where, first.name, names)
     _name_speakers(list(best.values()), where)
     transcript = read_transcript_tier(list(best.values()), where)
@@ -337,7 +337,7 @@ def _choose_transcript(tiers: list[LabelTier], where: str, tier: str = "", speak
 def _name_speakers(tiers: list[LabelTier], where: str) -> None:
     speakers = [tier.speaker for tier in tiers if tier.speaker]
     if len(speakers) > 1:
-        names = ", ".join(map(shorten, speakers[:NAMED_TIERS]))
+        names = shorten_list(speakers, NAMED_TIERS)
         LOG.warning("%s: %d people speak: %s; all are read; --tier NAME chooses one", where, len(speakers), names)
 
 
@@ -407,7 +407,7 @@ def _read_text(path: Path, kind: str = "label") -> str:
         return text
     names = MARKS["MASTER"].findall(text)
     if len(names) != 1:
-        held = f"is a master label file of {len(names)} recordings: {', '.join(map(shorten, names[:NAMED_TIERS]))}"
+        held = f"is a master label file of {len(names)} recordings: {shorten_list(names, NAMED_TIERS)}"
         raise InputError(f"{path}: {held}; required the labels of one; write a .lab beside each recording")
     return re.sub(r"^\.[ \t\r]*$", "", MARKS["MASTER"].sub("\n", text), flags=re.MULTILINE)
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shorten
+from lipmotion.errors import InputError, shorten, shorten_list
 from lipmotion.meshes.model.shape_names import is_known, to_arkit
 from lipmotion.motion.frame_labels import find_runs
 from lipmotion.types import WEIGHT, Channel, Motion
@@ -179,8 +179,7 @@ def _from_beginning(time_s: Array, values: Array) -> tuple[Array, Array]:
 
 
 def _name_spans(spans: Sequence[tuple[float, float]]) -> str:
-    more = f" and {len(spans) - 4} more" if len(spans) > 4 else ""
-    return ", ".join(f"{start_s:.2f}–{end_s:.2f} s" for start_s, end_s in spans[:4]) + more
+    return shorten_list([f"{start_s:.2f}–{end_s:.2f} s" for start_s, end_s in spans], 4)
 
 
 def _channel(name: str, unit: str) -> Channel:

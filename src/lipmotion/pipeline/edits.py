@@ -41,7 +41,7 @@ class Step:
     """An edit that one sentence states (``STEPS``). Raises InputError: a word that it spells out has no phones."""
 
     def __post_init__(self) -> None:
-        for word, phones in self.said.items():
+        for word, phones in self.spelled.items():
             if not phones:
                 raise InputError(f"{str(self)!r}: {shorten(repr(word))} has no phones; required WORD PHONES, WORD …")
             if any(is_silent(_read_unit(phone).phone) for phone in phones):
@@ -59,14 +59,14 @@ class Step:
         return forms[-1 if getattr(self.stated, "channel", "") else 0]
 
     @property
-    def said(self) -> dict[str, tuple[str, ...]]:
+    def spelled(self) -> dict[str, tuple[str, ...]]:
         """The phones of words that the sentence spells out, by word."""
         return {}
 
     @property
     def lexicon_entries(self) -> dict[str, tuple[Pronunciation, ...]]:
         """The same as a lexicon holds it."""
-        return {word: (phones,) for text, phones in self.said.items() for word in split_words(text)}
+        return {word: (phones,) for text, phones in self.spelled.items() for word in split_words(text)}
 
     def __str__(self) -> str:
         return self.form.format(**{name: _written(value) for name, value in vars(self.stated).items()})
@@ -226,7 +226,7 @@ class WordSaid(Step):
     phones: Text
 
     @property
-    def said(self) -> dict[str, tuple[str, ...]]:  # noqa: D102
+    def spelled(self) -> dict[str, tuple[str, ...]]:  # noqa: D102
         return {self.word: tuple(self.phones.split())}
 
 
@@ -251,7 +251,7 @@ class WordsSaidSo(WordsSaid):
     pronunciations: Text
 
     @property
-    def said(self) -> dict[str, tuple[str, ...]]:  # noqa: D102
+    def spelled(self) -> dict[str, tuple[str, ...]]:  # noqa: D102
         parts = (part.split() for part in self.pronunciations.split(","))
         return {word: tuple(phones) for word, *phones in filter(None, parts)}
 

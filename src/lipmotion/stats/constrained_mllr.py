@@ -53,7 +53,7 @@ def identity(size: int) -> Array:
     return np.eye(size, size + 1)
 
 
-def transformed(features: NDArray[np.float32], transform: Array) -> NDArray[np.float32]:
+def transform_features(features: NDArray[np.float32], transform: Array) -> NDArray[np.float32]:
     """Return the features [shape=(T, D)] after a transform [shape=(D, D + 1)]."""
     matrix, offset = transform[:, :-1].T.astype(np.float32), transform[:, -1].astype(np.float32)
     return np.asarray(features @ matrix + offset, np.float32)
@@ -68,7 +68,7 @@ def collect_transform_statistics(
     mixtures: Mixtures, features: NDArray[np.float32], densities: NDArray[np.intp], transform: Array
 ) -> TransformStatistics:
     """Return the statistics of frames of known densities [shapes=(T, D), (T,)], under the transform so far."""
-    current = transformed(features, transform)
+    current = transform_features(features, transform)
     precision, target = (np.zeros(features.shape) for _ in range(2))
     log_likelihood = len(features) * log_determinant(transform)
     for density in np.unique(densities):

@@ -68,13 +68,13 @@ class ControlBinding:
         shape = (len(self.rows), len(self.placement.points))
         return csr_array((self.weights.reshape(-1), self.controls.reshape(-1), starts), shape=shape)
 
-    def moved(self, mesh: Mesh, displacements: Array) -> Array:
+    def move_vertices(self, mesh: Mesh, displacements: Array) -> Array:
         """Return the vertices [shape=(V, 3)] under displacements of control points, eye distances [shape=(C, 3)]."""
         matrices = np.tile(np.eye(3, 4), (len(displacements), 1, 1))
         matrices[:, :, 3] = self.placement.to_mesh(displacements)
-        return self.transformed(mesh, matrices)
+        return self.transform_vertices(mesh, matrices)
 
-    def transformed(self, mesh: Mesh, matrices: Array) -> Array:
+    def transform_vertices(self, mesh: Mesh, matrices: Array) -> Array:
         """Return the vertices [shape=(V, 3)] under transformations of the control points [shape=(C, 3, 4)].
 
         v′ = Σ wᵢ Mᵢ v + (1 − Σ wᵢ) v: the matrices are blended, then applied, which is the same and costs less.
@@ -391,7 +391,7 @@ class PosedCharacter(DrivenCharacter):
         elif self.binding is None:
             raise InputError("the character has neither blendshapes of the mouth nor a binding; give it a binding")
         else:
-            vertices = self.binding.moved(self.mesh, pose.mouth)
+            vertices = self.binding.move_vertices(self.mesh, pose.mouth)
         if pose.others.any():
             vertices[self.moving] += (pose.others @ of_others).reshape(-1, 3)
         return vertices

@@ -6,6 +6,7 @@ is its motion.
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -143,7 +144,8 @@ def discover(directory: Path) -> RecordingFolder:
 
 
 KIND = "GRID corpus"
-RIGHTS = {"licence": "CC BY 4.0", "attribution": "GRID corpus (Cooke, Barker, Cunningham, Shao 2006), CC BY 4.0"}
+_ROWS = json.loads(Path(__file__).with_name("layouts.json").read_text(encoding="ascii"))
+RIGHTS = _ROWS[KIND]["rights"]
 SILENCES = frozenset({"sil", "sp"})  # labels of a word-time file that are not words
 WORD = re.compile(r"[^\W\d_]+(?:['-][^\W\d_]+)*")
 LARGEST_ALIGNMENT_BYTES = 1 << 16  # most bytes of a word-time file; GRID's have a hundred
@@ -291,43 +293,20 @@ def _read_tcd_words(_directory: Path, video: Path, _groups: Mapping[str, str]) -
 
 RESEARCH = {"licence": "research, as agreed with its owners"}
 
-LAYOUTS = (
+_WORDS: dict[str, Callable[[Path, Path, Mapping[str, str]], Words | None]] = {
+    KIND: _read_grid_words,
+    "CREMA-D": lambda _directory, _video, groups: split_words(CREMA_SENTENCES[groups["sentence"]]),
+    "TCD-TIMIT": _read_tcd_words,
+}
+_PARTS = {"<NAME>": NAME.pattern, "<SENTENCE>": "|".join(CREMA_SENTENCES)}  # of paths
+LAYOUTS = tuple(
     Layout(
-        KIND,
-        re.compile(rf"(?i:(?:.*[^a-z0-9])?(?P<speaker>s[1-9]\d?)/(?:.*/)?)(?P<stem>{NAME.pattern})"),
-        "{speaker}-{stem}",
-        _read_grid_words,
-        rights=RIGHTS,
-    ),
-    Layout(
-        "CREMA-D",
-        re.compile(rf".*/(?P<stem>(?P<speaker>1\d{{3}})_(?P<sentence>{'|'.join(CREMA_SENTENCES)})_[A-Z]{{3}}_[A-Z]+)"),
-        "{stem}",
-        lambda _directory, _video, groups: split_words(CREMA_SENTENCES[groups["sentence"]]),
-        rights={"licence": "ODbL 1.0", "attribution": "CREMA-D (Cao, Cooper, Keutmann, Gur, Nenkova, Verma 2014)"},
-    ),
-    Layout(
-        "TCD-TIMIT",
-        re.compile(
-            r"(?:.*/)?(?P<speaker>\d\d[MFT]|Lipspkr\d)/(?:Clips/)?(?P<camera>straight|30deg)cam/(?P<stem>[^/]+)"
-        ),
-        "{speaker}-{stem}",
-        _read_tcd_words,
-        {"camera": "straight"},
-        RESEARCH | {"attribution": "TCD-TIMIT (Harte, Gillen 2015)"},
-    ),
-    Layout(
-        "MEAD",
-        re.compile(
-            r"(?:.*/)?(?P<speaker>[MW]\d{3})/video/(?P<view>[^/]+)/(?P<emotion>[^/]+)/(?P<level>level_\d)/(?P<stem>[^/]+)"
-        ),
-        "{speaker}-{emotion}-{level}-{stem}",
-        only={"view": "front"},
-        rights=RESEARCH | {"attribution": "MEAD (Wang, Wu, Song, Yang, Wu, Qian, He, Qiao, Loy 2020)"},
-    ),
-    Layout(
-        LRS,
-        re.compile(r"(?:.*/)?(?:main|trainval|(?P<set>pretrain)|(?P<split>test))/(?P<speaker>[^/]+)/(?P<stem>\d{5})"),
-        "{set}-{speaker}-{stem}",
-    ),
+        kind,
+        re.compile(re.sub("<[A-Z]+>", lambda part: _PARTS[part[0]], row["path"])),
+        row["name"],
+        _WORDS.get(kind),
+        row.get("only", {}),
+        row.get("rights", {}),
+    )
+    for kind, row in _ROWS.items()
 )

@@ -189,7 +189,7 @@ def list_recordings(
 ) -> set[int]:
     """Return the recordings of the phones that differ between two sentences by their stress or words, if any do."""
     costs = costs_of(units.without(config.suppressed_phones), config)
-    one, other = (costs.shown(list_windows([each])) for each in (wanted, wrong))
+    one, other = (costs.suppress(list_windows([each])) for each in (wanted, wrong))
     differs = (getattr(one, by) != getattr(other, by)).reshape(len(one), -1).any(axis=1)
     assert one.phones.tolist() == other.phones.tolist()
     found = select(costs, costs.target(one, None, None))[0]

@@ -131,7 +131,7 @@ def test_a_word_whose_edge_is_suppressed_keeps_it() -> None:
 
 def joined(units: RecordedUnits, text: str, config=PRINTED):
     costs = costs_of(units.without(config.suppressed_phones), config)
-    target = costs.target(costs.shown(list_windows([timeline(text)])), None, None)
+    target = costs.target(costs.suppress(list_windows([timeline(text)])), None, None)
     pieces = to_pieces(costs, target, select(costs, target)[0])
     return target, join_pieces(costs.inventory, target, pieces, round(timeline(text)[-1].end_s * 100) + 1)[:, 0]
 
@@ -179,7 +179,7 @@ def test_a_suppressed_phone_is_an_invisible_neighbour_in_table_1() -> None:
     for text, before, after in (("m aa t iy", "protected", "invisible"), ("s t aa m", "invisible", "protected"),
                                 ("k aa d s", "invisible", "invisible"), ("m aa s", "protected", "normal")):  # fmt: skip
         costs = costs_of(inventory("m aa s iy").without(INVISIBLE), config)
-        target = costs.target(costs.shown(list_windows([timeline(text)])), None, None)
+        target = costs.target(costs.suppress(list_windows([timeline(text)])), None, None)
         shared = [PHONES[phone] for phone in target.windows.phones].index("aa")
         assert costs.forward_share(target, shared) == TABLE_1[before, after], text
 

@@ -63,21 +63,21 @@ def written(out: Path) -> list[str]:
 def test_a_line_is_kept_while_nothing_changes(line, out):
     (out / "a.json").write_bytes(CONTENT)
     with open_ledger(Place(str(out), "1"), [line]) as ledger:
-        assert ledger.kept(line, "settings", out) is None
+        assert ledger.find_same(line, "settings", out) is None
         ledger.append(record_of(line))
     with open_ledger(Place(str(out), "2"), [line]) as ledger:
-        assert ledger.kept(line, "settings", out) == record_of(line)
-        assert ledger.kept(line, "other settings", out) is None
+        assert ledger.find_same(line, "settings", out) == record_of(line)
+        assert ledger.find_same(line, "other settings", out) is None
         Path(line.recording).touch()  # a new time, the same content
-        assert ledger.kept(line, "settings", out) is not None
+        assert ledger.find_same(line, "settings", out) is not None
         Path(line.recording).with_suffix(".txt").write_text("words")  # a transcript has come
-        assert ledger.kept(line, "settings", out) is None
+        assert ledger.find_same(line, "settings", out) is None
         Path(line.recording).with_suffix(".txt").unlink()
         Path(line.recording).write_bytes(b"other")
-        assert ledger.kept(line, "settings", out) is None
+        assert ledger.find_same(line, "settings", out) is None
         Path(line.recording).write_bytes(b"sound")
         (out / "a.json").unlink()
-        assert ledger.kept(line, "settings", out) is None
+        assert ledger.find_same(line, "settings", out) is None
     assert sorted(path.name for path in out.iterdir()) == ["batch.jsonl"]
 
 
@@ -128,10 +128,10 @@ def test_damaged_rows_are_said_once_and_their_lines_done_again(line, out, caplog
             (out / "batch.jsonl").write_bytes(others + row + b"\n")
             caplog.clear()
             with open_ledger(Place(str(out), "2"), [line]) as ledger:
-                assert ledger.kept(line, "settings", out) is None, what
+                assert ledger.find_same(line, "settings", out) is None, what
                 report.write_reports([line], ledger, out)
                 ledger.append(record_of(line))
-                assert ledger.kept(line, "settings", out) == record_of(line), what
+                assert ledger.find_same(line, "settings", out) == record_of(line), what
             if "a line end" not in what:  # it is of a line that this batch has not: nobody looks at it
                 (message,) = caplog.messages
                 assert message.endswith(": 1 damaged rows are passed over; what they say was done is done again"), what
@@ -171,7 +171,7 @@ def test_killed_after_the_receipt(line, out, in_place):
     write_receipt(old.receipt("a"), record_of(line))
     (out / "a.json").write_bytes(CONTENT if in_place else b"of an earlier batch")
     with open_ledger(Place(str(out), "new"), [line]) as ledger:
-        assert (ledger.kept(line, "settings", out) is not None) == in_place
+        assert (ledger.find_same(line, "settings", out) is not None) == in_place
         assert not old.work("a").exists()
         assert read_receipt(old.receipt("a")) is None
     assert written(out) == ["a"] * in_place

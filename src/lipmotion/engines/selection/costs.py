@@ -178,7 +178,7 @@ class Costs:
         known = {PHONES[number] for number in np.unique(self.inventory.windows.phones[self.inventory.usable])}
         return {phone: find_similar_lips(phone, known) for phone in PHONES if phone not in known and known}
 
-    def shown(self, windows: PhoneWindows) -> PhoneWindows:
+    def suppress(self, windows: PhoneWindows) -> PhoneWindows:
         """Return the phones of one recording without those that are suppressed, if any are."""
         return windows.suppressed(self.config.suppressed_phones)
 

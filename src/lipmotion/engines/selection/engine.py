@@ -17,7 +17,7 @@ from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target, se
 from lipmotion.engines.selection.inventory import PHONE_NUMBER, SOURCE, RecordedUnits, find_source, list_windows
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
 from lipmotion.engines.selection.selection_training import build_target, fit_selection
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shorten_list
 from lipmotion.motion.predictors import count_conditions
 from lipmotion.printable import printable
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
@@ -173,9 +173,8 @@ def _find_named_units(costs: Costs, target: Target, units: Timeline[Unit]) -> di
         else:
             useless.append(f"{span.label.phone} at {span.start_s:.2f} s: {span.label.unit!r}")
     if useless:
-        more = f" and {len(useless) - NAMED_UNITS} more" if len(useless) > NAMED_UNITS else ""
         LOG.warning(
-            "%d of %d units name no recorded unit of their phone in this model (%s%s); these phones are selected again",
-            *(len(useless), len(units), printable("; ".join(useless[:NAMED_UNITS])), more),
+            "%d of %d units name no recorded unit of their phone in this model (%s); these phones are selected again",
+            *(len(useless), len(units), printable(shorten_list(useless, NAMED_UNITS))),
         )
     return required

@@ -40,13 +40,13 @@ def build_target(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
     duration_s = (frames - 1) / FRAME_RATE_HZ
     units, guide = cover_recording(speech.units, duration_s), model.guide
     if guide is None or not guide.predictor.can_predict(speech) or not costs.config.guide:
-        return costs.target(costs.shown(list_windows([units])), None, None)
+        return costs.target(costs.suppress(list_windows([units])), None, None)
     motion, distortion = guide.predictor.predict(speech)
     by_sound = bool(rate_phones(speech, distortion, frames).mean() < MIN_RELIABILITY)
     if by_sound:
         edges = np.linspace(0, duration_s, max(round(duration_s / SEGMENT_S), 1) + 1).tolist()
         units = Timeline(tuple(Span(a, b, Unit(SILENCE)) for a, b in pairwise(edges)))
-    windows = list_windows([units]) if by_sound else costs.shown(list_windows([units]))
+    windows = list_windows([units]) if by_sound else costs.suppress(list_windows([units]))
     predicted = interpolate_at(motion, windows.times_s)
     guided = guide.centre + (predicted - guide.centre) * guide.expansion  # as wide as recorded motion
     return costs.target(windows, guided, predicted, by_sound=by_sound)

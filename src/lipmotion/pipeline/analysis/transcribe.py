@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import AlignmentError, shorten
+from lipmotion.errors import AlignmentError, shorten, shorten_list
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, measure_fit
 from lipmotion.speech.recognition.anchors import find_anchors, leave_out_late_lines
 from lipmotion.speech.recognition.network.posteriors import (
@@ -288,9 +288,7 @@ def warn_of_misfit(fit: TranscriptFit, corrected: bool = False) -> None:
         LOG.warning("the transcript seems not to be what is said (%s)%s; %scheck it, or leave it out", why, also, done)
         return
     if fit.unsaid:
-        words = ", ".join(f"{shorten(word.word)!r} at {word.start_s:.1f} s" for word in fit.unsaid[:MAX_STRETCHES])
-        more = len(fit.unsaid) - MAX_STRETCHES
-        words += f" and {more} more" if more > 0 else ""
+        words = shorten_list([f"{shorten(w.word)!r} at {w.start_s:.1f} s" for w in fit.unsaid], MAX_STRETCHES)
         done = ", which are left out" if corrected else ""
         LOG.warning("the transcript seems to have words that are not said: %s%s; correct it", words, done)
     if fit.missing:

@@ -303,17 +303,17 @@ class Ledger:
             raise ExportError(f"{self._path}: cannot be written: {why}; make room, then run it again") from error
         self._last[_key(record["name"])] = record["fingerprint"], start
 
-    def kept(self, line: BatchLine, of_settings: str, out: Path) -> Record | None:
+    def find_same(self, line: BatchLine, of_settings: str, out: Path) -> Record | None:
         """Return the record of a line that need not be done again; None: it must be done.
 
         It need not if it was done with the same settings from the same files, and all its outputs exist.
         """
         if self._last.get(_key(line.name), ("", 0))[0] != fingerprint_line(line, of_settings):
             return None
-        record = self.finished(line, out)
+        record = self.find_finished(line, out)
         return record if record is not None and are_same_inputs(line, record) else None
 
-    def finished(self, line: BatchLine, out: Path) -> Record | None:
+    def find_finished(self, line: BatchLine, out: Path) -> Record | None:
         """Return the record of a line that was done, whatever the settings; None: it was not, or lacks an output."""
         record = self.record_of(line.name)
         if record is None or record["outcome"] != DONE:

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from lipmotion.errors import ExportError, InputError, shorten
+from lipmotion.errors import ExportError, InputError, shorten_list
 from lipmotion.formats.base import list_suffixes
 from lipmotion.storage.files import make_portable
 from lipmotion.storage.sources import check_listable, is_recording, read_text_file
@@ -166,7 +166,7 @@ def _read_table(source: Path, text: str) -> list[dict[str, str]] | None:
     except ValueError as error:
         raise InputError(f"{source}: not a readable table ({error}); export it again as CSV") from error
     if unused := [name for name in header if name and name != file and name not in COLUMNS]:
-        names = ", ".join(map(shorten, unused[:MAX_NAMED_LINES]))
+        names = shorten_list(unused, MAX_NAMED_LINES)
         LOG.warning("%s: columns that are not used: %s; used are %s", source, names, ", ".join((file, *COLUMNS)))
     rows = []
     for number, cells in cells_of:

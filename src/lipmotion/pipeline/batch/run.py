@@ -397,8 +397,8 @@ def _find_finished(
         mark = marks.get(line.name)
         if mark is not None and is_due(mark, ledger.record_of(line.name)):
             continue
-        approved = ledger.finished(line, out) if mark is not None and mark.kind == APPROVE else None
-        if approved is not None or ledger.kept(line, of_settings, out) is not None:
+        approved = ledger.find_finished(line, out) if mark is not None and mark.kind == APPROVE else None
+        if approved is not None or ledger.find_same(line, of_settings, out) is not None:
             finished.add(line.name)
         if approved is not None and not are_same_inputs(line, approved):
             outdated.append(line.name)

@@ -17,7 +17,7 @@ import numpy as np
 
 from lipmotion.corpora import Corpus
 from lipmotion.engines import Engine
-from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
+from lipmotion.errors import AlignmentError, InputError, MissingDependencyError, shorten_list
 from lipmotion.extensions import find_version
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.compiler import list_blas_kernels
@@ -61,7 +61,7 @@ def warn_of_doubtful_transcripts(
         return
     for names, problem in ((wrong, "seem not to be what is said"), (short, "seem to leave out words that are said")):
         if names:
-            counted = len(names), count, problem, _listed(names)
+            counted = len(names), count, problem, printable(shorten_list(names, MAX_NAMED_RECORDINGS))
             LOG.warning("%d of %d transcripts %s (%s), which teaches wrong lips; correct or remove them", *counted)
 
 
@@ -69,13 +69,8 @@ def warn_of_missing_transcripts(utterances: Sequence[Utterance]) -> None:
     """Log a warning that names the utterances with neither words nor labelled phones, if others have them."""
     missing = [utterance.name for utterance in utterances if utterance.phones is None and not utterance.words]
     if 0 < len(missing) < len(utterances):
-        counted = len(missing), len(utterances), _listed(missing)
+        counted = len(missing), len(utterances), printable(shorten_list(missing, MAX_NAMED_RECORDINGS))
         LOG.warning("%d of %d recordings have no transcript (%s): phones are recognised; add .txt files", *counted)
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = len(names) - MAX_NAMED_RECORDINGS
-    return printable(", ".join(names[:MAX_NAMED_RECORDINGS])) + (f" and {more} more" if more > 0 else "")
 
 
 UTTERANCES_PER_CHECKPOINT = 32  # utterances that are labelled between two checkpoints

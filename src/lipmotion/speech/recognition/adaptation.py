@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.speech.features.mfcc import FEATURES
 from lipmotion.speech.recognition.general import STREAMS
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio
-from lipmotion.stats.constrained_mllr import identity, transformed
+from lipmotion.stats.constrained_mllr import identity, transform_features
 from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 
 LARGEST_WARP = 2.0  # frequencies are not stretched by more, nor by less than its inverse
@@ -29,12 +29,12 @@ class Adaptation:
 
     def own_features(self, audio: AnalysedAudio) -> NDArray[np.float32]:
         """Return the adapted features for the own models [shape=(T, 39)]."""
-        return transformed(audio.mfcc(self.warp).values, self.own)
+        return transform_features(audio.mfcc(self.warp).values, self.own)
 
     def general_features(self, audio: AnalysedAudio) -> NDArray[np.float32]:
         """Return the adapted features for the general models [shape=(T, 39)]."""
         features = audio.general_features
-        streams = [transformed(features[:, s], matrix) for s, matrix in zip(STREAMS, self.general, strict=True)]
+        streams = [transform_features(features[:, s], matrix) for s, matrix in zip(STREAMS, self.general, strict=True)]
         return np.concatenate(streams, axis=1)
 
 

@@ -89,7 +89,7 @@ class TranscriptEvidence:
         return tuple(word for word in self.words if not word.is_said)
 
     @property
-    def said_share(self) -> float:
+    def spoken_share(self) -> float:
         """The share of the transcript's phones whose words are said, 0 to 1; 1 without words."""
         count = sum(len(word.phones) for word in self.words)
         return sum(len(word.phones) for word in self.words if word.is_said) / count if count else 1.0
@@ -97,7 +97,7 @@ class TranscriptEvidence:
     @property
     def is_doubtful(self) -> bool:
         """Whether the transcript as a whole is something else than what is said."""
-        return self.said_share < MIN_SAID_SHARE
+        return self.spoken_share < MIN_SAID_SHARE
 
 
 def find_evidence(
