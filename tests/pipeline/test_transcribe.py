@@ -1,6 +1,7 @@
 import re
 from typing import Any
 
+import numpy as np
 import pytest
 
 from lipmotion import Model, load_model
@@ -8,8 +9,11 @@ from lipmotion.errors import AlignmentError
 from lipmotion.pipeline.analysis import transcribe
 from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser
 from lipmotion.speech.recognition.recognised_speech import select_reliable
+from lipmotion.speech.sound.acoustic_conditions import mix_noise
+from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.types import Audio, Features, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import Lexicon, is_silent, split_words
+from lipmotion.units.phone_timelines import group_words
 from lipmotion.units.phones import count_phone_edits
 from pipeline.made import WELCOME, features_of, read_welcome, recogniser_of
 from testing.toy import ToySentence
@@ -115,6 +119,19 @@ def test_words_here_and_there_are_no_worse_than_none(welcome, kept):
         [span.label.phone for span in units if not is_silent(span.label.phone)] for units in (right, some, none)
     )
     assert count_phone_edits(wanted, with_some) <= count_phone_edits(wanted, with_none)
+
+
+@pytest.mark.skipif(find_installed_recogniser() is None, reason="no phone recogniser is installed")
+def test_in_noise_words_are_where_they_are_heard(welcome):
+    (audio, words), phones = welcome, recogniser_of(load_model(), "auto")
+    noisy = analysed(mix_noise(audio, "white", 3, [], 0))
+    places_s = [
+        [span.start_s for span in group_words(units) if span.label]
+        for units, _ in (transcribe.transcribe(phones, a, a.mfcc(), words, Lexicon()) for a in (audio, noisy))
+    ]
+    assert np.array(places_s[1]) == pytest.approx(
+        np.array(places_s[0]), abs=0.2
+    )  # by forced alignment, one is 0.48 off
 
 
 @pytest.mark.parametrize("first", [False, True])

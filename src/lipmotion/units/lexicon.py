@@ -64,6 +64,7 @@ OFTEN_LENGTHENED = frozenset("no so go do to who hello yo bro ho he me we she be
 """Words that are meant rather than those with their vowel twice (``noo``, ``loong``, ``stoop``)."""
 MARKS = read_patterns(Path(__file__).with_name("tables") / "lexicon.tsv")
 """Patterns of words and of entries of lexicons, by their names in the table."""
+BRITISH = read_table("british")
 SOUNDED = re.compile(r"(?=.*(.)\1\1|.*rr\Z|p[sf]{2})(?!([^fhmrsvz])\2*\Z)[b-df-hj-np-tv-xz]+\Z")
 """Sounds in letters: ``brrr``, ``psst``, ``fff``; no dictionary has them, and their letters are not spelled."""
 LONGEST_LENGTHENED, MAX_LENGTHENED = 100, 5  # a word of more letters, or with more that are doubled, is none of these
@@ -240,6 +241,7 @@ def list_entries(word: str) -> tuple[Pronunciation, ...]:
         end = text.index(b"\n", low + 1)
         entries.append(tuple(text[low:end].decode().lower().split()[1:]))
         low = end
+    entries += [tuple(phones.split()) for phones in BRITISH[word].split(",")] if word in BRITISH else []
     plain = remove_accents(word)
     return tuple(entries) if entries or plain == word else list_entries(plain)
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, shorten, shorten_list
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, measure_fit
-from lipmotion.speech.recognition.anchors import find_anchors, leave_out_late_lines
+from lipmotion.speech.recognition.anchors import bound_words, find_anchors, leave_out_late_lines
 from lipmotion.speech.recognition.network.posteriors import (
     POSTERIOR_STEP,
     WORD_BOUNDARY,
@@ -38,6 +38,7 @@ from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.voices.espeak import LanguageLexicon
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, Pronunciation, check_words, is_silent
+from lipmotion.units.phone_timelines import group_words
 from lipmotion.units.phones import count_phone_edits
 
 LOG = logging.getLogger("lipmotion")
@@ -45,7 +46,7 @@ MAX_WARNINGS = 20  # largest number of guessed pronunciations that are reported 
 FOREIGN_SHARE, MIN_FOREIGN = 0.25, 3
 """A text of which so large a share, and so many different words, are not in the dictionary is not English."""
 MAX_STRETCHES = 3  # largest number of stretches without words that are named in one warning
-REACH_S = 0.1  # a phone of a word may be heard so far from the middle that its recognition has
+REACH_S = 0.1  # a phone of a word may be heard so far from its recognition, and a word so far into those beside it
 MIN_INSERTED = 2  # fewer phones between words than this belong to them: recognition errs by one
 ALIKE_SHARE = 0.34  # words are said all the same where recognition finds their phones, but for so small a share
 MAX_REPLACED = 2
@@ -109,19 +110,17 @@ def transcribe(
     posteriors, sure = compute_phone_posteriors(analysed(audio))
     costs = SURE_COSTS if sure >= WORD_POSTERIORS[0] else WORD_COSTS
     evidence = find_evidence(posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units, costs)
-    if recognised is None or (refused is None and not (evidence.others and sure >= PHONE_POSTERIORS[0])):
-        fit = replace(fit, missing=evidence.gaps, evidence=evidence)
-        warn_of_misfit(fit)
-        return Transcription(units, fit)
-    phones_recognised = recognised()
-    evidence = _compare(evidence, phones_recognised)
+    corrected = recognised is not None and (refused is not None or (evidence.others and sure >= PHONE_POSTERIORS[0]))
+    phones_recognised = recognised() if recognised is not None and corrected else Timeline[Unit](())
+    evidence = _compare(evidence, phones_recognised) if corrected else evidence
     fit = replace(fit, missing=evidence.gaps, evidence=evidence)
-    warn_of_misfit(fit, corrected=True)
-    if fit.is_doubtful:
+    warn_of_misfit(fit, corrected=bool(corrected))
+    if fit.is_doubtful and corrected:
         return Transcription(None, fit)
     if refused is not None and not evidence.unsaid:
         raise refused
-    if evidence.gaps or evidence.unsaid:
+    is_wrong, timed = bool(evidence.gaps or evidence.unsaid), isinstance(words, TimedTranscript) and words.has_times
+    if (corrected and is_wrong) or not (is_wrong or timed or _are_in_order(units, evidence)):
         units = _correct(phones, audio, features, evidence, phones_recognised, lexicon)
     return Transcription(units, fit)
 
@@ -195,6 +194,16 @@ def _match_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> t
     return words, taken
 
 
+def _are_in_order(units: Timeline[Unit], evidence: TranscriptEvidence) -> bool:
+    """Return whether no word was aligned where the words beside it are heard, as forced alignment in noise does."""
+    aligned = [span for span in group_words(units) if span.label]
+    pairs = zip(pairwise(aligned), pairwise(evidence.words), strict=False)
+    return all(
+        before.end_s <= heard_after.start_s + REACH_S and after.start_s >= heard_before.end_s - REACH_S
+        for (before, after), (heard_before, heard_after) in pairs
+    )
+
+
 def _select_recognised(
     recognised: Timeline[Unit], evidence: TranscriptEvidence, other: OtherSpeech
 ) -> list[list[Span[Unit]]]:
@@ -238,18 +247,22 @@ def _correct(
 ) -> Timeline[Unit]:
     """Return the words of a transcript that are said, and what is recognised beside them, aligned."""
     labels: list[tuple[str, float | None]] = []
+    heard_s: list[tuple[float, float]] = []
     variants: dict[str, tuple[Pronunciation, ...]] = {}
     for number, word in enumerate((*evidence.words, None)):
         for other in (each for each in evidence.others if each.first == number):
             for run in _select_recognised(recognised, evidence, other):
                 variants[str(len(labels))] = (tuple(span.label.phone for span in run),)
                 labels.append((run[0].label.word, run[0].label.confidence))
+                heard_s.append((run[0].start_s, run[-1].end_s))
         if word is not None and word.is_said:
             known = lexicon.pronunciations(word.word)
             variants[str(len(labels))] = known if word.phones in known else (word.phones,)
             labels.append((word.word, None))
+            heard_s.append((word.start_s, word.end_s))
     spans = list[Span[Unit]]()
-    for span in phones.align(audio, features, tuple(variants), Lexicon(variants)):
+    anchors = bound_words(heard_s)
+    for span in phones.align(audio, features, tuple(variants), Lexicon(variants), anchors):
         text, confidence = labels[int(span.label.word)] if span.label.word else ("", None)
         spans.append(replace(span, label=replace(span.label, word=text, confidence=confidence)))
     return Timeline(tuple(spans))

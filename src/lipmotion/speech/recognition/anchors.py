@@ -20,6 +20,9 @@ LINE_TOLERANCE_S, WORD_TOLERANCE_S = 0.5, 0.25
 WIDENING_FACTORS, MIN_IMPROVEMENT = (2, 4, 8, 16), 0.2
 """Where words press against their windows or fit badly, the tolerance is widened by these factors in turn; it stays
 wider where the words then fit better by this many nats a frame."""
+LEAD_S, TAIL_S, REACH_S = 0.2, 0.4, 0.1
+"""A word begins so long before its first sound is heard at most, and ends so long after its last one, for a network
+hears each sound once, drawn-out ones somewhere within them; both may be off by the third."""
 BAD_FIT, WORST_FIT = -3.5, -6.0
 """Words that fit worse than the first, in nats a frame, may be elsewhere; worse than the second, they are not there."""
 FREE_FRAMES = 60_000  # recordings of up to ten minutes are aligned without times where these belong to something else
@@ -36,6 +39,7 @@ class Anchors:
     end_s: NDArray[np.float64]  # NaN where it is not known
     tolerance_s: NDArray[np.float64]  # by how much the word may be earlier or later
     groups: NDArray[np.intp]  # number of the word's time, which other words of its line may share
+    heard: bool = False  # the words were heard there: no fit is better elsewhere
 
 
 def find_anchors(transcript: TimedTranscript) -> Anchors:
@@ -55,6 +59,17 @@ def find_anchors(transcript: TimedTranscript) -> Anchors:
     table = np.array(rows, float).reshape(-1, 3)  # None becomes NaN
     differs = ~np.isclose(table[1:, :2], table[:-1, :2], equal_nan=True).all(axis=1)
     return Anchors(table[:, 0], table[:, 1], table[:, 2], np.append(0, np.cumsum(differs)))
+
+
+def bound_words(heard_s: Sequence[tuple[float, float]]) -> Anchors:
+    """Return times of words that a phone recogniser hears: between the words beside them, and near to these sounds.
+
+    heard_s : start and end of each word in seconds
+    """
+    starts_s, ends_s = np.array(heard_s, float).reshape(-1, 2).T
+    first_s = np.fmax(np.append(np.nan, ends_s[:-1]), starts_s - LEAD_S)
+    last_s = np.fmin(np.append(starts_s[1:], np.nan), ends_s + TAIL_S)
+    return Anchors(first_s, last_s, np.full(len(first_s), REACH_S), np.arange(len(first_s)), heard=True)
 
 
 def leave_out_late_lines(transcript: TimedTranscript, duration_s: float) -> TimedTranscript:
@@ -163,6 +178,8 @@ def align_within(
         return search(windows), windows, tolerance_s
 
     placed, windows, tolerance_s = place_words(anchors.tolerance_s)
+    if anchors.heard:
+        return placed, windows
     for factor in WIDENING_FACTORS:
         fits = average_fits(placed, anchors.groups, frames)
         wider_s = np.maximum(factor * anchors.tolerance_s, tolerance_s)
