@@ -20,7 +20,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = verbs.add_parser("batch", help="turn thousands of recordings into lip motion, with a report")
     listed = "a folder of recordings, or a list: a path a line, or a table with columns file,transcript,output,speaker"
     add_input(parser, "source", what="list or folder of recordings", metavar="LIST|DIR", help=listed)
-    add_output(parser, "--out", is_folder=True, metavar="DIR", help="folder of the outputs")
+    add_output(parser, "-o", "--out", "--output", is_folder=True, metavar="DIR", help="folder of the outputs")
     checked = "only compare the recordings with their script: missing, silent, of the wrong length, twice there ..."
     parser.add_argument("--check", action="store_true", help=checked)
     kinds = "what animate writes (json csv glb mp4 ...) and cues.tsv .xml .json .dat .pgo .spine.json (default: json)"
