@@ -17,13 +17,18 @@ def test_several_times_and_any_engine(run, toy_model_file, coupled_model_file, t
 def test_without_a_time_all_states_are_listed(run, toy_model_file, toy_speech):
     listed = run("explain", toy_speech, "--model", toy_model_file)
     documents = [json.loads(line) for line in run("explain", toy_speech, "--model", toy_model_file, "--json").out]
-    assert (listed.code, listed.err) == (0, [])
-    assert listed.out[0].split() == ["from", "to", "phone", "word", "state"]
+    assert (listed.code, listed.err, listed.out[0].split()) == (0, [], ["from", "to", "phone", "word", "state"])
     assert [line[:8].strip() for line in listed.out[1:]] == [f"{document['start_s']:.2f}" for document in documents]
     assert {document["state"] for document in documents} >= {"rest"}
     few = run("explain", toy_speech, "--model", toy_model_file, "--count", "2")
-    assert few.out[1:3] == listed.out[1:3]
-    assert few.out[3] == f"and {len(documents) - 2} more (--count N prints N, --json all)"
+    assert few.out[1:] == [*listed.out[1:3], f"and {len(documents) - 2} more (--count N prints N, --json all)"]
+
+
+@pytest.mark.parametrize("words", ["explain SPEECH --at 0.5", "cues SPEECH -o a.tsv", "edit a.json --of SPEECH"])
+def test_a_terminal_shows_how_far_the_work_is(words, run, toy_model_file, toy_speech, monkeypatch):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    done = run(*(toy_speech if word == "SPEECH" else word for word in words.split()), "--model", toy_model_file)
+    assert "moving the mouth (1/1)" in "".join(done.err)
 
 
 @pytest.mark.long
@@ -52,7 +57,7 @@ def test_words_are_written_and_given_back(run, here):
 def test_for_people_and_programs(run):
     assert run("words", WELCOME) == (0, [SAID], [])
     done = run("words", WELCOME, "--machine-readable")
-    start, success = map(json.loads, done.out)
-    assert (start["type"], success["type"]) == ("start", "success")
+    start, *progress, success = map(json.loads, done.out)
+    assert (start["type"], progress[0]["value"], success["type"]) == ("start", 0.0, "success")
     assert " ".join(word["word"] for word in success["words"]) == SAID
     assert 0 < success["confidence"] < 1

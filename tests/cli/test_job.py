@@ -24,7 +24,7 @@ from meshes.heads import head, write_glb
 
 LINE = """animate a.wav --transcript t.txt --model m.lipmotion --pauses natural -o a.json b.mp4 -o c.vtt --channels
 opening,width --fps 30 --face man --jaw none --control-points --to csv,mp4 --still blinks,head --face-seed 3 --stepped
---offset-ms -40 --background #102030"""
+--offset-ms -4e1 --background #102030"""
 SAME = Job(
     Request(Path("a.wav"), "t.txt", pauses="natural", model=Path("m.lipmotion")),
     Outputs(
@@ -134,7 +134,7 @@ def test_a_batch_takes_a_job(run, here, toy_speech, toy_model_file):
         f"[request]\nmodel = {str(toy_model_file)!r}\nrecogniser = 'own'\n"
         "[outputs]\nkinds = ['csv']\nrate_hz = 25\nchannels = ['opening']\n"
     )
-    line = ("batch", "sounds", "--out", "out", "--job", "scene.toml", "--jobs", "1", "--channels", "width")
+    line = ("batch", "sounds", "-o", "out", "--job", "scene.toml", "--jobs", "1", "--channels", "width")
     assert run(*line).code == 0
     rows = (here / "out" / "a.csv").read_text().splitlines()
     assert (rows[0], re.split(",", rows[2])[0]) == ("time_s,width", "0.04")

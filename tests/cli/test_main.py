@@ -55,6 +55,7 @@ def test_a_misspelt_option(run):
 def test_a_word_that_is_no_verb(run):
     for words, hint in (
         (["animat", "a.wav"], "no verb 'animat'; did you mean: lipmotion animate"),
+        (["corpus", "prepar", "a", "-o", "b"], "no verb 'prepar'; did you mean: lipmotion corpus prepare"),
         (["bogus"], "no verb 'bogus'; the verbs are: animate, batch, live, speak"),
     ):
         check_refused(run(*words), 2, hint)
@@ -194,25 +195,18 @@ def keys(lines: list[str]) -> list[str]:
 
 def test_the_shipped_model_is_cited_by_default(run, coupled_model_file):
     done = run("cite")
-    assert (done.code, done.err) == (0, [])
-    assert keys(done.out) == ["lipmotion", *ENGINE_KEYS["trajectory"], "cooke2006"]
+    assert (done.code, done.err, keys(done.out)) == (0, [], ["lipmotion", *ENGINE_KEYS["trajectory"], "cooke2006"])
     assert done.out == run("cite", find_shipped()).out
     done = run("cite", coupled_model_file)
-    assert (done.code, done.err) == (0, [])
-    assert keys(done.out) == ["lipmotion", *ENGINE_KEYS["coupled"]]
+    assert (done.code, done.err, keys(done.out)) == (0, [], ["lipmotion", *ENGINE_KEYS["coupled"]])
 
 
 def test_engines_and_keys(run):
-    for name in sorted(ENGINE_KEYS):
+    for name in sorted({*ENGINE_KEYS, *ENGINES.built_in}):
         assert keys(run("cite", name).out) == ["lipmotion", *ENGINE_KEYS[name]]
     for key in set(bibliography()) - {"lipmotion"}:
         done = run("cite", key)
         assert (done.code, done.err, keys(done.out)) == (0, [], [key])
-
-
-def test_every_built_in_engine_names_its_papers():
-    assert set(ENGINE_KEYS) == set(ENGINES.built_in)
-    assert {key for named in ENGINE_KEYS.values() for key in named} <= set(bibliography())
 
 
 def test_what_a_header_adds():

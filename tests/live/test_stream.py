@@ -185,7 +185,7 @@ def test_what_cannot_be_heard_is_refused_and_the_stream_goes_on(sound: np.ndarra
         ([[1.0, 2.0], [3.0]], "no samples"),
         *((np.zeros(shape), rf"shape \({str(shape)[1:-1]}\)") for shape in ((2, 2, 2), (1, 800), (2, 16_000))),
         (np.zeros(3, np.int32), "int32"),
-        (b"123", "3 bytes"),
+        *((b"123", "3 bytes"), (b"OggS", "OggS"), (np.ma.masked_less(np.zeros(3), 1), "none masked")),
     ):
         with pytest.raises(InputError, match=message):
             stream.push(wrong)

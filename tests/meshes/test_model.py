@@ -158,7 +158,7 @@ def test_names_as_files_spell_them():
     assert {spelled: shape_names.to_arkit(spelled) for spelled in arkit} == arkit
     assert len({*shape_names.ARKIT_MOUTH, *shape_names.ARKIT_OTHERS}) == 52
     visemes = {"viseme_PP": "PP", "viseme_I": "ih", "vrc.v_oh": "oh", "Viseme_aa": "aa", "viseme_ZZ": None}
-    visemes |= {"viseme_PP.001": "PP", "aa": None}
+    visemes |= {"viseme_PP.001": "PP", "aa": None, "V_Dental_Lip": "FF", "V_L": None, "G8F__eCTRLvM": "PP"}
     assert len(set(shape_names.VISEMES_15)) == 15
     assert {spelled: shape_names.find_viseme(spelled) for spelled in visemes} == visemes
     vowels = {"Fcl_MTH_A": "aa", "Fcl_MTH_O.003": "oh", "aa": "aa", "う": "ou", "oh": "oh"}

@@ -35,10 +35,10 @@ def test_frames_have_times_and_channels_have_names() -> None:
 
 def test_it_says_what_does_not_fit() -> None:
     for changes, message in (
-        ({"values": np.zeros((3, 1))}, r"shape \(3, 1\), required \(T, 2\)"),
-        ({"values": np.zeros(3)}, r"shape \(3,\), required \(T, 2\)"),
+        ({"values": np.zeros((3, 1))}, r"shape \(3, 1\), required unmasked \(T, 2\)"),
+        ({"values": np.zeros(3)}, r"shape \(3,\), required unmasked \(T, 2\)"),
         ({"rate_hz": 0.0}, "rate is 0.0 Hz, required more than 0"),
-        ({"rate_hz": -1.0}, "rate is -1.0 Hz"),
+        ({"values": np.ma.masked_less(np.zeros((3, 2)), 1)}, r"required unmasked \(T, 2\)"),
         ({"rate_hz": float("nan")}, "rate is nan Hz"),
         ({"channels": (Channel("opening"), Channel("opening", "mm"))}, "names repeat: opening, opening"),
     ):

@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 from lipmotion.cli.arguments.declared import check_paths
 from lipmotion.cli.arguments.options import Version
 from lipmotion.cli.terminal.events import Events, Stopper
-from lipmotion.cli.terminal.printing import flush_output, print_usage, with_program_name
+from lipmotion.cli.terminal.printing import flush_output, print_error, print_usage
 from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.extensions import Registry
 from lipmotion.types.values import parse_number, parse_whole
@@ -31,7 +31,7 @@ VERBS: Registry[Callable[[Any], None]] = Registry("verb", "lipmotion.verbs", _PL
 """What adds each verb to the parser; those of faces, studio and lab are entry points."""
 MIN_LIKENESS = 0.7
 """So alike must an option be to one that does not exist to be suggested: ``--force`` is not meant by ``--voice``."""
-NUMBER = re.compile(r"-\d+|-\d*\.\d+")  # a negative number, which is no option
+NUMBER = re.compile(r"-(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?$")  # a negative number, which is no option
 EXIT_CODES = """exit codes: 0 done, 1 a bug (doctor: a broken part), 2 wrong command line, 3 unusable input, 4 corpus,
 5 alignment, 6 model file, 7 output, 8 missing package, 130 interrupted, 143 terminated"""
 
@@ -44,8 +44,8 @@ def run(words: Sequence[str], stopper: Stopper, events: Events) -> None:
     """
     if sys.stdout is None:
         raise ExportError("standard output is closed; open it, or send it to a file or to /dev/null")
-    handler, python_warnings = logging.StreamHandler(), logging.getLogger("py.warnings")
-    handler.setFormatter(_WarningFormatter())
+    handler, python_warnings = logging.Handler(), logging.getLogger("py.warnings")
+    handler.emit = lambda record: print_error(f"warning: {record.getMessage()}")  # type: ignore[method-assign]
     logging.basicConfig(handlers=[handler], level=logging.WARNING)
     show_before = warnings.showwarning
     # of Python or of another package, so that it is printed as one printable line
@@ -64,24 +64,16 @@ def run(words: Sequence[str], stopper: Stopper, events: Events) -> None:
 
 
 def parse_words(words: Sequence[str], options: argparse.Namespace) -> argparse.Namespace:
-    """Return the options, over those of a job file and a level.
-
-    If the first word is no verb, the error names the one that is most like it.
-    """
+    """Return the options, over those of a job file and a level. Raises WrongCommandLineError."""
     verb = next((word for word in words if not word.startswith("-")), None)
     program = parser([name for name in VERBS.names if name == verb])
-    verbs = _verbs(program)
-    if verb is not None and verb not in verbs:
-        near = get_close_matches(verb, verbs, n=1)
-        hint = f"did you mean: {program.prog} {near[0]}" if near else f"the verbs are: {', '.join(verbs)}"
-        program.error(f"no verb {verb!r}; {hint}")
     words = _put_positionals_first(program, words)
     empty = argparse.Namespace(**vars(options))
     options, unknown = program.parse_known_args(words, options)
     if getattr(options, "job", None) or getattr(options, "detail", None):  # what they say are the defaults by now
         options, unknown = program.parse_known_args(words, empty)
     if unknown:
-        verbs[options.verb].error(f"unrecognized arguments: {' '.join(unknown)}")
+        _verbs(program)[options.verb].error(f"unrecognized arguments: {' '.join(unknown)}")
     return options
 
 
@@ -110,10 +102,14 @@ def _put_positionals_first(parser: argparse.ArgumentParser, words: Sequence[str]
 
     Of ``-o OUT RECORDING`` argparse would take the recording for an output, too. If no word stands elsewhere, the last
     one is the recording, and so are those before it that exist and end alike, where a verb takes several.
-    Raises WrongCommandLineError: an option that the verb has not.
+    Raises WrongCommandLineError: no such verb, and which is most like it; an option that the verb has not.
     """
     verb, verbs = next((at for at, word in enumerate(words) if not word.startswith("-")), len(words)), _verbs(parser)
-    if verb < len(words) and words[verb] in verbs:
+    if verb < len(words) and verbs:
+        if words[verb] not in verbs:
+            near = get_close_matches(words[verb], verbs, n=1)
+            hint = f"did you mean: {parser.prog} {near[0]}" if near else f"the verbs are: {', '.join(verbs)}"
+            parser.error(f"no verb {words[verb]!r}; {hint}")
         return [*words[: verb + 1], *_put_positionals_first(verbs[words[verb]], words[verb + 1 :])]
     known, moved, taken, at = parser._option_string_actions, list[int](), list[int](), 0
     words = [  # "-o OUT" may be one word, as for Rhubarb
@@ -146,7 +142,7 @@ def _find_recordings(positional: argparse.Action, words: Sequence[str], taken: S
 
 def _is_option(word: str) -> bool:
     """Return whether argparse takes a word for an option: not a pipe, a negative number, or words with a space."""
-    return word.startswith("-") and word != "-" and " " not in word and not NUMBER.fullmatch(word)
+    return word.startswith("-") and word != "-" and " " not in word and not NUMBER.match(word)
 
 
 def _find_option(parser: argparse.ArgumentParser, word: str) -> argparse.Action | None:
@@ -175,6 +171,7 @@ class _Parser(argparse.ArgumentParser):
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
+        self._negative_number_matcher = NUMBER
         self.register("type", int, parse_whole)
         self.register("type", float, partial(parse_number, finite=False))
 
@@ -185,8 +182,3 @@ class _Parser(argparse.ArgumentParser):
 
     def _print_message(self, message: str, file: Any = None) -> None:
         print_usage(message, is_wanted=file is sys.stdout)
-
-
-class _WarningFormatter(logging.Formatter):
-    def format(self, record: logging.LogRecord) -> str:
-        return with_program_name(f"warning: {record.getMessage()}")

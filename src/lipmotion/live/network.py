@@ -28,6 +28,7 @@ from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS, SPEECH_RATE_HZ
 
 TAPS, BLOCK = 16, 160
 """Zero crossings of the resampling filter on either side; and samples that are resampled at a time, 10 ms."""
+FILE_STARTS = (b"RIFF", b"OggS", b"fLaC", b"ID3\3", b"ID3\4", b"\x1aE\xdf\xa3")  # of WAV, Ogg, FLAC, MP3, WebM
 LARGEST_SAMPLE = 1e6  # samples beyond this are no sound, also where full scale is not 1
 
 
@@ -80,6 +81,8 @@ class Resampler:
 def mono_samples(samples: Any) -> NDArray[np.float32]:
     """Return samples as floats of one channel, full scale 1. Raises InputError: as ``Stream.push``."""
     if isinstance(samples, bytes | bytearray) or (isinstance(samples, memoryview) and samples.itemsize == 1):
+        if (start := bytes(samples[:4])) in FILE_STARTS:
+            raise InputError(f"bytes of a file, which begin with {start!r}; required its samples: decode it first")
         if len(samples) % 2:
             raise InputError(f"{len(samples)} bytes of sound, required whole samples of 16 bits")
         samples = np.frombuffer(samples, "<i2")
@@ -87,10 +90,10 @@ def mono_samples(samples: Any) -> NDArray[np.float32]:
         values = np.asarray(samples)
     except ValueError as error:
         raise InputError(f"no samples ({error}), required an array of shape (N,) or (N, C)") from error
-    is_number = values.dtype.kind == "f" or (values.dtype.kind == "i" and values.itemsize == 2)
+    is_number = not np.ma.is_masked(samples) and (values.dtype.kind == "f" or values.dtype.str[1:] == "i2")
     if not is_number or values.ndim not in (1, 2) or not all(0 < count <= MAX_CHANNELS for count in values.shape[1:]):
         found = f"samples of shape {values.shape} and type {values.dtype}"
-        raise InputError(f"{found}, required (N,) or (N, C), C at most {MAX_CHANNELS}, floats or int16")
+        raise InputError(f"{found}, required (N,) or (N, C), C at most {MAX_CHANNELS}, floats or int16, none masked")
     with np.errstate(over="ignore"):
         floats = values.astype(np.float32) / np.float32(32768 if values.dtype.kind == "i" else 1)
     if not (np.abs(floats) <= LARGEST_SAMPLE).all():

@@ -77,7 +77,7 @@ def _read_form(form: str, kind: Any) -> tuple[re.Pattern[str], dict[str, Any]]:
     """Return the pattern of a kind of sentence, and what reads its values, by the names of the fields."""
     types, names = get_type_hints(kind), re.findall(r"{(\w+)}", form)
     pattern = re.sub(r"\\{(\w+)\\}", lambda name: f"({_READ[types[name[1]]][0]})", re.escape(form))
-    return re.compile(pattern.replace(r"\ ", r"\s+")), {name: _READ[types[name]][1] for name in names}
+    return re.compile(pattern.replace(r"\ ", r"\s+"), re.IGNORECASE), {name: _READ[types[name]][1] for name in names}
 
 
 def _written(value: object) -> str:
@@ -437,7 +437,7 @@ def parse_step(sentence: str) -> Step:
             values = zip(readers.items(), match.groups(), strict=True)
             stated = kind(**{name: read(text) for (name, read), text in values})
             return stated if isinstance(stated, Step) else CurveStep(stated)
-    first = sentence.split()[:1]
+    first = sentence.lower().split()[:1]
     near = [form for form in FORMS if form.split()[:1] == first] or FORMS
     required = f"required {'one of: ' if len(near) > 1 else ''}{'; '.join(near)}"
     raise InputError(f"{shorten(repr(sentence))} is no edit; {required} (whole numbers, seconds as 1.24, one word)")

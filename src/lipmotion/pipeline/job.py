@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.outputs.output import Output, OutputSettings, ShownFace
     from lipmotion.types import Audio, Generation
 
-RECOGNITION = 0.3  # the share of the work that is recognition, where a video is drawn, too
+RECOGNITION = {True: 0.3, False: 0.6}  # the share of the work that is motion, where a video is drawn, and where none
 
 
 @dataclass(frozen=True)
@@ -127,12 +127,12 @@ def run(  # noqa: PLR0913
         model=model,
         edits=edits,
         workers=workers,
-        monitor=sub_monitor(monitor, 0.0, RECOGNITION if draws else 1.0),
+        monitor=sub_monitor(monitor, 0.0, RECOGNITION[draws]),
         background=face.load if draws else None,
         curves=list_curve_names(curves) if curves else (),
     )
-    drawing = sub_monitor(monitor, RECOGNITION, 1.0)
-    write_job_outputs(job, face, generation, recording, model=model, temporary=temporary, monitor=drawing)
+    writing = sub_monitor(monitor, RECOGNITION[draws], 1.0)
+    write_job_outputs(job, face, generation, recording, model=model, temporary=temporary, monitor=writing)
     return generation
 
 

@@ -36,8 +36,9 @@ class Audio:
 
     def __post_init__(self) -> None:
         samples = self.samples
-        if not isinstance(samples, np.ndarray) or samples.dtype.kind != "f" or samples.ndim != 1:
-            found = f"{samples.dtype} {samples.shape}" if isinstance(samples, np.ndarray) else type(samples).__name__
+        is_array = isinstance(samples, np.ndarray) and not np.ma.is_masked(samples)
+        if not is_array or samples.dtype.kind != "f" or samples.ndim != 1:
+            found = f"{samples.dtype} {samples.shape}" if is_array else type(samples).__name__
             how = f"divide integers of 16 bits by {FULL_SCALE}, take the mean of channels"
             raise InputError(f"the samples are {found}, required a NumPy array of floats of shape (N,); {how}")
         if isinstance(self.rate_hz, str | None) or not self.rate_hz > 0:

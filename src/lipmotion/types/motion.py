@@ -59,8 +59,8 @@ class Motion:
     channels: tuple[Channel, ...]
 
     def __post_init__(self) -> None:
-        if self.values.ndim != 2 or self.values.shape[1] != len(self.channels):
-            raise InputError(f"motion values have shape {self.values.shape}, required (T, {len(self.channels)})")
+        if np.ma.is_masked(self.values) or self.values.ndim != 2 or self.values.shape[1] != len(self.channels):
+            raise InputError(f"motion values of shape {self.values.shape}, required unmasked (T, {len(self.channels)})")
         if not 0 < self.rate_hz < float("inf"):
             raise InputError(f"motion rate is {self.rate_hz} Hz, required more than 0 and finite")
         if len(set(self.names)) != len(self.channels):

@@ -195,13 +195,12 @@ def evaluate(
 
 
 def _was_trained_on(model: Model, utterances: Sequence[Utterance], folder: str) -> bool:
-    """Return whether a model was trained on some utterances, as far as its header says: corpus, list, speakers."""
-    about = model.about
-    split, speakers, corpora = about.get("split"), about.get("speakers"), about.get("corpus", ())
+    """Return whether a model, or its prior, was trained on some utterances, as far as its header says."""
     return any(
-        utterance.source.get("collection", folder) in corpora
-        and split in (utterance.split, "all")
-        and (not speakers or utterance.speaker in speakers)
+        utterance.source.get("collection", folder) in about.get("corpus", ())
+        and about.get("split") in (utterance.split, "all")
+        and utterance.speaker in (about.get("speakers") or [utterance.speaker])
+        for about in [each.about for each in (model, model.prior) if each is not None]
         for utterance in utterances
     )
 

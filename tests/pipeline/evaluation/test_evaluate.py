@@ -202,14 +202,15 @@ def test_without_transcripts_there_is_audio_only_and_one_that_does_not_fit_is_na
 
 def test_a_model_on_its_own_training_list_is_named(toy_model, toy_corpus, figures):
     training = [toy_corpus.utterance(toy_corpus.names("train")[0])]
-    about = toy_model.about
+    another = replace(toy_model, about={**toy_model.about, "corpus": ["another"]})
     assert "seen_in_training" not in figures
     assert _was_trained_on(toy_model, training, "toy")
-    assert _was_trained_on(replace(toy_model, about={**about, "split": "all"}), held_out(toy_corpus), "toy")
-    assert not _was_trained_on(replace(toy_model, about={**about, "corpus": ["another"]}), training, "toy")
-    assert not _was_trained_on(replace(toy_model, about={**about, "speakers": ["ben"]}), training, "toy")
-    first = Selection(names=toy_corpus.names("train")[:1])
-    assert evaluate(toy_model, toy_corpus, selection=first)["seen_in_training"] is True
+    all_of_it, of_ben = ({**toy_model.about, **other} for other in ({"split": "all"}, {"speakers": ["ben"]}))
+    assert _was_trained_on(replace(toy_model, about=all_of_it), held_out(toy_corpus), "toy")
+    assert _was_trained_on(replace(another, prior=toy_model), training, "toy")
+    assert not _was_trained_on(another, training, "toy")
+    assert not _was_trained_on(replace(toy_model, about=of_ben), training, "toy")
+    assert evaluate(toy_model, toy_corpus, selection=Selection(names=[training[0].name]))["seen_in_training"] is True
 
 
 def renamed(motion: Motion) -> Motion:

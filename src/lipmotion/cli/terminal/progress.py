@@ -7,7 +7,7 @@ import errno
 import logging
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from typing import Any
 
@@ -17,7 +17,7 @@ from lipmotion.errors import ExportError, InputError, LipMotionError
 from lipmotion.extensions import describe_failed_extension
 from lipmotion.printable import printable
 from lipmotion.storage.files import as_text
-from lipmotion.types.progress import Item, Progress, warnings_to
+from lipmotion.types.progress import Item, Monitor, Progress, warnings_to
 
 
 class Report:
@@ -133,14 +133,14 @@ _NAMES = {number: name.capitalize() for name, number in LEVELS.items()}
 
 
 @contextmanager
-def print_status_lines(options: argparse.Namespace) -> Iterator[Callable[[float], None]]:
-    """Yield a function that reports progress, 0 to 1; report success at the end.
+def print_status_lines(options: argparse.Namespace) -> Iterator[Monitor]:
+    """Yield a monitor that shows progress; report success at the end.
 
     Warnings become events, too, where events are asked for, and go to the log file, where there is one, which is told
     how it ended as well. Raises ExportError: that file cannot be written.
     """
     events: Events = options.events
-    root = logging.getLogger()
+    root, report = logging.getLogger(), Report(options)
     path, handlers = options.log_file, root.handlers
     log: logging.Handler = logging.NullHandler(LEVELS["fatal"] + 1)
     if path is not None:
@@ -150,21 +150,29 @@ def print_status_lines(options: argparse.Namespace) -> Iterator[Callable[[float]
             raise ExportError(f"{path}: the log cannot be written: {error.strerror or error}") from error
         log.setLevel(LEVELS[options.log_level])
         log.setFormatter(_LogFormatter(datefmt="%Y-%m-%d %H:%M:%S"))
-    console = [_StatusHandler(events)] if isinstance(events, RhubarbStatus) else handlers
+    console = handlers
+    if isinstance(events, RhubarbStatus):
+        status, console = events, [logging.Handler()]
+        console[0].emit = lambda record: status.emit("log", _name_level(record), record.getMessage())  # type: ignore[method-assign]
     root.handlers = [*(console if LEVELS[options.console_level] <= logging.WARNING else ()), log]
 
     def note(level: str, message: str) -> None:
         if LEVELS[level] >= log.level:
             log.handle(logging.LogRecord("", LEVELS[level], "", 0, message, None, None))
 
-    def progress(done: float) -> None:
+    def receive(event: Progress | Item) -> None:
+        done = round(event.share, 4) if isinstance(event, Progress) else 0.0
         note("trace", f"Progress: {done:.0%}")
         if isinstance(events, RhubarbStatus):
             events.emit("progress", "Trace", f"Progress: {done:.0%}", value=done)
+        elif done < 1:
+            report.receive(event)
+        else:
+            report.close()
 
     try:
         note("info", f"Application startup. Input file: {as_text(options.speech)}.")
-        yield progress
+        yield receive
         options.stopper.settle()
         note("info", "Application terminating normally.")
         if isinstance(events, RhubarbStatus):
@@ -174,20 +182,15 @@ def print_status_lines(options: argparse.Namespace) -> Iterator[Callable[[float]
         note("fatal", f"Application terminating with error: {known[1] if known else error!r}")
         raise
     finally:
+        report.close()
         root.handlers = handlers
         log.close()
 
 
 class _LogFormatter(logging.Formatter):
     def format(self, record: logging.LogRecord) -> str:
-        name = _NAMES.get(record.levelno, record.levelname.capitalize())
-        return f"[{self.formatTime(record, self.datefmt)}] 1 [{name}] {record.getMessage()}"
+        return f"[{self.formatTime(record, self.datefmt)}] 1 [{_name_level(record)}] {record.getMessage()}"
 
 
-class _StatusHandler(logging.Handler):
-    def __init__(self, events: RhubarbStatus) -> None:
-        super().__init__()
-        self._events = events
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self._events.emit("log", _NAMES.get(record.levelno, record.levelname.capitalize()), record.getMessage())
+def _name_level(record: logging.LogRecord) -> str:
+    return _NAMES.get(record.levelno, record.levelname.capitalize())

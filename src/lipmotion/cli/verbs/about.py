@@ -14,15 +14,13 @@ from lipmotion.cli.arguments.options import add_arguments, add_machine_readable
 from lipmotion.cli.terminal.printing import print_line, print_lines
 from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.errors import InputError, LipMotionError
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types.progress import Item
 
 LIPMOTION, EIGENLIPS, ADAPTATION, GRID = "lipmotion", "xieliu2007", "gales1998", "cooke2006"
 """Keys of the software itself, of the methods of eigenlips and of adaptation, and of the GRID corpus."""
-ENGINE_KEYS: Mapping[str, tuple[str, ...]] = {
-    "trajectory": ("hofer2008", "tokuda2000", "tokuda1999", "shinoda2000", "fujinaga2001", "silen2012"),
-    "coupled": ("xieliu2007", "tokuda2000", "fujinaga2001", "silen2012"),
-    "selection": ("minnisbreen2000", "verhelst1993"),
-    "joint": ("hofer2008", "tokuda2000", "tokuda1999", "shinoda2000"),
+ENGINE_KEYS: Mapping[str, list[str]] = {
+    row["engine"]: row["keys"].split() for row in read_shipped_table("lipmotion", "engine_citations.csv")
 }
 """Keys of the papers that each built-in engine implements, with its default options."""
 
@@ -118,20 +116,13 @@ def _run_completion(options: argparse.Namespace) -> None:
     from lipmotion.cli.command_line import parser
 
     program = parser()
-    _complete_files(program)
-    print_lines(shtab.complete(program, shell=options.shell).removesuffix("\n"))
-
-
-def _complete_files(parser: argparse.ArgumentParser) -> None:
-    """Let every value that has no choices be a file."""
-    import shtab
-
-    for action in parser._actions:
+    parsers = [program]
+    for action in (action for each in parsers for action in each._actions):
         if isinstance(action, argparse._SubParsersAction):
-            for verb in action.choices.values():
-                _complete_files(verb)
-        elif action.choices is None and action.nargs != 0:
+            parsers += action.choices.values()
+        elif action.choices is None and action.nargs != 0:  # a file may be the value
             action.complete = shtab.FILE  # type: ignore[attr-defined] # where shtab looks for it
+    print_lines(shtab.complete(program, shell=options.shell).removesuffix("\n"))
 
 
 def add_doctor(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

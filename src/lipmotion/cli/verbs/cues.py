@@ -18,6 +18,7 @@ from lipmotion.pipeline.request import Request
 from lipmotion.storage.files import as_text
 from lipmotion.storage.sources import Source, check_apart, is_file
 from lipmotion.types.delivery import Delivery
+from lipmotion.types.progress import Progress, sub_monitor
 
 RECOGNISERS = {"pocketsphinx": "auto", "phonetic": "fast"}  # the recogniser that takes the place of each of Rhubarb's
 VERSION = "; takes the options of Rhubarb Lip Sync version 1.14.0"
@@ -110,24 +111,22 @@ def run(options: argparse.Namespace) -> None:
 
     if options.output == [Path(PIPE)]:
         options.output = []  # they are printed
-    with print_status_lines(options) as set_progress, read_pipe(options.speech) as speech:
+    with print_status_lines(options) as monitor, read_pipe(options.speech) as speech:
         if [path.suffix.lower() in {"", ".txt"} for path in options.output] == [True]:
             options.format = options.format or "tsv"  # as Rhubarb writes whatever the name is
         check_apart(options.output, _find_words(Path(options.speech)), force=options.force)
         delivery, requested = pick_part(options, Delivery()), pick_part(options, Request(), recording=speech)
         check_cue_options(options.fps, options.hold, options.shapes)
         check_cue_outputs(options.output, speech, options.format)
-        set_progress(0.0)
-        request, model = read_request(requested), load_model(requested.model)
-        set_progress(0.1)
-        edits = edit_file(requested.edits)
-        result, delivery = animate(request, model=model, edits=edits), edits.edits.delivery(delivery)
-        set_progress(0.9)
+        monitor(Progress("loading the model", 0, 1, 0.0))
+        request, model, edits = read_request(requested), load_model(requested.model), edit_file(requested.edits)
+        result = animate(request, model=model, edits=edits, monitor=sub_monitor(monitor, 0.1, 0.9))
+        delivery = edits.edits.delivery(delivery)
         sheet = cues(result, fps=options.fps, hold_frames=options.hold, shapes=options.shapes, delivery=delivery)
         sheet = replace(sheet, blair=options.blair or not options.letters)
         speech_path = "" if is_pipe(options.speech) else speech
         write_cues(sheet, options.output, speech=speech_path, form=options.format)
-        set_progress(1.0)
+        monitor(Progress("writing the cues", 1, 1, 1.0))
         for path in options.output:
             print_line(path)
         if not options.output:

@@ -24,7 +24,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Read or begin the file, add the edits, try them out, and write it."""
+    from lipmotion.pipeline.analysis.read_request import read_request
     from lipmotion.pipeline.edit_files import create_edit_file, read_edits, write_edits
+    from lipmotion.pipeline.session import Session
     from lipmotion.units import group_words
 
     with report_progress(options) as report:
@@ -33,9 +35,10 @@ def run(options: argparse.Namespace) -> None:
         if options.of is not None and options.file.exists():
             raise InputError(f"{options.file}: exists; add edits without --of, or delete it to begin again")
         requested = pick_part(options, Request(), recording=options.of)
-        file = create_edit_file(requested)[0] if options.of is not None else read_edits(options.file)
+        of = Session(read_request(requested), monitor=report.receive) if options.of is not None else None
+        file = create_edit_file(requested, of)[0] if of is not None else read_edits(options.file)
         after = file.undo(options.undo).then(*options.sentences)
-        session, edits = file.session(), after.edits
+        session, edits = file.session(monitor=report.receive), after.edits
         units = session.generate(edits).units if edits.steps else session.units()
         if options.of is not None or options.undo or options.sentences:
             write_edits(after, options.file)

@@ -18,23 +18,23 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = verbs.add_parser("explain", help="print which states and Gaussians the motion of a frame comes from")
     add_options(parser, Request, but=("edits",))
     add_arguments(parser, __package__, "explain")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, machine_readable=False)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Call ``lipmotion.explain`` and print the explanations; without a time, ``lipmotion.state_runs`` and the runs."""
+    """Print what ``lipmotion.explain`` returns; without a time, what ``lipmotion.state_runs`` does."""
     from lipmotion.pipeline.analysis.read_request import read_request
-    from lipmotion.pipeline.generate.explain import explain, run_lines, state_runs, write_document, write_explanation
-    from lipmotion.pipeline.model import load_model
+    from lipmotion.pipeline.generate import explain
+    from lipmotion.pipeline.session import NO_EDITS, Session
 
-    requested = pick_part(options, Request())
-    request, model = read_request(requested), load_model(requested.model)
-    if options.at is not None:
-        explanations = explain(request, at=options.at, model=model)
-        documents, text = map(write_document, explanations), "\n\n".join(map(write_explanation, explanations))
-    else:
-        runs = state_runs(request, model=model)
-        documents, text = map(asdict, runs), "\n".join(run_lines(runs, options.count))
+    with report_progress(options) as report:
+        session = Session(read_request(pick_part(options, Request())), monitor=report.receive)
+        if options.at is not None:
+            frames = explain.explain_session(session, NO_EDITS, options.at)
+            documents, text = map(explain.write_document, frames), "\n\n".join(map(explain.write_explanation, frames))
+        else:
+            runs = explain.list_runs(session.generate())
+            documents, text = map(asdict, runs), "\n".join(explain.run_lines(runs, options.count))
     if not options.json:
         print_lines(text)
         return
@@ -61,7 +61,8 @@ def run_words(options: argparse.Namespace) -> None:
     with report_progress(options) as report:
         paths = language.check_word_outputs(options.output, options.speech)
         request = Request(options.speech, recogniser=options.recogniser)
-        recognition = language.recognise_words(request, model=options.model, workers=count_workers(options))
+        how: dict[str, Any] = {"workers": count_workers(options), "monitor": report.receive}
+        recognition = language.recognise_words(request, model=options.model, **how)
         language.write_words(recognition.words, paths)
         report.finish(
             "\n".join(map(str, options.output)) or language.format_words(recognition.words).removesuffix("\n"),

@@ -65,11 +65,9 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _read_pipe(rate_hz: int) -> Iterator[bytes]:
-    rest, begins = b"", True
+    rest = b""
     while content := os.read(sys.stdin.fileno(), 2 * int(CHUNK_S * rate_hz)):
-        if begins and content.startswith(b"RIFF"):
-            raise InputError("standard input is a .wav; required: samples without a header, or the name of the file")
-        content, begins = rest + content, False
+        content = rest + content
         even = len(content) // 2 * 2
         rest = content[even:]
         yield content[:even]

@@ -19,8 +19,9 @@ VISEMES_15 = ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa",
 """The visemes of Oculus and OpenXR, in their order."""
 VRM_VOWELS = ("aa", "ih", "ou", "ee", "oh")  # the mouth shapes of VRM
 VRM_EMOTIONS = ("angry", "happy", "relaxed", "sad", "surprised")  # the expressions of VRM that moods use
-_VISEME_SPELLINGS = {"i": "ih", "o": "oh", "u": "ou"} | {name.lower(): name for name in VISEMES_15}
-_VOWEL_SPELLINGS = {"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh"} | {name: name for name in VRM_VOWELS}
+_SPELLINGS = read_shipped_table("lipmotion.meshes.model", "spoken_names.csv")
+_VISEME_SPELLINGS = {row["spelling"]: row["viseme"] for row in _SPELLINGS if row["viseme"]}
+_VOWEL_SPELLINGS = {row["spelling"]: row["vowel"] for row in _SPELLINGS if row["vowel"]}
 _VOWEL_SPELLINGS |= dict(zip("あいうえお", VRM_VOWELS, strict=True))
 _ARKIT = {name.lower(): name for name in (*ARKIT_MOUTH, *ARKIT_OTHERS)}
 _SIDES = {"l": "left", "r": "right", "left": "left", "right": "right"}
@@ -42,7 +43,7 @@ def to_arkit(name: str) -> str | None:
 
 def find_viseme(name: str) -> str | None:
     """Return the Oculus name of a viseme as files spell it, or None: ``viseme_I`` and ``vrc.v_ih`` are ``ih``."""
-    match = re.search(r"(?:viseme|vrc\.v|v)[_.\-](\w+?)$", _COPY.sub("", name), re.IGNORECASE)
+    match = re.search(r"(?:(?:viseme|vrc\.v|v)[_.\-]|e(?=ctrlv))(\w+?)$", _COPY.sub("", name), re.I)
     return _VISEME_SPELLINGS.get(match[1].lower()) if match else None
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
@@ -20,8 +21,9 @@ from lipmotion.speech.recognition.recogniser import open_recogniser
 from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.storage.files import atomic_file, check_distinct, check_target
 from lipmotion.storage.json_text import as_json
-from lipmotion.types import Audio, TimedTranscript, TimedWord, Timeline, TranscriptLine
+from lipmotion.types import SPEECH_RATE_HZ, Audio, TimedTranscript, TimedWord, Timeline, TranscriptLine
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
+from lipmotion.types.progress import ItemT, Monitor, ParallelMap, Progress, ResultT, silent_monitor
 from lipmotion.units.ipa_phones import read_tokens
 from lipmotion.units.lexicon import detect_language, is_english
 from lipmotion.units.spoken_text import parse_tagged_text
@@ -114,12 +116,14 @@ LINE_PAUSE_S = 0.5  # a longer pause between words ends a line of text
 
 
 @limit_threads()
-def recognise_words(speech: SpeechInput, *, model: Model | str | Path | None = None, workers: int = 1) -> Recognition:
+def recognise_words(
+    speech: SpeechInput, *, model: Model | str | Path | None = None, workers: int = 1, monitor: Monitor = silent_monitor
+) -> Recognition:
     """Return the English words of a recording in time, with the phones that they or free recognition decided.
 
     speech  : an audio or video file, samples at 16 kHz, or a ``Request``, of which the transcript is not used
     model   : whose phone models align the words: from ``load_model``, or a path; None: the shipped one
-    workers : as of ``animate``
+    workers, monitor : as of ``animate``
     Raises InputError: the recording is not usable, or the recogniser does not recognise words.
     Raises MissingDependencyError: pocketsphinx is not installed.
 
@@ -132,13 +136,33 @@ def recognise_words(speech: SpeechInput, *, model: Model | str | Path | None = N
     chosen = model if isinstance(model, Model) else load_model(model or request.model)
     if request.recogniser != "auto":
         raise InputError(f"the recogniser {request.recogniser!r} recognises phones, not words; required 'auto'")
+    monitor(Progress("recognising words", 0, 1, 0.0))
     audio = analysed(read_recording(request))
     recogniser = open_recogniser(chosen.phones, request.recogniser, chosen.adaptation)
-    if workers == 1:
-        return recogniser.recognition(audio, audio.mfcc())
     from lipmotion.pipeline.workers import map_in_processes
 
-    return recogniser.recognition(audio, audio.mfcc(), map_in_processes(workers))
+    each: ParallelMap = map if workers == 1 else map_in_processes(workers)
+    return recogniser.recognition(audio, audio.mfcc(), report_seconds(each, audio.duration_s, monitor))
+
+
+def report_seconds(each: ParallelMap, duration_s: float, monitor: Monitor) -> ParallelMap:
+    """Return a map over stretches of samples (16 bit, 16 kHz) that reports how far into the sound it is."""
+
+    def map_with_reports(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+        lengths_s: deque[float] = deque()
+
+        def measured() -> Iterator[ItemT]:
+            for item in items:
+                lengths_s.append(len(item) / 2 / SPEECH_RATE_HZ if isinstance(item, bytes) else 0.0)
+                yield item
+
+        done_s = 0.0
+        for result in each(function, measured()):
+            done_s += lengths_s.popleft()
+            monitor(Progress("recognising words, seconds", int(done_s), int(duration_s), min(done_s / duration_s, 1.0)))
+            yield result
+
+    return map_with_reports
 
 
 def format_words(words: Timeline[RecognisedWord]) -> str:

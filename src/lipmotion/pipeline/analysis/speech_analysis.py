@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import logging
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.pipeline.analysis.language import warn_of_another_language
+from lipmotion.pipeline.analysis.language import report_seconds, warn_of_another_language
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_recording, read_request
 from lipmotion.pipeline.model import Model, with_prior
 from lipmotion.pipeline.request import DETECTED, Request
@@ -39,7 +38,6 @@ from lipmotion.speech.sound.voice_events import find_voice_events, silence_units
 from lipmotion.storage.sources import is_file
 from lipmotion.types import (
     FRAME_RATE_HZ,
-    SPEECH_RATE_HZ,
     Audio,
     Features,
     Monitor,
@@ -56,6 +54,7 @@ from lipmotion.types import (
     VoiceEvent,
     frames_of,
     silent_monitor,
+    sub_monitor,
 )
 from lipmotion.types.audio import LAUGHTER
 from lipmotion.types.delivery import MoodTag
@@ -67,8 +66,6 @@ from lipmotion.units.text_normalisation import require_tokens
 if TYPE_CHECKING:
     from lipmotion.speech.recognition.agreement import TranscriptFit
 
-ItemT = TypeVar("ItemT")
-ResultT = TypeVar("ResultT")
 
 UNHEARD_S = 0.05  # phones may last so long outside of all passages, and half of their time: alignment is no surer
 LATE_S = 0.1  # seconds by which given units may end after the sound; editing programs round times
@@ -128,7 +125,7 @@ def analyse_speech(
     monitor(Progress("reading the sound", 0, 1, 0.0))
     audio = analysed(read_recording(request))
     monitor(Progress("recognising phones", 0, 1, 0.02))
-    analysis = _find_phones(model, request, audio, _report_progress(each, audio.duration_s, monitor))
+    analysis = _find_phones(model, request, audio, report_seconds(each, audio.duration_s, sub_monitor(monitor, *WORDS)))
     speech, recognition = analysis.speech, analysis.recognition
     tones = [(first / FRAME_RATE_HZ, end / FRAME_RATE_HZ) for first, end in audio.tones]
     events = find_voice_events(audio, speech.units) if request.manner == DETECTED else ()
@@ -213,27 +210,6 @@ def align_between(
 
 def _open_recogniser(model: Model, request: Request) -> Recogniser:
     return open_recogniser(model.phones, request.recogniser, model.adaptation)
-
-
-def _report_progress(each: ParallelMap, duration_s: float, monitor: Monitor) -> ParallelMap:
-    """Return a map over stretches of samples (16 bit, 16 kHz) that reports how far into the sound it is."""
-
-    def map_with_reports(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
-        lengths_s: deque[float] = deque()
-
-        def measured() -> Iterator[ItemT]:
-            for item in items:
-                lengths_s.append(len(item) / 2 / SPEECH_RATE_HZ if isinstance(item, bytes) else 0.0)
-                yield item
-
-        done_s = 0.0
-        for result in each(function, measured()):
-            done_s += lengths_s.popleft()
-            share = WORDS[0] + (WORDS[1] - WORDS[0]) * min(done_s / duration_s, 1.0)
-            monitor(Progress("recognising words, seconds", int(done_s), int(duration_s), share))
-            yield result
-
-    return map_with_reports
 
 
 def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: ParallelMap) -> SpeechAnalysis:

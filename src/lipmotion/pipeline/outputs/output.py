@@ -32,6 +32,7 @@ from lipmotion.storage.files import check_distinct, check_target
 from lipmotion.storage.sources import VIDEO_SUFFIXES
 from lipmotion.types import SPEECH_RATE_HZ, Audio, Generation, Monitor, Prosody, silent_monitor
 from lipmotion.types.delivery import Staging
+from lipmotion.types.progress import sub_monitor, with_progress
 
 LOG = logging.getLogger("lipmotion")
 Made = TypeVar("Made")
@@ -318,7 +319,7 @@ def write(  # noqa: PLR0913
     curves   : what motion files hold instead of the motion, unless ``channels`` asks for more: ``arkit``, ``visemes``,
                ``fap``, a table of a rig (``.csv``), or a character with blendshapes (docs/meshes.md)
     temporary : whether ``speech`` is a file that will be gone, which outputs then do not name
-    monitor  : receives reports of the progress of videos
+    monitor  : receives reports of the progress
     Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
     Raises InputError: a frame rate out of its range, or an unknown channel or face.
     The arguments are checked before the first file is written.
@@ -354,5 +355,7 @@ def write_performance(performance: Performance, outputs: Sequence[str | Path], *
     if performance.sound_file is None or temporary:
         written = (output.path for output in planned if isinstance(output, SoundOutput))
         performance = replace(performance, sound_file=next(written, None))
-    for write_file in [output.prepare(performance) for output in planned]:  # nothing, if the motion does not suit one
+    shown = sub_monitor(performance.monitor, 0.0, float(not any(output.draws for output in planned)))
+    prepared = with_progress(planned, "preparing the files", shown)
+    for write_file in [output.prepare(performance) for output in prepared]:  # nothing, if the motion does not suit one
         write_file()
