@@ -6,7 +6,7 @@ Each loop has transitions along its own axis of the joint states only, so a fram
 Probabilities of a frame are scaled to sum to ``WHOLE``, and raised to 1 / ``WHOLE`` where they are less. Densities are
 multiplied in double precision, and products under a least value are set to 0. So no number is denormal, which would be
 many times slower, nor the product of two probabilities. What that may lose is bounded, and where it is too much, the
-recording is computed in the next precision, at last in logarithms: slow, and exact however improbable a path is.
+recording is computed in logarithms: slow, and exact however improbable a path is.
 """
 
 from __future__ import annotations
@@ -27,20 +27,17 @@ from lipmotion.kernels.factorial_loops import (
     join_logs,
     log_ends,
 )
+from lipmotion.kernels.forward_backward import add_logs
 
 Array = NDArray[Any]
 Index = NDArray[np.intp]
 Double = NDArray[np.float64]
-SINGLE, DOUBLE = np.dtype(np.float32), np.dtype(np.float64)
-OFF: dict[np.dtype[Any], float] = {SINGLE: 1e-4, DOUBLE: 1e-10}
-"""By precision: the largest share of the likelihood that may come of probabilities that were raised."""
-WHOLE: dict[np.dtype[Any], float] = {SINGLE: 1e16, DOUBLE: 1e70}
-"""By precision: the sum of the probabilities of a frame. They are raised to 1 divided by this where they are less."""
-MIN_PRODUCT = {SINGLE: 1e-37, DOUBLE: 1e-300}
-"""By precision: smaller products of probabilities and densities are set to 0."""
-MIN_TOTAL = {SINGLE: 1e-20, DOUBLE: 1e-150}
-"""By precision: least sum of these products, as a share of the whole. With such a sum, what was set to 0 or underflowed
-is less than what probabilities are raised to."""
+OFF = 1e-10  # the largest share of the likelihood that may come of probabilities that were raised
+WHOLE = 1e70  # the sum of the probabilities of a frame. They are raised to 1 divided by this where they are less
+MIN_PRODUCT = 1e-300  # smaller products of probabilities and densities are set to 0
+MIN_TOTAL = 1e-150
+"""Least sum of these products, as a share of the whole. With such a sum, what was set to 0 or underflowed is less than
+what probabilities are raised to."""
 MIN_POSTERIOR = 1e-20  # smaller posteriors and counts are set to 0, as those of states that cannot be are not quite 0
 MIN_PROBABILITY = 1e-100
 """Least probability of a transition, or of beginning or ending in a state: products of smaller ones may underflow."""
@@ -62,8 +59,7 @@ class FactorialPosteriors(NamedTuple):
     Posteriors and counts under 1e-20 are 0.
 
     Guaranteed but for rounding, however improbable a path is at first: the likelihood is right to a share of δ, and the
-    errors of the posteriors of a frame, or of the counts of a step from frame to frame, sum to 3 δ at most: δ is 1e-4
-    for log densities in single precision, 1e-10 for those in double precision (``OFF``).
+    errors of the posteriors of a frame, or of the counts of a step from frame to frame, sum to 3 δ at most; δ: ``OFF``.
     """
 
     audio: Array
@@ -80,22 +76,20 @@ def infer_factorial(
     """Return the posteriors and expected counts of a recording in two loops.
 
     stretch : frames whose forward probabilities are stored at once, others are computed twice; None: √T, or what fits
-    Log densities in single precision are processed in single precision where that loses nothing, which takes half the
-    time. Where few joint states are possible, or double precision may lose paths that count, because they were some 250
-    nats below a frame's best, the recording is processed in logarithms.
+    Where few joint states are possible, or double precision may lose paths that count, because they were some 250 nats
+    below a frame's best, the recording is processed in logarithms.
     Source: Ghahramani & Jordan (1997), "Factorial hidden Markov models", appendix B. Forward and backward probabilities
     are raised to a least one, so they are upper bounds; how much comes of that follows from their overlap in a frame.
     Cost: time O(T·Na·Nv·(Ua + Uv)), memory O(stretch + T/stretch) times Na·Nv.
     """
     order = np.lexsort(logs.pairs.T[::-1])
     logs = logs._replace(pair=logs.pair[:, order], pairs=logs.pairs[order])
-    ways: list[_Scaled | _InLogs] = []
     share = np.prod([np.mean(log > -np.inf) for log in (logs.audio, logs.visual)])
-    probabilities = (p for loop in (audio, visual) for p in (*_moves(loop, DOUBLE), loop.initial, loop.final))
+    probabilities = (p for loop in (audio, visual) for p in (*_moves(loop), loop.initial, loop.final))
     lowest = min(float(part.min(where=part > 0, initial=1.0)) for part in probabilities)
-    if lowest >= MIN_PROBABILITY and share > SPARSE_SHARE:
-        ways += [_Scaled(audio, visual, logs, kind) for kind in OFF if kind in (DOUBLE, logs.audio.dtype)]
-    results = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
+    is_scaled = lowest >= MIN_PROBABILITY and share > SPARSE_SHARE
+    ways = (way(audio, visual, logs) for way in ((_Scaled, _InLogs) if is_scaled else (_InLogs,)))
+    results = (_forward_backward((audio, visual), logs, way, stretch) for way in ways)
     result = next(each for each in results if each is not None)
     return result._replace(pair=result.pair[:, np.argsort(order)])
 
@@ -105,7 +99,7 @@ def _forward_backward(
 ) -> FactorialPosteriors | None:
     """Return the posteriors, computed in a way; None: its precision is not enough."""
     frames = len(logs.audio)
-    stretch = stretch or count_cached_frames(frames, way.frame_bytes)
+    stretch = stretch or count_cached_frames(frames, way.initial.nbytes)
     starts, heads, log_likelihood = range(0, frames, stretch), list[Array | None](), 0.0
     forward: Forward = []
     for start in starts:
@@ -137,19 +131,18 @@ Entered = tuple[Double, Double]
 
 
 class _Scaled:
-    """Steps of forward–backward with scaled probabilities, in one precision."""
+    """Steps of forward–backward with scaled probabilities."""
 
-    def __init__(self, audio: Loop, visual: Loop, logs: FactorialLogLikelihoods, kind: np.dtype[Any]) -> None:
-        self.logs, self.kind, self.whole = logs, kind, WHOLE[kind]
+    def __init__(self, audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -> None:
+        self.logs = logs
         self.initial, self.final = log_ends(audio, visual)
-        self.audio, self.visual = _moves(audio, kind), _moves(visual, kind)
+        self.audio, self.visual = _moves(audio), _moves(visual)
         self.start, self.densities = 0, list[tuple[Array, Array, Array, float]]()
         self.after = self.initial, self.initial  # of the frame after: backward probabilities times densities, leaving
         # In a frame, what was raised is 1 / whole² at most for each joint state, forward and backward, times the sum of
         # all that leads to a state or from it: up to U + 2 ≤ 3 U in each loop.
-        raised = 2 * len(logs.audio) * 9 * self.initial.size / self.whole**2
-        self.min_log_overlap = math.log(raised / OFF[kind])
-        self.frame_bytes = self.initial.size * kind.itemsize
+        raised = 2 * len(logs.audio) * 9 * self.initial.size / WHOLE**2
+        self.min_log_overlap = math.log(raised / OFF)
 
     def forward(self, start: int, stop: int, before: Array | None, results: Forward) -> float:
         """Append the forward probabilities of some frames, and those of leaving the last visual states after the audio
@@ -171,9 +164,9 @@ class _Scaled:
             total = _forward(
                 before, stay, onward, entering, *self.visual[:2], moved @ self.visual[2],
                 audio, visual, pair, self.logs.pairs,
-                MIN_PRODUCT[self.kind], self.whole, after,
+                MIN_PRODUCT, WHOLE, after,
             )  # fmt: skip
-            if not total > MIN_TOTAL[self.kind]:
+            if not total > MIN_TOTAL:
                 return -math.inf
             log_total += math.log(total) + best
             results.append((after, moved))
@@ -194,9 +187,8 @@ class _Scaled:
                 if not log > -math.inf:
                     break
                 rows, columns = map(np.arange, before.shape)
-                logs = np.log(before.astype(np.float64))
-                log_overlap = _meet_in_logs(logs, self.final, self.logs.pairs, rows, columns, *sums)
-                log_overlap -= math.log(self.whole)
+                log_overlap = _meet_in_logs(np.log(before), self.final, self.logs.pairs, rows, columns, *sums)
+                log_overlap -= math.log(WHOLE)
             else:
                 audio, visual, pair, _ = self.densities[t - self.start]
                 (stay, onward, leave), units, count = self.visual, len(self.audio[2]), len(self.visual[2])
@@ -206,16 +198,16 @@ class _Scaled:
                 after = np.empty_like(before)
                 total = _backward(
                     before, moved, *self.audio[:2], self.audio[2] @ moved[:units], audio, visual, pair,
-                    self.logs.pairs, MIN_PRODUCT[self.kind], self.whole, after, *sums,
+                    self.logs.pairs, MIN_PRODUCT, WHOLE, after, *sums,
                 )  # fmt: skip
                 met = float(sums[0].sum())
-                if not (met > 0 and total > MIN_TOTAL[self.kind]):
+                if not (met > 0 and total > MIN_TOTAL):
                     break
                 for values in sums:
                     values[:] = values / met
-                entered[0][:] += before[-units:] @ moved[:units].T / np.float64(met)
-                entered[1][:] += leaving.T @ first / np.float64(met)
-                log_overlap = math.log(met) - 2 * math.log(self.whole)
+                entered[0][:] += before[-units:] @ moved[:units].T / met
+                entered[1][:] += leaving.T @ first / met
+                log_overlap = math.log(met) - 2 * math.log(WHOLE)
             log_overlaps[t - start], self.after = log_overlap, (after, forward[t - start][1])
             if not log_overlap >= self.min_log_overlap:
                 break
@@ -225,18 +217,15 @@ class _Scaled:
         """Return probabilities, scaled, and the log of their sum before, from log probabilities."""
         best = float(joint.max())
         if not math.isfinite(best):
-            return np.zeros(joint.shape, self.kind), -math.inf
+            return np.zeros(joint.shape), -math.inf
         joint = np.exp(joint - best)
         total = float(joint.sum())
-        shares = np.maximum(joint * (self.whole / total), 1 / self.whole).astype(self.kind)
-        return shares, math.log(total) + best
+        return np.maximum(joint * (WHOLE / total), 1 / WHOLE), math.log(total) + best
 
 
-def _moves(loop: Loop, kind: np.dtype[Any]) -> tuple[Array, Array, Array]:
+def _moves(loop: Loop) -> tuple[Array, Array, Array]:
     """Return probabilities of staying, of going on, and from each unit's last state to each unit's first."""
-    parts = loop.stay.ravel(), loop.onward.ravel(), loop.leave[:, None] * loop.enter
-    stay, onward, leaving = (np.ascontiguousarray(part, kind) for part in parts)
-    return stay, onward, leaving
+    return loop.stay.ravel(), loop.onward.ravel(), loop.leave[:, None] * loop.enter
 
 
 class _InLogs:
@@ -248,10 +237,11 @@ class _InLogs:
         self.loops, self.logs = (LogTransitions.of(audio), LogTransitions.of(visual)), logs
         self.back_loops = self.loops[0].reverse(), self.loops[1].reverse()
         self.initial, self.final = log_ends(audio, visual)
-        self.frame_bytes = self.initial.nbytes
-        self.possible = logs.audio > -np.inf, logs.visual > -np.inf
-        for possible, states in zip(self.possible, logs.pairs.T, strict=True):
-            np.logical_or.at(possible.T, states, -np.inf < logs.pair.T)
+        possible = []
+        for log, states in zip((logs.audio, logs.visual), logs.pairs.T, strict=True):
+            paired = (logs.pair > -np.inf).astype(np.float32) @ np.eye(log.shape[1], dtype=np.float32)[states]
+            possible.append((log > -np.inf) | (paired > 0))
+        self.possible = possible[0], possible[1]
         self.after = self.initial, self.initial  # of the frame after: backward probabilities times densities, leaving
 
     def forward(self, start: int, stop: int, before: Array | None, results: Forward) -> float:
@@ -282,18 +272,19 @@ def _forward_in_logs(
 
     before : of the frame before; of the first frame, of beginning
     """
-    columns = np.flatnonzero(possible[1][max(start - 1, 0)])
+    columns, moved = np.flatnonzero(possible[1][max(start - 1, 0)]), np.full_like(before, -np.inf)
     for t in range(start, start + len(joint)):
         after, rows, before_columns = joint[t - start], np.flatnonzero(possible[0][t]), columns
         columns = np.flatnonzero(possible[1][t])
         if t == 0:
-            after[:] = before
+            for i in rows:
+                after[i, columns] = before[i, columns]
         else:
-            moved = np.full(after.shape, -np.inf)
+            moved[:] = -np.inf
             _move_logs(before, loops[0], rows, before_columns, moved)
             _move_logs(moved.T, loops[1], columns, rows, after.T)
             leaving[t - start] = moved[:, moved.shape[1] - leaving.shape[2] :]
-        after += join_logs(logs, t)
+        _add_densities(logs, t, rows, columns, after)
         before = after
 
 
@@ -310,11 +301,13 @@ def _back_in_logs(
     """
     log_overlaps, units, others = np.empty(len(joint)), len(entered[0]), len(entered[1])
     rows_after = np.flatnonzero(possible[0][min(start + len(joint), len(logs.audio) - 1)])
+    moved, beta, backward = np.full_like(final, -np.inf), np.full_like(final, -np.inf), backward.copy()
     for t in range(start + len(joint) - 1, start - 1, -1):
         before, rows, columns = joint[t - start], np.flatnonzero(possible[0][t]), np.flatnonzero(possible[1][t])
-        beta, moved = np.full(before.shape, -np.inf), np.full(before.shape, -np.inf)
+        moved[:], beta[:] = -np.inf, -np.inf
         if t + 1 == len(logs.audio):
-            beta[:] = final
+            for i in rows:
+                beta[i, columns] = final[i, columns]
         else:
             turned = moved.shape[1] - 1 - columns[::-1], len(moved) - 1 - rows[::-1]
             _move_logs(backward.T[::-1], loops[1], turned[0], rows_after, moved.T[::-1])
@@ -322,19 +315,23 @@ def _back_in_logs(
         sums = posteriors[0][t], posteriors[1][t], posteriors[2][t]
         log_overlap = _meet_in_logs(before, beta, logs.pairs, rows, columns, *sums)
         if t + 1 < len(logs.audio) and log_overlap > -np.inf:
-            _count_entered(before[len(before) - units :], moved[:units], log_overlap, entered[0])
-            _count_entered(leaving_after.T, backward[:, :others].T, log_overlap, entered[1])
-        beta += join_logs(logs, t)
-        log_overlaps[t - start], backward, leaving_after, rows_after = log_overlap, beta, leaving[t - start], rows
+            last, first = before[len(before) - units :, columns], moved[:units, columns]
+            _count_entered(last, first, log_overlap, entered[0])
+            last, first = leaving_after[rows_after], backward[rows_after, :others]
+            _count_entered(last.T, first.T, log_overlap, entered[1])
+        _add_densities(logs, t, rows, columns, beta)
+        log_overlaps[t - start], leaving_after, rows_after = log_overlap, leaving[t - start], rows
+        backward, beta = beta, backward
     return log_overlaps, backward
 
 
 @compiled
-def _add_logs(one: float, other: float) -> float:
-    """Return the logarithm of the sum of two probabilities."""
-    best = max(one, other)
-    less = min(one, other) - best
-    return best + math.log1p(math.exp(less)) if less > MIN_LOG_SHARE else best
+def _add_densities(logs: FactorialLogLikelihoods, t: int, rows: Index, columns: Index, joint: Double) -> None:
+    """Add the log densities of a frame in rows and columns, outside of which all is -inf."""
+    densities = join_logs(logs, t)
+    for i in rows:
+        for j in columns:
+            joint[i, j] += densities[i, j]
 
 
 @compiled
@@ -355,7 +352,7 @@ def _sum_entering(
         else:
             sums[c] = -np.inf
             for u in range(len(last)):
-                sums[c] = _add_logs(sums[c], last[u, columns[c]] + loop.leaving[u, state])
+                sums[c] = add_logs(sums[c], last[u, columns[c]] + loop.leaving[u, state])
     return sums
 
 
@@ -374,7 +371,7 @@ def _move_logs(before: Double, loop: LogTransitions, rows: Index, columns: Index
         entering = _sum_entering(last, loop, i, columns, parts, tops) if i < units else tops
         for c, j in enumerate(columns):
             other = entering[c] if i < units else before[i - units, j] + loop.onward[i - units]
-            after[i, j] = _add_logs(before[i, j] + loop.stay[i], other)
+            after[i, j] = add_logs(before[i, j] + loop.stay[i], other)
 
 
 @compiled
@@ -482,23 +479,22 @@ def _backward(
             _combine(moved[i], stay[i], moved[i + units], onward[i], beta)
         else:
             _combine(moved[i], stay[i], left[i - inner], 1.0, beta)
-        alpha, total, first = before[i], np.float64(0), p
+        alpha, total, first = before[i], 0.0, p
         for j in range(len(beta)):
-            product = np.float64(alpha[j]) * beta[j]
+            product = alpha[j] * beta[j]
             posterior_1[j] += product
             total += product
         posterior_0[i] = total
         p = _emit(beta, i, p, density_0, density_1, pair, pairs, floor, after[i])
         for q in range(first, p):
-            posterior_pair[q] = np.float64(alpha[pairs[q, 1]]) * beta[pairs[q, 1]]
+            posterior_pair[q] = alpha[pairs[q, 1]] * beta[pairs[q, 1]]
     return _share(after, mass)
 
 
 @compile_to_rounding
 def _combine(one: Array, weight: float, other: Array, other_weight: float, into: Array) -> None:
-    first, second = into.dtype.type(weight), into.dtype.type(other_weight)
     for j in range(len(into)):
-        into[j] = first * one[j] + second * other[j]
+        into[j] = weight * one[j] + other_weight * other[j]
 
 
 @compile_to_rounding
@@ -509,11 +505,11 @@ def _emit(
     """Fill in row i times its densities; its pairs are from p on: return the first pair of the next row."""
     density = density_0[i]
     for j in range(len(prior)):
-        partly = np.float64(prior[j]) * density
+        partly = prior[j] * density
         product = (partly if partly > floor else 0.0) * density_1[j]
         into[j] = product if product > floor else 0.0
     while p < len(pairs) and pairs[p, 0] == i:
-        product = np.float64(prior[pairs[p, 1]]) * pair[p]
+        product = prior[pairs[p, 1]] * pair[p]
         into[pairs[p, 1]] = product if product > floor else 0.0
         p += 1
     return p
@@ -521,8 +517,8 @@ def _emit(
 
 @compile_to_rounding
 def _share(joint: Array, mass: float) -> float:
-    """Make probabilities sum to ``whole``, raised to 1 / ``whole`` at least; return their sum before, by ``whole``."""
-    flat, total = joint.reshape(joint.size), np.float64(0)
+    """Make probabilities sum to ``mass``, raised to 1 / ``mass`` at least; return their sum before, by ``mass``."""
+    flat, total = joint.reshape(joint.size), 0.0
     for j in range(len(flat)):
         total += flat[j]
     scale, floor = mass / total if total > 0 else 0.0, 1 / mass

@@ -20,6 +20,7 @@ MIN_LOG = -700.0  # probabilities with smaller logarithms are set to 0
 LOG_2 = math.log(2)
 
 
+@compiled
 def log_forward_backward(
     log_initial: Array, log_emission: Array, arc_from: Index, arc_to: Index, arc_log: Array, log_final: Array
 ) -> tuple[Array, Array, float]:
@@ -34,22 +35,27 @@ def log_forward_backward(
     alpha[t, s] = log P(frames up to t, state s at t); beta[t, s] = log P(frames after t | state s at t).
     Source: Rabiner 1989, §III, in logarithms.  Cost: O(T·E).
     """
-    alpha, beta = np.full((2, *log_emission.shape), -np.inf)
-    counts, last = np.zeros(len(arc_log)), len(log_emission) - 1
+    alpha, beta = np.full(log_emission.shape, -np.inf), np.full(log_emission.shape, -np.inf)
+    counts, last, log_likelihood = np.zeros(len(arc_log)), len(log_emission) - 1, -np.inf
 
     alpha[0] = log_initial + log_emission[0]
     for t in range(1, last + 1):
-        np.logaddexp.at(alpha[t], arc_to, alpha[t - 1, arc_from] + arc_log)
+        for arc, source in enumerate(arc_from):
+            target = arc_to[arc]
+            alpha[t, target] = add_logs(alpha[t, target], alpha[t - 1, source] + arc_log[arc])
         alpha[t] += log_emission[t]
-    log_likelihood = float(np.logaddexp.reduce(alpha[last] + log_final))
-    if np.isneginf(log_likelihood):
+    for log in alpha[last] + log_final:
+        log_likelihood = add_logs(log_likelihood, log)
+    if log_likelihood == -np.inf:
         return beta, counts, log_likelihood
 
     beta[last] = log_final
     for t in range(last - 1, -1, -1):
-        onward = arc_log + (log_emission[t + 1] + beta[t + 1])[arc_to]
-        np.logaddexp.at(beta[t], arc_from, onward)
-        counts += np.exp(alpha[t, arc_from] + onward - log_likelihood)
+        entered = log_emission[t + 1] + beta[t + 1]
+        for arc, source in enumerate(arc_from):
+            onward = arc_log[arc] + entered[arc_to[arc]]
+            beta[t, source] = add_logs(beta[t, source], onward)
+            counts[arc] += math.exp(alpha[t, source] + onward - log_likelihood)
     return alpha + beta - log_likelihood, counts, log_likelihood
 
 
@@ -100,7 +106,7 @@ def _chains(
         for t in range(1, T):
             alpha[t, 0] = max(alpha[t - 1, 0] + stay[0] + emission[t, 0], LOG_ZERO)
             for s in range(1, S):
-                arrive = _log_sum(alpha[t - 1, s] + stay[s], alpha[t - 1, s - 1] + move[s - 1])
+                arrive = add_logs(alpha[t - 1, s] + stay[s], alpha[t - 1, s - 1] + move[s - 1])
                 alpha[t, s] = max(arrive + emission[t, s], LOG_ZERO)
         total = log_likelihood[u] = alpha[T - 1, S - 1] + move[S - 1]
         beta, onward = np.full(S, LOG_ZERO), np.empty(S)
@@ -112,7 +118,7 @@ def _chains(
                 for s in range(S):
                     keep = stay[s] + onward[s]
                     stays[t, u, s] = alpha[t, s] + keep - total
-                    reach = _log_sum(keep, move[s] + onward[s + 1]) if s + 1 < S else keep
+                    reach = add_logs(keep, move[s] + onward[s + 1]) if s + 1 < S else keep
                     beta[s] = max(reach, LOG_ZERO)
             for s in range(S):
                 alpha[t, s] = alpha[t, s] + beta[s] - total
@@ -120,7 +126,8 @@ def _chains(
 
 
 @compiled
-def _log_sum(x: float, y: float) -> float:
+def add_logs(x: float, y: float) -> float:
+    """Return the logarithm of the sum of two probabilities."""
     if x == y:
         return x + LOG_2
     high, low = max(x, y), min(x, y)

@@ -109,7 +109,7 @@ class ForwardBackwardNetwork(NamedTuple):
             at place s is the sum over chains of ``log_emissions[c][:, columns[c][s]]``
         columns       : of each chain [shape=(S,)]
         What is computed is ``log_forward_backward``: by ``_forward_backward`` in the precision of ``log_emissions``;
-        where that would lose what counts, in double precision, and at last in logarithms by NumPy.
+        where that would lose what counts, in double precision, and at last in logarithms.
         Cost: O(T·E), and exponentials of densities; in double precision twice, in logarithms fifty times as slow.
         """
         precision, layout = log_emissions[0].dtype, self.layout
@@ -134,10 +134,8 @@ class ForwardBackwardNetwork(NamedTuple):
                 log_likelihood = (np.log(scales) + best).sum() + best_first + (len(root) - 1) * weights.best
                 return NetworkPosteriors(root, counts, float(log_likelihood))
         arc_to = np.repeat(np.arange(len(self.arc_start)), np.diff(self.arc_start, append=len(self.arc_from)))
-        log_posterior, counts, log_likelihood = log_forward_backward(
-            log_first, _joint(logs, columns)[:, layout.place], self.arc_from, arc_to, log_arcs,
-            np.zeros(len(log_first)),
-        )  # fmt: skip
+        parts = _joint(logs, columns)[:, layout.place], self.arc_from, arc_to, log_arcs, np.zeros(len(log_first))
+        log_posterior, counts, log_likelihood = log_forward_backward(log_first, *parts)
         return NetworkPosteriors(np.exp(log_posterior)[:, layout.order].astype(precision), counts, log_likelihood)
 
 

@@ -6,7 +6,7 @@ import pytest
 from engines.coupled.tiny import KINDS, chains, observations, structure
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled import conversion
-from lipmotion.engines.coupled.conversion import EXACT, PRINTED, SOFT, VITERBI, convert, path_to_means
+from lipmotion.engines.coupled.conversion import EXACT, PRINTED, SOFT, VITERBI, convert
 from lipmotion.stats.curves import with_dynamics
 from lipmotion.testing import example, examples, speech, timeline
 from lipmotion.types import silent_monitor
@@ -46,12 +46,11 @@ def test_the_viterbi_start_is_the_means_along_the_best_path():
     (lips,), _ = convert(model, data, model.full_lattice, VITERBI, EXACT, 0)
     path, _ = max(oracle.paths(model, data.without_visual_streams()), key=lambda pair: pair[1])
     group = model.groups[1]
-    expected = [
-        (np.exp(group.mixtures.log_weights[d])[:, None] * group.mixtures.means[d]).sum(axis=0)
-        for d in group.tie[list(path)]
-    ]
+    means = (np.exp(group.mixtures.log_weights)[:, :, None] * group.mixtures.means).sum(axis=1)
+    expected = means[group.tie[list(path)]]
     np.testing.assert_allclose(lips, expected, rtol=1e-5)
-    np.testing.assert_allclose(path_to_means(model, np.array(path), 1), expected, rtol=1e-5)
+    (lips,), _ = convert(model, data, model.full_lattice, VITERBI, EXACT, 0, np.array(path[::-1]))
+    np.testing.assert_allclose(lips, expected[::-1], rtol=1e-5)
 
 
 def test_the_maximiser_is_where_the_derivative_vanishes():

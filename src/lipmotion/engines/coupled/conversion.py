@@ -24,6 +24,7 @@ from lipmotion.stats.pca import find_principal_axes, measure_covariance
 from lipmotion.stats.trees import create_statistics, ridge
 
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
 SOFT, VITERBI = "soft", "viterbi"
 STARTS = (SOFT, VITERBI)
 EXACT, PRINTED = "exact", "printed"
@@ -38,7 +39,7 @@ def convert(
     start: str = SOFT,
     update: str = EXACT,
     max_steps: int = 10,
-    speech_inference: Inference | None = None,
+    given_speech: Inference | Index | None = None,
 ) -> tuple[tuple[Array, ...], tuple[float, ...]]:
     """Return the visual streams that maximise the joint likelihood with speech, near the start.
 
@@ -47,7 +48,7 @@ def convert(
     start        : ``soft``: expected means over all paths, given speech; ``viterbi``: the paper's, along the best path
     update       : ``exact``: the maximiser of each M-step; ``printed``: Eq. 9 as it stands
     max_steps    : greatest number of EM steps after the start
-    speech_inference : posteriors given speech alone, where they are known; a soft start needs them
+    given_speech : where it is known, what the start is made of: the posteriors, or the path, given speech alone
     Returns the streams [each shape=(T, D_s)], and the log likelihood per frame by step. With ``exact`` updates the
     joint likelihood never falls; with ``printed`` ones it may.
     Source: Xie & Liu 2007, Eqs. 3–11, Fig. 6.
@@ -60,10 +61,11 @@ def convert(
         return tuple(weighted / np.maximum(precision, 1e-300) for precision, weighted in statistics)
 
     if start == VITERBI:
-        path, _ = chains.best_path(speech, lattice)
+        path = given_speech if isinstance(given_speech, np.ndarray) else chains.best_path(speech, lattice)[0]
         streams = tuple(path_to_means(chains, path, stream) for stream in visual)
     else:
-        streams = update_streams(speech_inference or chains.infer(speech, lattice), EXACT)
+        inference = given_speech if isinstance(given_speech, Inference) else chains.infer(speech, lattice)
+        streams = update_streams(inference, EXACT)
     if not max_steps:
         return streams, ()
     result = run_em(
@@ -103,7 +105,7 @@ def sum_precisions(chains: Chains, inference: Inference, stream: int, update: st
     return precisions, weighted_means
 
 
-def path_to_means(chains: Chains, path: NDArray[np.intp], stream: int) -> Array:
+def path_to_means(chains: Chains, path: Index, stream: int) -> Array:
     """Return the mean of a stream's mixture in every state along a path of joint states [shape=(T, D)]."""
     group = chains.groups[group_index(chains, stream)]
     mixtures = group.stream_mixtures(stream)

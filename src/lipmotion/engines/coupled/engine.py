@@ -17,7 +17,7 @@ from lipmotion.engines.coupled.chains.densities import infer_components
 from lipmotion.engines.coupled.chains.lattice import Lattice, LatticePosteriors
 from lipmotion.engines.coupled.chains.model import Chains, Inference, speech_observations
 from lipmotion.engines.coupled.chains.product import Product
-from lipmotion.engines.coupled.conversion import convert, group_index, path_to_means
+from lipmotion.engines.coupled.conversion import VITERBI, convert, group_index
 from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.chain_training import mark_allowed_units
 from lipmotion.engines.coupled.training.coupled_training import THREADS, grow_models
@@ -203,10 +203,13 @@ class CoupledEngine(Engine[CoupledModel]):
     def _statistics(self, model: CoupledModel, speech: Speech, frames: slice) -> tuple[Statistics, NDArray[np.intp]]:
         """Return means and precisions [each shape=(T, 3, Q)], and the most probable joint state of every frame."""
         chains = model.chains
-        if self.config.conversion == PATH:
+        if self.config.conversion == PATH or (self.config.conversion != TRAJECTORY and self.config.start == VITERBI):
             observations = speech_observations(speech, model.visual, frames)
-            path, _ = chains.best_path(observations, self.lattice(model, speech, frames))
-            return model.frame_statistics([path_to_means(chains, path, s + 1) for s in range(len(model.visual))]), path
+            lattice = self.lattice(model, speech, frames)
+            path, _ = chains.best_path(observations, lattice)
+            steps = self.config.steps if self.config.conversion != PATH else 0
+            streams, _ = convert(chains, observations, lattice, VITERBI, self.config.update, steps, path)
+            return model.frame_statistics(streams), path
         inference = self.infer(model, speech, frames)
         if self.config.conversion != TRAJECTORY:
             how = self.config.start, self.config.update, self.config.steps

@@ -182,9 +182,9 @@ class FactorialLattice(Lattice):
             full = np.zeros((len(posterior), state_counts[chain]), np.float32)
             full[:, self.states[chain]] = posterior
             chains.append(full)
-            remaining = posterior.astype(np.float32)  # what joint states with densities of their own leave a state
-            np.subtract.at(remaining.T, self.own_density_positions[:, chain], own.T)
-            densities.append(np.concatenate([np.maximum(remaining, 0), own], axis=1))
+            states = np.eye(posterior.shape[1], dtype=np.float32)[self.own_density_positions[:, chain]]
+            remaining = posterior - own @ states  # what joint states with densities of their own leave a state
+            densities.append(np.concatenate([np.maximum(remaining, 0), own], axis=1, dtype=np.float32))
         advance_counts: list[Array] = []  # chain by chain: how often each state is left, then how often it is kept
         for counts in (expected.audio_counts, expected.visual_counts):
             advance_counts += [counts.onward.ravel(), counts.enter.sum(axis=1), counts.stay.ravel()]

@@ -198,17 +198,11 @@ def _shard_sums(job: tuple[Chains, Sequence[LatticeUtterance]]) -> Sums:
     for utterance in utterances:
         observations, lattice, weight = utterance.observations, utterance.lattice, utterance.weight
         inference = chains.infer(observations, lattice)
-        posteriors = inference.posteriors
+        posteriors, shares = inference.posteriors, inference.responsibilities
         if not np.isfinite(posteriors.log_likelihood):
             continue
-        for statistics, group, densities, posterior, responsibilities in zip(
-            emission_statistics,
-            chains.groups,
-            lattice.densities,
-            posteriors.densities,
-            inference.responsibilities,
-            strict=True,
-        ):
+        of_groups = emission_statistics, chains.groups, lattice.densities, posteriors.densities, shares
+        for statistics, group, densities, posterior, responsibilities in zip(*of_groups, strict=True):
             weighted = posterior if weight == 1 else posterior * np.float32(weight)
             statistics.accumulate(group, observations, densities, weighted, responsibilities)
         transition_counts[lattice.transition_index] += weight * posteriors.transition_counts
