@@ -155,12 +155,11 @@ def test_the_shape_is_that_of_the_person() -> None:
 def test_the_mouth_is_where_mouth_pictures_have_it_and_replaced_within_its_region(scale: int) -> None:
     mask, (rows, columns) = mark_mouth(scale), find_mouth_part(scale)
     assert mask[rows, columns].shape == (MOUTH_HEIGHT * scale, MOUTH_WIDTH * scale)
-    corner = (columns.start / scale + CORNER[0], rows.start / scale + CORNER[1])
-    assert corner == pytest.approx(MOUTH_CORNER)
+    assert (columns.start / scale + CORNER[0], rows.start / scale + CORNER[1]) == pytest.approx(MOUTH_CORNER)
     assert mask[rows, columns].sum() == mask.sum()
     corners = mask[rows, columns][: CHEEK_PX[1] * scale // 2, : CHEEK_PX[0] * scale // 2]
     assert not corners.any()  # where the light is measured, the footage stays
-    assert mask[rows, columns].mean() == pytest.approx(np.pi * 34 * 26 / (72 * 56), rel=0.02)
+    assert mask[rows, columns].mean() == pytest.approx(0.927 * 70 * 54 / (72 * 56), rel=0.02)
 
 
 @pytest.mark.parametrize("scale", [1, 2])

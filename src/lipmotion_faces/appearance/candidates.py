@@ -202,7 +202,7 @@ class RefinementOptions:
             raise InputError(f"{self.neighbours} neighbours, required at least 1")
 
 
-STEADY = RefinementOptions(steadiness=0.3, blur_px=2.0)
+STEADY = RefinementOptions(steadiness=1.0, blur_px=3.0)
 """The default: one candidate for all colours, steady; the edges of lips are its own, as mixed ones are blurred."""
 PAPER = RefinementOptions(together=False, steadiness=0.0, neighbours=1)
 """The refinement of the paper: the nearest candidate of every colour and frame."""

@@ -31,8 +31,8 @@ JAW_SHARE = 1.15  # half of its width, as a share of half the distance between t
 NARROWEST_PX, WIDEST_PX = 34.0, 58.0
 """Limits of half its width: the mouth must fit in, and it must fit into the picture."""
 MIN_BOTTOM_PX = 106.0  # the part that is replaced holds the mouth, whatever the chin
-MOUTH_AXES_PX = 34.0, 26.0
-"""Half width and half height of the ellipse in which the mouth is replaced, about the middle of the mouth region."""
+MOUTH_AXES_PX = 35.0, 27.0
+"""Half width and height of the part in which the mouth is replaced: marks of the skin lie in one picture, not two."""
 CHEEK_PX = 12, 10
 """Width and height of the corners of the mouth region, in which the light is measured: they show skin in any pose."""
 
@@ -91,7 +91,7 @@ def mark_mouth(scale: int) -> Mask:
     """Return the part in which the mouth is replaced, within the mouth region: bool array [shape=(H, W)]."""
     middle = MOUTH_CORNER[1] + MOUTH_HEIGHT / 2
     x, y = _list_positions(scale)
-    return (x / MOUTH_AXES_PX[0]) ** 2 + ((y - middle) / MOUTH_AXES_PX[1]) ** 2 <= 1
+    return (x / MOUTH_AXES_PX[0]) ** 4 + ((y - middle) / MOUTH_AXES_PX[1]) ** 4 <= 1
 
 
 def measure_cheek_light(mouths: NDArray[Any]) -> Array:

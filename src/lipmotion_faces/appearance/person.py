@@ -57,6 +57,8 @@ DISTANCE_GAINS = np.array([1.0, 1.1, 1.0])
 DISTANCE_WEIGHTS = np.array([800.0, 1600.0, 800.0])
 """What one standard deviation of each among the candidates counts, beside the eigenlips, grey levels: the regression
 alone shows two thirds of the width's deviation (docs/results/video.md)."""
+COMPONENT_GAINS = np.tile(np.where(np.arange(COMPONENTS) < 4, 1.1, 1.6), len(COLOURS)).astype(np.float32)
+"""How much mixtures are exaggerated: they vary less than mouths, the more the finer a component: teeth were grey."""
 LONGEST_CLOSURE_S = 0.3
 """A closure that lasts no longer shows one recorded mouth; in pauses mouths are mixed, as they live on."""
 MOUTH_RIDGE = 1e-3  # ridge of the regression of the jaw on the mouth, as a share of the variance of the mouth
@@ -179,7 +181,7 @@ class Appearance:
             np.concatenate([codes, ((distances - middle) * weights).astype(np.float32)], axis=1)
             for codes, distances in ((predicted, wanted), (self.mouth_codes, measured))
         )
-        mouths = candidates.draw_to_recorded(sought, recorded)[:, : predicted.shape[1]]
+        mouths = candidates.draw_to_recorded(sought, recorded)[:, : predicted.shape[1]] * COMPONENT_GAINS
         if contact is None:
             return mouths
         for first, stop in find_runs(contact >= 1).tolist():

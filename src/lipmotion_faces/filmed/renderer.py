@@ -44,24 +44,24 @@ class StitchingOptions:
     """How mouth and jaw are made.
 
     jaw       : whether the jaw is replaced, too; False: the background's jaw stays, the mouth alone is replaced
-    mouth     : how the detail of the mouth is chosen; None: eigenlips alone, blurred
+    mouth     : how the detail of the mouth is chosen
     sharpening : by how much what is stitched in is sharpened (``sharpen``); 0: not
     average   : number of pictures over which the mouth is averaged before, odd; 1: none
     jaw_detail : how the detail of the jaw is chosen
-    noise     : whether the noise of the camera is added
+    noise     : share of the camera's noise that is added: recorded mouths have noise of their own
     """
 
     jaw: bool = True
-    mouth: candidates.RefinementOptions | None = candidates.STEADY
+    mouth: candidates.RefinementOptions = candidates.STEADY
     sharpening: float = candidates.SHARPENING
     average: int = 1
     jaw_detail: candidates.RefinementOptions = JAW_OPTIONS
-    noise: bool = True
+    noise: float = 0.5
     seed: int = 0
 
 
 STITCHING = StitchingOptions()
-AS_PRINTED = StitchingOptions(mouth=candidates.PAPER, sharpening=0, average=3)
+AS_PRINTED = StitchingOptions(mouth=candidates.PAPER, sharpening=0, average=3, noise=1)
 """The mean of three pictures, then the nearest of 500 candidates: Xie & Liu 2007, §6.1 and Eqs. 14–16."""
 
 
@@ -131,10 +131,7 @@ class Stitcher:
         return chosen, np.clip(codes.width / np.maximum(recorded[chosen[:, 0], 1], 1e-6), *STRETCH)
 
     def _draw_mouths(self, codes: Floats, chosen: NDArray[np.intp], factors: Array, first: int) -> Pictures:
-        if self.options.mouth is None:
-            pictures = self._mouths.eigenlips.restore(codes)
-        else:
-            pictures = self._mouths.refine(codes, chosen, None if (factors == 1).all() else factors)
+        pictures = self._mouths.refine(codes, chosen, None if (factors == 1).all() else factors)
         return self._noise.add(pictures, first) if self.options.noise else pictures
 
     def _measure_gains(self, behind: Pictures) -> Array:
@@ -144,7 +141,7 @@ class Stitcher:
 
     @cached_property
     def _mouths(self) -> candidates.Refiner:
-        return self.appearance.make_refiner("mouth", self.options.mouth or candidates.PAPER)
+        return self.appearance.make_refiner("mouth", self.options.mouth)
 
     @cached_property
     def _jaws(self) -> candidates.Refiner:
@@ -152,7 +149,8 @@ class Stitcher:
 
     @cached_property
     def _noise(self) -> NoiseSource:
-        return NoiseSource(self.appearance.noise, self._mouths.eigenlips.size, self.options.seed)
+        noise = replace(self.appearance.noise, covariance=self.options.noise**2 * self.appearance.noise.covariance)
+        return NoiseSource(noise, self._mouths.eigenlips.size, self.options.seed)
 
     @cached_property
     def _lower_face(self) -> CloningSystem:
