@@ -1,5 +1,6 @@
 """Labels that users of other tools have reported, and their siblings: words and phones as they are said."""
 
+import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -40,22 +41,8 @@ def grid(end: float = 2, /, **tiers: Sequence[tuple[float, float, str]]) -> str:
 
 
 @pytest.mark.parametrize(
-    ("name", "said", "sounds"),
-    [
-        ("two-tiers-mau.TextGrid", MOTHER, ""), ("three-tiers-mau.TextGrid", MOTHER, ""),
-        ("sampa-three-tiers.TextGrid", "she thought", "sil sh iy th ao t sil"),
-        ("spoken-noise-phone.TextGrid", MOTHER, ""),
-        ("unknown-word-label.TextGrid", "my mother moved the baby", ""),
-        ("elan-utterances.TextGrid", "mama went home", ""), ("noise-words.txt", "mama", ""),
-        ("said-not-in-transcript.json", "hi mama moon", "hh ay m aa m ah m uw n"),
-        ("word-time-nan.json", "hello big moon", ""), ("words-in-ms.json", MOTHER, ""),
-        ("two-speakers.TextGrid", "mama papa", "m aa m ax p aa p ax"),
-        ("u16le-nobom.TextGrid", "mama", "sil m aa m ax sil"), ("fragments.json", "hello big moon", ""),
-        ("stt-utterances.json", "hello big moon", ""), ("stt-nested-alternatives.json", "hello big moon", ""),
-        ("list-text-start_time.json", "hello big moon", ""),
-        ("city-flap-ipa.TextGrid", "", "sil s ih d iy s ih d iy s ih d iy sil"),
-    ],
-)  # fmt: skip
+    ("name", "said", "sounds"), json.loads(Path(__file__).with_name("reported_cases.json").read_text(encoding="utf-8"))
+)
 def test_the_words_and_phones_that_are_said(name: str, said: str, sounds: str) -> None:
     assert not said or words(CASES / name) == said
     assert not sounds or phones(CASES / name) == sounds.split()

@@ -8,8 +8,10 @@ Source: D. H. Klatt, "Software for a cascade/parallel formant synthesizer", JASA
 of the table. D. H. and L. C. Klatt, JASA 87 (1990): glottal pulse. Deviations: no nasal zero; one frication resonance.
 """
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -110,51 +112,20 @@ def _syllabic(consonant: PhoneTargets) -> PhoneTargets:
 
 
 SCHWA: Formants = (500, 1400, 2450)
-_PALATAL, _ALVEOLAR, _LABIAL, _VELAR = (270, 1850, 2500), (280, 1700, 2650), (260, 850, 2100), (270, 1900, 2300)
-_M, _N, _L = _nasal((260, 1000, 2200)), _nasal((270, 1550, 2600)), _glide((340, 1050, 2750))
-
-_VOWELS: dict[str, Formants] = {
-    "iy": (290, 2200, 2950), "ih": (400, 1920, 2560), "ix": (420, 1700, 2500), "eh": (540, 1760, 2500),
-    "ae": (680, 1700, 2420), "aa": (730, 1090, 2440), "ao": (580, 860, 2500), "ah": (640, 1220, 2400), "ax": SCHWA,
-    "uh": (450, 1050, 2350), "uw": (320, 900, 2250), "er": (470, 1270, 1560), "axr": (490, 1380, 1700),
+_MADE = {
+    "vowel": _vowel, "glide": _glide, "nasal": _nasal, "fricative": _fricative, "stop": _stop, "affricate": _affricate,
 }  # fmt: skip
+_ROWS = json.loads(Path(__file__).with_name("phone_targets.json").read_text(encoding="utf-8"))
 PHONE_TARGETS: dict[str, PhoneTargets] = {
     "sil": (TargetSegment(),),
     "sp": (TargetSegment(),),
-    **{phone: _vowel(formants) for phone, formants in _VOWELS.items()},
-    "ey": _vowel((480, 1800, 2520), (330, 2150, 2700)),
-    "ay": _vowel((710, 1200, 2480), (380, 2050, 2600)),
-    "oy": _vowel((540, 850, 2450), (370, 1950, 2550)),
-    "aw": _vowel((710, 1250, 2450), (420, 880, 2350)),
-    "ow": _vowel((530, 980, 2350), (370, 820, 2300)),
-    "w": _glide((290, 620, 2150)),
-    "y": _glide((265, 2250, 3000)),
-    "r": _glide((330, 1080, 1400)),
-    "l": _L,
-    "el": _syllabic(_L),
-    "m": _M,
-    "em": _syllabic(_M),
-    "n": _N,
-    "en": _syllabic(_N),
-    "ng": _nasal((280, 2100, 2600)),
     "hh": (TargetSegment(widths=(200.0, 150.0, 200.0), aspiration=0.12),),
-    "f": _fricative((300, 1050, 2200), 0.10, 5000, 5000),
-    "v": _fricative((280, 1050, 2200), 0.05, 5000, 5000, voicing=0.35),
-    "th": _fricative((300, 1350, 2550), 0.08, 6500, 2500),
-    "dh": _fricative((280, 1350, 2550), 0.04, 6500, 2500, voicing=0.35),
-    "s": _fricative((300, 1650, 2600), 0.40, 5800, 1800),
-    "z": _fricative((270, 1650, 2600), 0.22, 5800, 1800, voicing=0.3),
-    "sh": _fricative((300, 1850, 2450), 0.45, 2900, 1300),
-    "zh": _fricative((270, 1850, 2450), 0.25, 2900, 1300, voicing=0.3),
-    "p": _stop(_LABIAL, 0.25, 900, 1200, voiced=False),
-    "b": _stop(_LABIAL, 0.18, 800, 1200, voiced=True),
-    "t": _stop(_ALVEOLAR, 0.45, 4500, 2500, voiced=False),
-    "d": _stop(_ALVEOLAR, 0.30, 4200, 2500, voiced=True),
-    "k": _stop(_VELAR, 0.45, 1950, 500, voiced=False),
-    "g": _stop(_VELAR, 0.30, 1900, 500, voiced=True),
-    "ch": _affricate(_PALATAL, 0.45, 3000, 1400),
-    "jh": _affricate(_PALATAL, 0.28, 3000, 1400, voicing=0.3),
+    **{
+        phone: _MADE[made](*(tuple(each) if isinstance(each, list) else each for each in numbers), **named)  # type: ignore[operator]
+        for phone, (made, numbers, named) in _ROWS.items()
+    },
 }
+PHONE_TARGETS |= {f"e{phone}": _syllabic(PHONE_TARGETS[phone]) for phone in "lmn"}
 """The segments of every phone of the inventory, in order."""
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from lipmotion.errors import CorpusError, InputError, shorten
@@ -237,9 +237,9 @@ class Layout:
     kind: str
     path: re.Pattern[str]
     name: str
-    words: Callable[[Path, Path, Mapping[str, str]], Words | None] | None = None
-    only: Mapping[str, str] = field(default_factory=dict)
-    rights: Mapping[str, str] = field(default_factory=dict)
+    words: Callable[[Path, Path, Mapping[str, str]], Words | None] | None
+    only: Mapping[str, str]
+    rights: Mapping[str, str]
 
 
 def read_layouts(directory: Path) -> RecordingFolder | None:
@@ -291,43 +291,20 @@ def _read_tcd_words(_directory: Path, video: Path, _groups: Mapping[str, str]) -
 
 RESEARCH = {"licence": "research, as agreed with its owners"}
 
-LAYOUTS = (
+_WORDS = {
+    "grid": _read_grid_words,
+    "crema-d": lambda _directory, _video, groups: split_words(CREMA_SENTENCES[groups["sentence"]]),
+    "tcd-timit": _read_tcd_words,
+}
+_SETS = {"NAME": NAME.pattern, "SENTENCES": "|".join(CREMA_SENTENCES)}  # what the paths in the table stand for
+LAYOUTS = tuple(
     Layout(
-        KIND,
-        re.compile(rf"(?i:(?:.*[^a-z0-9])?(?P<speaker>s[1-9]\d?)/(?:.*/)?)(?P<stem>{NAME.pattern})"),
-        "{speaker}-{stem}",
-        _read_grid_words,
-        rights=RIGHTS,
-    ),
-    Layout(
-        "CREMA-D",
-        re.compile(rf".*/(?P<stem>(?P<speaker>1\d{{3}})_(?P<sentence>{'|'.join(CREMA_SENTENCES)})_[A-Z]{{3}}_[A-Z]+)"),
-        "{stem}",
-        lambda _directory, _video, groups: split_words(CREMA_SENTENCES[groups["sentence"]]),
-        rights={"licence": "ODbL 1.0", "attribution": "CREMA-D (Cao, Cooper, Keutmann, Gur, Nenkova, Verma 2014)"},
-    ),
-    Layout(
-        "TCD-TIMIT",
-        re.compile(
-            r"(?:.*/)?(?P<speaker>\d\d[MFT]|Lipspkr\d)/(?:Clips/)?(?P<camera>straight|30deg)cam/(?P<stem>[^/]+)"
-        ),
-        "{speaker}-{stem}",
-        _read_tcd_words,
-        {"camera": "straight"},
-        RESEARCH | {"attribution": "TCD-TIMIT (Harte, Gillen 2015)"},
-    ),
-    Layout(
-        "MEAD",
-        re.compile(
-            r"(?:.*/)?(?P<speaker>[MW]\d{3})/video/(?P<view>[^/]+)/(?P<emotion>[^/]+)/(?P<level>level_\d)/(?P<stem>[^/]+)"
-        ),
-        "{speaker}-{emotion}-{level}-{stem}",
-        only={"view": "front"},
-        rights=RESEARCH | {"attribution": "MEAD (Wang, Wu, Song, Yang, Wu, Qian, He, Qiao, Loy 2020)"},
-    ),
-    Layout(
-        LRS,
-        re.compile(r"(?:.*/)?(?:main|trainval|(?P<set>pretrain)|(?P<split>test))/(?P<speaker>[^/]+)/(?P<stem>\d{5})"),
-        "{set}-{speaker}-{stem}",
-    ),
+        row["kind"],
+        re.compile(re.sub("NAME|SENTENCES", lambda match: _SETS[match[0]], row["path"])),
+        row["name"],
+        _WORDS.get(row["words"]),
+        dict(part.split("=") for part in row["only"].split()),
+        {key: row[key] for key in ("licence", "attribution") if row[key]},
+    )
+    for row in read_shipped_table("lipmotion_faces.corpus", "layouts.csv")
 )
