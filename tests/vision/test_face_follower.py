@@ -139,6 +139,20 @@ def test_she_is_known_again_elsewhere_and_a_face_that_jumps_is_looked_at_again(s
     assert follower.mark_person().tolist() == [True] * 12 + [False] * 4 + [True] * 4
 
 
+def test_a_face_that_is_surer_the_other_way_up_is_upside_down(show: Show) -> None:
+    follower, _ = show([([ANNA], 0)])
+    face = np.zeros((len(trackers.TRACKED_POINTS), 3))
+    follower._finder = SimpleNamespace(  # type: ignore[assignment]
+        find_boxes=lambda image, **_: [trackers.FaceBox(0, 0, 9, 0.5 + image[0, 0, 0] / 512)]
+    )
+    picture = np.zeros((64, 64, 3), np.uint8)
+    picture[-1, -1] = 255
+    for x, y, expected in ((60, 0, True), (20, 60, False)):
+        face[face_follower._EYES[1], :2] = x, y
+        assert follower.is_upside_down(picture, face) is expected
+        assert not follower.is_upside_down(picture[::-1, ::-1], face)
+
+
 SMALL_ANNA, SMALL_BELLA = ("a", 220.0, 60.0, 32.0), ("b", 80.0, 60.0, 32.0)
 
 

@@ -69,7 +69,7 @@ def test_a_span_holds_the_frames_of_its_time(tmp_path, name):
 class LateContainer:
     """A container of ten pictures, one a second, in which seeking ends three pictures too late, unless at the start."""
 
-    start_time = 0
+    start_time, format = 0, SimpleNamespace(name="late")
 
     def __init__(self) -> None:
         self.at = 0
@@ -115,6 +115,20 @@ def test_rotations_turn_the_corner(write_video):
         turned = np.rot90(picture, rotation // 90)
         assert image.shape == turned.shape
         np.testing.assert_allclose(image, turned, atol=60)
+
+
+def test_pictures_of_an_avi_are_in_order_and_times_that_go_back_are_told(tmp_path):
+    for bf in ("0", "3"):
+        pictures = [np.full((48, 64, 3), 30 + n, np.uint8) for n in range(50)]
+        path = write_frames(tmp_path / f"{bf}.avi", pictures, options={"bf": bf, "crf": "1"})
+        np.testing.assert_allclose([frame.time_s for frame in all_frames(path)], np.arange(50) / 25, atol=1e-6)
+    path = write_frames(tmp_path / "a.ts", [np.full((48, 64, 3), 9, np.uint8)] * 20, options={"bf": "0"})
+    path.write_bytes(2 * path.read_bytes())
+    with open_video(path) as video:
+        notes = frames.damage_notes(video, np.array([frame.time_s for frame in video.frames]), 25.0)
+    assert notes == [f"damaged: 20 of about 39 frames can be used ({frames.GOES_BACK})"]
+    with open_video(write_frames(tmp_path / "a.mkv", pictures, ticks=range(100, 150))) as video:
+        assert video.stated_s == pytest.approx(2, abs=0.1)  # Matroska states when it ends
 
 
 def test_sound_alone_is_not_a_video(tmp_path):

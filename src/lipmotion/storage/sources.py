@@ -312,12 +312,12 @@ def has_video(path: Path) -> bool:
 def read_duration(container: Any, stream: Any) -> float:
     """Return the duration of a stream that an open container states, in seconds; 0 if it states none.
 
-    A stream without a duration of its own has that of the container; but as subtitles may last longer than sound and
-    video, in a container with subtitles it has the longest duration of sound and video.
+    A stream without a duration of its own has that of the container, but where subtitles may last longer. Matroska
+    states when things end, of a stream as a text.
     """
     if stream.duration:
         return float(stream.duration * stream.time_base)
-    if not container.streams.subtitles:
-        return (container.duration or 0) / 1e6
-    streams = (*container.streams.video, *container.streams.audio)
-    return max(max(0.0, parse_clock(each.metadata.get("DURATION", ""))) for each in streams)  # Matroska's is a text
+    own_s = max(0.0, parse_clock(stream.metadata.get("DURATION", "")))
+    late_s = (container.start_time or 0) / 1e6 if container.format.name == "matroska,webm" else 0.0
+    longest_s = 0.0 if container.streams.subtitles else (container.duration or 0) / 1e6
+    return max((own_s or longest_s) - late_s, 0.0)

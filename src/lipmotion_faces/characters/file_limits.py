@@ -9,33 +9,11 @@ from collections import Counter
 from pathlib import Path
 
 from lipmotion.errors import InputError
-from lipmotion.storage.sources import check_source
+from lipmotion.storage.sources import check_source, read_shipped_table
 
-ALLOWANCE = {
-    "bytes of files": 1 << 28,
-    "bytes of a document": 1 << 25,
-    "values in a document": 1_000_000,
-    "lines": 5_000_000,
-    "nodes": 10_000,
-    "joints": 100_000,
-    "parts": 2_000,
-    "vertices": 200_000,
-    "corners of textures": 1_000_000,
-    "triangles": 400_000,
-    "blendshapes": 1_000,
-    "morph targets": 20_000,
-    "displacements": 8_000_000,
-    "numbers": 80_000_000,
-    "bytes of pictures": 1 << 28,
-    "pixels of pictures": 1 << 27,
-}
-"""The most that one character may have, all of its files, nodes and parts together.
-
-joints        : of all skins, or their matrices
-parts         : primitives, counted again for every node that shows them
-morph targets : of all parts;  displacements : vertices that they, or expressions, move
-numbers       : of the arrays that are read
-"""
+_ROWS = read_shipped_table("lipmotion_faces.characters", "file_limits.csv")
+ALLOWANCE = {row["what"]: int(row["most"]) for row in _ROWS}
+"""The most that one character may have, all of its files, nodes and parts together."""
 MAX_VERTICES = ALLOWANCE["vertices"]
 
 

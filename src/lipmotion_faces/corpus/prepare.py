@@ -291,6 +291,7 @@ def _make_utterance(job: _Job, source: dict[str, str]) -> Utterance:
         recording = replace(recording, phones=supplied.shift_phones(recording.phones, labelled_s))
         source = source | {"sound_late_ms": f"{separate.late_s * 1000:.3f}", "sound_found_by": separate.how}
     audio = quantise(audio)
+    motion = replace(motion, notes=(*motion.notes, *supplied.doubt_recording(audio, motion)))
     check_words(recording.words or (), audio.duration_s)
     return Utterance(
         name=recording.name,

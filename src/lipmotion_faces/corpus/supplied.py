@@ -12,10 +12,12 @@ import numpy as np
 from lipmotion.errors import InputError
 from lipmotion.formats.base import read_motion
 from lipmotion.formats.tables import is_live_link_file, read_curve_table
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, OPENS
 from lipmotion.pipeline.outputs.motion_files import correct_rate
 from lipmotion.speech.features.mfcc import WINDOW
+from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.voice_activity import find_sound
 from lipmotion.storage.sources import hash_file
 from lipmotion.types import Audio, Motion, Span, Timeline, Track, Unit
 from lipmotion.units import PAUSE, SILENCE, check_phones, is_silent
@@ -30,6 +32,9 @@ CURVES_MARGIN_S, CURVES_MARGIN_SHARE = 0.5, 0.02
 """Largest difference of duration between curves and sound: seconds, or share of the sound. It is larger where the frame
 rate of the curves is wrong."""
 PHONES_MARGIN_S = 0.1  # seconds by which labels may end after the sound; labelling programs round times
+MIN_COVERED_SHARE = 0.5  # motion that covers less of its sound is reported
+MIN_MOVED = 0.01
+"""Standard deviation of the opening beneath which lips do not speak (578 clips of speech: 0.0195 and more)."""
 SPEECH_CURVES = frozenset(
     (*ARKIT_MOUTH, "cheekPuff", "cheekSquintLeft", "cheekSquintRight", "noseSneerLeft", "noseSneerRight")
 )
@@ -90,6 +95,19 @@ def read_supplied_track(curves: MotionFile, duration_s: float | None) -> Track:
             f"lasts {duration_s:.2f} s; required: the same time from the same start"
         )
     return Track(motion, np.ones(len(motion.values), bool) if seen is None else seen)
+
+
+def doubt_recording(audio: Audio, track: Track) -> tuple[str, ...]:
+    """Return notes on sound and motion of which nothing can be learned, or only little."""
+    curves, length_s = track.motion, len(track.seen) / track.motion.rate_hz
+    if length_s < MIN_COVERED_SHARE * audio.duration_s:
+        return (f"motion for {length_s:.1f} of {audio.duration_s:.1f} s of sound",)
+    if not find_sound(analysed(audio).log_energy):
+        return ("nothing is said in its sound",)
+    lips = next((name for name in ("opening", OPENS) if name in curves.names), None)
+    if lips is None or not track.seen.any() or (moved := float(np.std(curves[lips][track.seen]))) > MIN_MOVED:
+        return ()
+    return (f"the lips hardly move in speech ({moved:.4f}): a still picture, somebody else, or a covered mouth?",)
 
 
 def read_supplied_phones(recording: SourceRecording, duration_s: float) -> Timeline[Unit] | None:

@@ -139,6 +139,13 @@ class FaceFollower:
         self._scene_of_frame.append(None if face is None else len(self._scenes) - 1)
         return face
 
+    def is_upside_down(self, image: Image, face: Array) -> bool:
+        """Return whether the detector is surer of a face in the picture turned by half: the mesh finds one in both."""
+        x, y = face[_EYES[1], :2] - face[_EYES[0], :2]
+        views = (image, np.ascontiguousarray(image[::-1, ::-1])) if x > abs(y) else ()  # a leaning face is followed
+        scores = [max((box.score for box in self._finder.find_boxes(v, thorough=False)), default=0.0) for v in views]
+        return bool(scores and scores[1] > scores[0])
+
     def mark_person(self) -> NDArray[np.bool_]:
         """Return in which frames the face found is that of the person [shape=(T,)]."""
         scenes = self._find_scenes()

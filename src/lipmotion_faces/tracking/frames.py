@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +48,10 @@ WHOLE = VideoSpan()
 SEEK_MARGIN_S = 1.0
 """Decoding starts at the key frame before the span by this much: containers that seek by the time of decoding are late
 by the pictures that wait for others."""
+REORDERED = ("h264", "hevc", "mpeg4")
+"""Codecs that may store pictures in another order: an AVI holds no times to show them, and FFmpeg guesses wrong."""
 ROUNDING_S = 1e-4  # a picture belongs to a span that begins this much later: times of the container are whole ticks
+GOES_BACK = "times that go back, as in files joined end to end"
 SHORT_S = 0.5  # pictures that end more than this before the stated duration are reported
 MIN_SIDE_PX, LONGEST_SIDE_PX = 16, 8192
 """Bounds of a picture's width and height, px: a smaller one shows no face, a larger one fills the memory."""
@@ -108,8 +113,9 @@ def damage_notes(video: OpenVideo, times_s: NDArray[np.float64], rate_hz: float)
     notes = []
     end_s = float(times_s[-1]) + 1 / rate_hz
     if video.damage:
-        expected = round(max(video.stated_s, end_s) * rate_hz)
-        notes.append(f"damaged: {len(times_s)} of about {expected} frames can be decoded")
+        expected = max(round(max(video.stated_s, end_s) * rate_hz), len(times_s) + video.damage.count(GOES_BACK))
+        why = f" ({GOES_BACK})" if GOES_BACK in video.damage else ""
+        notes.append(f"damaged: {len(times_s)} of about {expected} frames can be used{why}")
     if end_s < video.stated_s - SHORT_S:
         notes.append(f"cut short: pictures up to {end_s:.2f} s of {video.stated_s:.2f} s")
     return notes
@@ -122,8 +128,9 @@ def _decode_frames(
     pixel_shape = float(stream.sample_aspect_ratio or 1)
     last_s = float("-inf")
     for picture in _decode_pictures_from(container, stream, start_s + span.start_s - ROUNDING_S, damage):
-        if picture.time is None or picture.time - start_s <= last_s:
-            continue  # it has no time, or one that another picture has
+        if picture.time is None or picture.time - start_s <= last_s:  # it has no time, or one that another picture has
+            damage += [] if picture.time is None or picture.time - start_s > last_s - ROUNDING_S else [GOES_BACK]
+            continue
         last_s = max(picture.time - start_s, span.start_s)
         if last_s >= span.end_s - ROUNDING_S:
             break
@@ -165,10 +172,15 @@ def _decode_pictures_from(container: Any, stream: Any, first_s: float, damage: l
 def _decode_pictures(container: Any, stream: Any, damage: list[str]) -> Iterator[Any]:
     import av
 
-    packets = container.demux(stream)
+    packets, times = container.demux(stream), deque[int]()
+    is_counted = container.format.name == "avi" and stream.codec_context.name in REORDERED
     while True:
         try:
-            for picture in next(packets).decode():
+            packet = next(packets)
+            times += [packet.dts] if is_counted and packet.size and packet.dts is not None else []
+            for picture in packet.decode():
+                if times:
+                    picture.pts = times.popleft()
                 if picture.is_corrupt:
                     damage.append("a damaged picture")
                 else:
@@ -176,6 +188,7 @@ def _decode_pictures(container: Any, stream: Any, damage: list[str]) -> Iterator
         except (StopIteration, av.EOFError):
             return
         except av.FFmpegError as error:
+            times = deque(islice(times, 1, None))
             damage.append(str(error.strerror))
 
 

@@ -40,6 +40,7 @@ SMALL_EYES_PX = 35.0
 opening with the clip as it was of 0.99 at 65 px, 0.98 at 40, 0.90 at 25."""
 COMPARED_PX = 360
 """Pictures are thinned to fewer columns and rows than this before they are compared with the one before."""
+TURNED_STEP = 50  # whether the face is upside down is asked once in so many pictures
 STRETCH_LIMIT = 2.0  # a clip is refused when its time stamps span more than this many times the frames that it holds
 
 COLUMN = {index: n for n, index in enumerate(TRACKED_POINTS)}
@@ -139,6 +140,7 @@ def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: 
     time_s, has_face, changes, sizes = list[float](), list[bool](), list[float](), set[tuple[int, int]]()
     points, mouths = list[Array](), list[NDArray[np.uint8]]()
     before: NDArray[np.int16] | None = None
+    turned = list[bool]()
     with open_video(path, span) as video, FaceFollower(person, tracker) as follower:
         for frame in video.frames:
             image, face = frame.image, follower.follow(frame.image)
@@ -151,10 +153,14 @@ def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: 
             sizes.add((image.shape[0], image.shape[1]))
             has_face.append(face is not None)
             if face is not None:
+                if len(points) % TURNED_STEP == 0:
+                    turned.append(follower.is_upside_down(image, face))
                 points.append(face)
                 mouths.append(reduce_mouth(crop_mouth(image, map_eyes(face[_EYES, :2]))))
     if not time_s:
         raise InputError(f"{path}: no picture from {span.start_s:.2f} to {span.end_s:.2f} s; give a whole video")
+    if 2 * sum(turned) > len(turned):
+        raise InputError(f"{path}: the face is upside down, required upright; turn the video by 180 degrees")
     times_s, cuts, with_face = np.array(time_s), tuple(follower.list_cuts()), np.flatnonzero(has_face)
     rows = np.flatnonzero(follower.mark_person()[with_face])  # of the points: those of the person
     others = len(with_face) - len(rows)

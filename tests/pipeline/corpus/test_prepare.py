@@ -19,6 +19,8 @@ from lipmotion_faces.corpus.coverage import measure_coverage, measure_phone_dist
 from pipeline.made import replace_tracking, write_noise
 from testing.toy import toy_utterances
 
+SILENT = "nothing is said in its sound"  # noise of one level
+
 
 @pytest.fixture
 def studio(tmp_path: Path) -> Path:
@@ -72,15 +74,15 @@ def test_recordings_become_a_corpus(studio, tmp_path):
 
 def test_what_is_up_to_date_is_kept_and_so_are_remarks(studio, tmp_path, tracked):
     write_noise(studio / "cut.mp4", seed=9)
-    assert prepare(studio, tmp_path / "corpus", workers=1).notes == {"cut": ("cut at 0.50 s",)}
+    assert prepare(studio, tmp_path / "corpus", workers=1).notes["cut"] == ("cut at 0.50 s", SILENT)
     before = content(tmp_path / "corpus")
     report = prepare(studio, tmp_path / "corpus", workers=1)
     assert (report.prepared, report.kept) == ((), ("a", "b", "c", "cut"))
     assert report.unseen == {"a": 2, "b": 2, "c": 2, "cut": 2}
-    assert report.notes == {"cut": ("cut at 0.50 s",)}
+    assert report.notes == dict.fromkeys("abc", (SILENT,)) | {"cut": ("cut at 0.50 s", SILENT)}
     assert tracked == ["a", "b", "c", "cut"]
     assert content(tmp_path / "corpus") == before
-    assert Corpus.open(report.corpus).utterance("cut").track.notes == ("cut at 0.50 s",)
+    assert Corpus.open(report.corpus).utterance("cut").track.notes == ("cut at 0.50 s", SILENT)
 
 
 @pytest.mark.usefixtures("tracked")

@@ -103,6 +103,17 @@ def recording(phones: Timeline[Unit] | None) -> SourceRecording:
     return SourceRecording("a", Path("a.wav"), None, phones=phones)
 
 
+@pytest.mark.parametrize(
+    ("swing", "seconds", "loud", "noted"),
+    [(0.03, 3, 1, ""), (0.004, 3, 1, "hardly move"), (0.03, 1, 1, "1.0 of 3.0 s"), (0.03, 3, 0, "nothing is said")],
+)
+def test_sound_and_motion_of_which_nothing_is_learned(swing, seconds, loud, noted):
+    audio = Audio((loud * speech_like(np.random.default_rng(0), 3)).astype(np.float32), RATE_HZ)
+    motion = Motion(swing * np.sin(np.arange(25.0 * seconds))[:, None], 25.0, (Channel("opening"),))
+    notes = supplied.doubt_recording(audio, Track(motion, np.ones(25 * seconds, bool)))
+    assert [noted in note for note in notes] == [True] * bool(noted)
+
+
 def test_silence_is_named_as_recognition_names_it():
     labelled = said(
         *[(0.1, 0.2, "sp"), (0.2, 0.4, "aa"), (0.4, 0.5, "sil"), (0.5, 0.7, "m"), (0.7, 0.8, "sp")],

@@ -101,8 +101,6 @@ class _TrackDecoder:
         is_stated = (has_own or not self._container.streams.video) and kind not in GUESSED
         is_stated = is_stated and (kind != "mp3" or starts)  # a header that states the length begins after the delay
         stated_s = read_duration(self._container, self._stream) if is_stated else 0.0
-        if kind == "matroska,webm" and starts and not list_video(self._container):  # it states its end
-            stated_s -= float(starts * self._stream.time_base)
         rounded_s = ROUNDED_S if kind in STATED else (1 - CUT_SHORT_SHARE) * stated_s
         if kind == "caf" and self._stream.codec_context.name.startswith("pcm"):
             stated_s, rounded_s = self._stream.frames / self._stream.rate, 0.0  # its duration is that of the file
