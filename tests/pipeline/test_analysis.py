@@ -192,6 +192,14 @@ def test_the_recogniser_says_what_the_engine_does_not_know(toy_model, toy_senten
     assert recognised(RecognisingEngine(found=toy_sentence.units), toy_model, toy_sentence).units[1].label.phone == "aa"
 
 
+def test_a_voice_whose_words_are_given_is_known_where_the_engine_recognises_it(toy_sentence, monkeypatch):
+    monkeypatch.setattr("lipmotion.pipeline.analysis.speech_analysis.rate_knowledge", lambda *_: 0.4)
+    request = Request(WELCOME, transcript=WELCOME.with_suffix(".txt"), recogniser="fast")
+    for found, voice in ((None, 0.4), (toy_sentence.units, 1.0)):
+        speech = analyse_speech(replace(load_model(), engine=RecognisingEngine(found=found)), request).speech
+        assert {part.speech.voice for part in speech.parts} == {voice}
+
+
 def test_f0_is_computed_for_engines_that_want_it(toy_sentence):
     features = features_of(toy_sentence.audio)
     found = build_speech(RecognisingEngine(), toy_sentence.audio, features, toy_sentence.units).log_f0

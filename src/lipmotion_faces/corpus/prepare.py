@@ -197,7 +197,7 @@ def _make_job(
         settings = {"tracker": f"{tracker} {packages[tracker]}", "crops": "yes" if crops else "no"}
     else:
         settings, packages = {"tracker": "none: motion was given"}, {"av": metadata.version("av")}
-    settings["recipe"] = RECIPE
+    settings["recipe"] = "6" if recording.file.suffix.lower() == ".avi" else RECIPE  # times were guessed
     if recording.offset_s is not None:
         settings["sound"] = f"{recording.offset_s * 1000:.3f} ms late, as given"
     source = {

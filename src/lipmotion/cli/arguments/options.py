@@ -70,11 +70,8 @@ def numbers(text: str) -> list[int]:
 
 
 KINDS: dict[str, dict[str, Any]] = {
-    "flag": {"action": "store_true"},
-    "off": {"action": "store_false"},
-    "optional": {"nargs": "?"},
-    "any": {"nargs": "*"},
-    "many": {"nargs": "+"},
+    **{kind: {"action": action} for kind, action in {"flag": "store_true", "off": "store_false"}.items()},
+    **{kind: {"nargs": sign} for kind, sign in {"optional": "?", "any": "*", "many": "+"}.items()},
     "append": {"action": "append"},
     "repeated": {"action": "append", "default": []},
     "whole": {"type": int},

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -24,20 +26,7 @@ from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Configuration, Constraints, Example, Generation, Monitor, Speech, StateTrace, Timeline, Unit
 
 Array = NDArray[np.float64]
-SOUND: dict[str, Any] = {
-    "guide": 0.0,
-    "invisible": "",
-    "overlap": "middle",
-    "context": 1.0,
-    "word": 0.3,
-    "stress": 0.3,
-    "duration": 0.5,
-    "join": 0.05,
-    "velocity": 0.0,
-    "hard": 0.5,
-    "protected": 0.0,
-    "cluster": 0.5,
-}
+SOUND: dict[str, Any] = json.loads(Path(__file__).with_name("sound_costs.json").read_text(encoding="utf-8"))
 """Costs where the sound counts: no phone is invisible, and no sound guides."""
 ROUNDING_S = 1e-6
 

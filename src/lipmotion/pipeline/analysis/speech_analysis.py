@@ -142,7 +142,16 @@ def analyse_speech(
         warn_of_another_language(recognition)
     is_given = request.units is not None or analysis.fit is not None
     speech = with_voice(model.phones, audio, speech, recognition, phones_given=is_given)
+    if speech.parts is not None and (is_given or speech.units_known):  # else the engine said so when it recognised them
+        speech = replace(speech, parts=tuple(_ask_engine(model, part) for part in speech.parts))
     return replace(analysis, speech=with_prior(model.prior, speech))
+
+
+def _ask_engine(model: Model, part: SpeechPart) -> SpeechPart:
+    """Return a passage whose phones were given; its voice is known where the engine recognises the speaker."""
+    unlabelled, rated = replace(part.speech, units=Timeline(())), part.speech.voice
+    is_own = 0 < rated < 1 and model.engine.recognise(model.learned, unlabelled) is not None
+    return part._replace(speech=replace(part.speech, voice=1.0)) if is_own else part
 
 
 def with_voice(
@@ -155,11 +164,11 @@ def with_voice(
     phones_given : whether the phones in time were given
     It is 1 where the engine recognised the speaker, and for silence.
     """
-    by_engine, parts = recognition is None and not phones_given and not speech.units_known, speech.parts
+    is_recognised, parts = not phones_given and not speech.units_known, speech.parts
+    by_engine = recognition is None and is_recognised
     voice = 1.0 if by_engine or not speech.features.values.any() else rate_knowledge(phones, analysed(audio))
     if parts is not None:
         sounds = {passage.first: analysed(passage.audio) for passage in analysed(audio).passages}
-        is_recognised = not phones_given and not speech.units_known
         parts = tuple(
             part
             if is_recognised and part.speech.voice == 1

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, shorten, shorten_list
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, measure_fit
-from lipmotion.speech.recognition.anchors import bound_words, find_anchors, leave_out_late_lines
+from lipmotion.speech.recognition.anchors import REACH_S, bound_words, find_anchors, leave_out_late_lines
 from lipmotion.speech.recognition.network.posteriors import (
     POSTERIOR_STEP,
     WORD_BOUNDARY,
@@ -38,7 +38,6 @@ from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.voices.espeak import LanguageLexicon
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, Pronunciation, check_words, is_silent
-from lipmotion.units.phone_timelines import group_words
 from lipmotion.units.phones import count_phone_edits
 
 LOG = logging.getLogger("lipmotion")
@@ -46,7 +45,6 @@ MAX_WARNINGS = 20  # largest number of guessed pronunciations that are reported 
 FOREIGN_SHARE, MIN_FOREIGN = 0.25, 3
 """A text of which so large a share, and so many different words, are not in the dictionary is not English."""
 MAX_STRETCHES = 3  # largest number of stretches without words that are named in one warning
-REACH_S = 0.1  # a phone of a word may be heard so far from its recognition, and a word so far into those beside it
 MIN_INSERTED = 2  # fewer phones between words than this belong to them: recognition errs by one
 ALIKE_SHARE = 0.34  # words are said all the same where recognition finds their phones, but for so small a share
 MAX_REPLACED = 2
@@ -196,11 +194,11 @@ def _match_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> t
 
 def _are_in_order(units: Timeline[Unit], evidence: TranscriptEvidence) -> bool:
     """Return whether no word was aligned where the words beside it are heard, as forced alignment in noise does."""
-    aligned = [span for span in group_words(units) if span.label]
-    pairs = zip(pairwise(aligned), pairwise(evidence.words), strict=False)
+    spans = [span for span in units if not is_silent(span.label.phone)]
+    edges = np.cumsum([len(word.phones) for word in evidence.words]).tolist()
     return all(
-        before.end_s <= heard_after.start_s + REACH_S and after.start_s >= heard_before.end_s - REACH_S
-        for (before, after), (heard_before, heard_after) in pairs
+        spans[edge - 1].end_s <= after.start_s + REACH_S and spans[edge].start_s >= before.end_s - REACH_S
+        for (before, after), edge in zip(pairwise(evidence.words), edges, strict=False)
     )
 
 

@@ -22,7 +22,7 @@ WIDENING_FACTORS, MIN_IMPROVEMENT = (2, 4, 8, 16), 0.2
 wider where the words then fit better by this many nats a frame."""
 LEAD_S, TAIL_S, REACH_S = 0.2, 0.4, 0.1
 """A word begins so long before its first sound is heard at most, and ends so long after its last one, for a network
-hears each sound once, drawn-out ones somewhere within them; both may be off by the third."""
+hears each sound once, drawn-out ones somewhere within them; what it hears may be off by the third."""
 BAD_FIT, WORST_FIT = -3.5, -6.0
 """Words that fit worse than the first, in nats a frame, may be elsewhere; worse than the second, they are not there."""
 FREE_FRAMES = 60_000  # recordings of up to ten minutes are aligned without times where these belong to something else

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import groupby
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,6 @@ from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import LogLikelihoods, UnitLoop, build_unit_loop, compute_log_likelihoods, penalise
 from lipmotion.kernels.paths import Windows
 from lipmotion.speech.recognition.adaptation import Adaptation
-from lipmotion.speech.recognition.anchors import Anchors, align_within
 from lipmotion.speech.recognition.general import CombinedPhones, combine_likelihoods, combine_phones
 from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser, find_stretches, mean_posterior
 from lipmotion.speech.recognition.recognised_speech import (
@@ -35,6 +35,9 @@ from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.speaker_similarity import OWN_SCORE, STRANGER_SCORE, SpeakerSimilarity, speaker_similarity
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, find_similar_phone, is_silent
+
+if TYPE_CHECKING:
+    from lipmotion.speech.recognition.anchors import Anchors
 
 RECOGNISER_KINDS = ("auto", "fast", "own", "general")
 """Phones are recognised by: ``own``: the model's own phone models alone; ``general``: those of many voices alone;
@@ -245,6 +248,8 @@ def _aligned(
     if anchors is None:
         spoken = [item.spoken for item in search(None)]
     else:
+        from lipmotion.speech.recognition.anchors import align_within
+
         counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
         edge, frames = counts[hmm.table.free[0]], log_likelihoods.frames
         shortest = {id(word): min(sum(counts[unit] for unit in variant) for variant in word) for word in words}
