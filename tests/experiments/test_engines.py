@@ -225,7 +225,7 @@ def test_what_cannot_be_trained_on(toy_corpus, tmp_path):
     with pytest.raises(InputError, match="sizes none; required: from 1 to 8"):
         run_learning_curve(toy_corpus, sizes=[])
     for order, words in (
-        (["x1", "x2", "x3", "x4", "x5", "x6"], r"6 of 6 names to train on \(x1, x2, x3, x4, x5, ...\) are not"),
+        (["x1", "x2", "x3", "x4", "x5", "x6"], r"6 of 6 names to train on \(x1, x2, x3, x4, x5 and 1 more\) are not"),
         (["toy00", "toy01", "toy00"], r"1 of 3 names to train on \(toy00\) stand in the list more than once"),
     ):
         with pytest.raises(CorpusError, match=words):
