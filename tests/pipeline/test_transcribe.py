@@ -11,6 +11,7 @@ from lipmotion.speech.recognition.network.posteriors import find_installed_recog
 from lipmotion.speech.recognition.recognised_speech import select_reliable
 from lipmotion.speech.sound.acoustic_conditions import mix_noise
 from lipmotion.speech.sound.analysed_audio import analysed
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Features, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import Lexicon, is_silent, split_words
 from lipmotion.units.phone_timelines import group_words
@@ -132,6 +133,15 @@ def test_in_noise_words_are_where_they_are_heard(welcome):
     assert np.array(places_s[1]) == pytest.approx(
         np.array(places_s[0]), abs=0.2
     )  # by forced alignment, one is 0.48 off
+
+
+@pytest.mark.recordings
+@pytest.mark.skipif(find_installed_recogniser() is None, reason="no phone recogniser is installed")
+def test_fast_speech_keeps_the_words_that_are_recognised(recordings):
+    audio = analysed(read_audio(recordings / "speech-open" / "acoustic_corpus.wav"))
+    words = split_words((recordings / "speech-open" / "acoustic_corpus.lab").read_text("utf-8"))
+    fit = corrected(audio, words).fit
+    assert len(fit.unsaid) < len(words) / 4  # of 59; 27 where a few that are not doubt all those beside them
 
 
 @pytest.mark.parametrize("first", [False, True])

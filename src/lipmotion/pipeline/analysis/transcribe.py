@@ -47,8 +47,8 @@ FOREIGN_SHARE, MIN_FOREIGN = 0.25, 3
 MAX_STRETCHES = 3  # largest number of stretches without words that are named in one warning
 MIN_INSERTED = 2  # fewer phones between words than this belong to them: recognition errs by one
 ALIKE_SHARE = 0.34  # words are said all the same where recognition finds their phones, but for so small a share
-MAX_REPLACED = 2
-"""So few words are said in place of others; more are of another sentence, which may have words of this one."""
+MAX_REPLACED, SAME_SHARE = 2, 0.6
+"""So few words are said in place of others; more are of another sentence, unless so many of their phones are found."""
 
 
 class Transcription(NamedTuple):
@@ -164,28 +164,28 @@ def _match_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> t
     words, phones = list(evidence.words), [span.label.phone for span in spans]
     wanted = [(number, phone) for number, word in enumerate(words) for phone in word.phones]
     matcher = SequenceMatcher(None, [phone for _, phone in wanted], phones, autojunk=False)
-    matched: dict[int, list[int]] = {}
+    matched, doubted, taken, end = dict[int, list[int]](), set[int](), set[int](), 0
     for first, at, size in matcher.get_matching_blocks():
         for (number, _), place in zip(wanted[first : first + size], range(at, at + size), strict=True):
             matched.setdefault(number, []).append(place)
-    doubted = set[int]()
     for other in evidence.others:
         left_out = range(other.first, other.stop)
-        shares = [len(matched.get(number, ())) / len(words[number].phones) for number in left_out]
-        unlike = [number for number, share in zip(left_out, shares, strict=True) if share < 1]
-        if min(shares, default=1.0) < 1 - ALIKE_SHARE:
-            few = unlike[-1] - unlike[0] < MAX_REPLACED
-            doubted.update(range(unlike[0], unlike[-1] + 1) if few else left_out)
-    taken, end = set[int](), 0
+        sizes = [len(words[number].phones) for number in left_out]
+        shares = [len(matched.get(number, ())) / size for number, size in zip(left_out, sizes, strict=True)]
+        unlike = {number: share for number, share in zip(left_out, shares, strict=True) if share < 1}
+        replaced = [number for number, share in unlike.items() if share < 1 - ALIKE_SHARE]
+        if replaced and max(unlike) - min(unlike) < MAX_REPLACED:
+            doubted.update(range(min(unlike), max(unlike) + 1))
+        elif replaced:
+            doubted.update(replaced if np.average(shares, weights=sizes) >= SAME_SHARE else left_out)
     for number, word in enumerate(words):
         stop = next((matched[later][0] for later in range(number + 1, len(words)) if later in matched), len(spans))
-        limit = ALIKE_SHARE * len(word.phones)
         if number in doubted:
             continue
         lengths = range(max(len(word.phones) - 1, 1), len(word.phones) + 2)
         runs = [range(first, first + length) for length in lengths for first in range(end, stop - length + 1)]
         edits = [(count_phone_edits(word.phones, phones[run.start : run.stop]), run.start, run.stop) for run in runs]
-        if edits and min(edits)[0] <= limit:
+        if edits and min(edits)[0] <= ALIKE_SHARE * len(word.phones):
             _, first, end = min(edits)
             words[number] = word._replace(start_s=spans[first].start_s, end_s=spans[end - 1].end_s, is_said=True)
             taken.update(range(first, end))
