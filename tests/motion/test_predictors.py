@@ -102,7 +102,7 @@ def test_the_recordings_choose_where_no_name_is_given() -> None:
     steps = -(-len(one.valid) // 4)
     prior = PriorOutput(np.zeros((steps, 1)), np.zeros((steps, 0), np.float32), np.zeros(steps))
     standing = replace(one, speech=replace(one.speech, prior=prior))
-    spectra = (ConditionSpectrum(np.zeros((len(one.valid), 40), np.float16), 1.0, 0.0),)
+    spectra = (ConditionSpectrum(*(np.zeros((len(one.valid), n), np.float16) for n in (40, 64)), 1.0, 0.0),)
     heard = replace(one, valid=np.ones(12_000, bool), condition_spectra=spectra)
     much = replace(standing, valid=np.ones(48_000, bool), condition_spectra=spectra)
     spoken = replace(one, speech=replace(one.speech, posteriors=TokenPosteriors(np.zeros((9, 3), np.float16), "", 1)))
@@ -125,19 +125,20 @@ def test_a_header_names_the_predictor_only_where_it_was_chosen() -> None:
 
 
 def example_in_conditions(seed: int, tempos: tuple[float, ...] = (1.0,)) -> tuple[Example, np.ndarray]:
-    """An example whose motion is a smooth function of two bands; its other versions are as much distorted as fast."""
+    """An example whose motion is in a band and in the encoding; its other versions are as much distorted as fast."""
     one = example(("aa", "t", "iy", "s"), seed)
     frames = len(one.valid)
     rng = np.random.default_rng(seed)
     slow = np.cumsum(rng.standard_normal((frames, 2)), axis=0)
     slow = (slow - slow.mean(axis=0)) / slow.std(axis=0)
     spectrum = rng.normal(0, 0.1, (frames, SPECTRUM_BANDS))
-    spectrum[:, 3], spectrum[:, 8] = slow[:, 0], slow[:, 1]
-    versions = []
+    encoding, versions = rng.normal(0, 0.1, (frames, 64)).astype(np.float16), []
+    spectrum[:, 3], encoding[:, 8] = slow[:, 0], slow[:, 1] / 4
     for tempo in tempos:
         positions = np.minimum(np.round(np.arange(int(frames / tempo)) * tempo).astype(int), frames - 1)
-        versions.append(ConditionSpectrum(spectrum[positions].astype(np.float16), tempo, float(tempo != 1)))
-    speech = replace(one.speech, spectrum=spectrum.astype(np.float32))
+        rows = (each[positions].astype(np.float16) for each in (spectrum, encoding))
+        versions.append(ConditionSpectrum(*rows, tempo, float(tempo != 1)))
+    speech = replace(one.speech, spectrum=spectrum.astype(np.float32), encoding=encoding)
     return replace(one, speech=speech, condition_spectra=tuple(versions)), slow * [0.1, 0.02] + [0.3, 0.6]
 
 
@@ -180,6 +181,15 @@ def test_a_predictor_is_the_same_after_serialisation_but_for_half_precision(kind
     learned, one = (learned, example_in_conditions(5)[0]) if kind == "trained" else (learned.predictor, standing(3)[0])
     again = type(learned).from_arrays(learned.arrays(), 2)
     np.testing.assert_allclose(again.predict(one.speech)[0], learned.predict(one.speech)[0], atol=3e-3)
+
+
+def test_a_network_of_a_former_model_hears_the_spectrum_alone(trained: AcousticNetwork) -> None:
+    speech = replace(example_in_conditions(5)[0].speech, encoding=None)
+    former = replace(trained, network=acoustic_network.FORMER_SHAPE.initial(3, 0), encoding=None)
+    again = AcousticNetwork.from_arrays(former.arrays(), 2)
+    np.testing.assert_allclose(again.predict(speech)[0], former.predict(speech)[0], atol=3e-3)
+    with pytest.raises(InputError, match="encoding"):
+        trained.predict(speech)
 
 
 def test_a_network_without_a_part_or_with_a_scale_of_nothing_is_refused(trained: AcousticNetwork) -> None:

@@ -143,7 +143,7 @@ def test_a_model_that_stands_on_another_gets_the_same_of_it_whoever_speaks(welco
 
 
 @pytest.mark.parametrize(
-    ("voice", "reliability", "share"), [(0.0, 0.0, 0.75), (0.0, 1.0, 0.35), (1.0, 0.0, 0.3), (1.0, 1.0, 0.0)]
+    ("voice", "reliability", "share"), [(0.0, 0.0, 0.65), (0.0, 1.0, 0.35), (0.5, 0.0, 0.325), (1.0, 0.0, 0.0)]
 )
 def test_motion_follows_the_sound_in_speech_the_less_phones_are_relied_on(voice, reliability, share):
     prior = load_model().learned.motion.prior

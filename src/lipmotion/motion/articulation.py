@@ -259,11 +259,9 @@ def measure_articulators(motion: NDArray[np.floating[Any]], names: Sequence[str]
     return measured
 
 
-SOUND_SHARES = (0.75, 0.35)
-"""Share of the motion that the general network hears, after all that is done for such a voice, where training knows it
-half or less: where phones cannot be relied on at all, and where they can (docs/results/voices.md)."""
-NOISY_SHARE = 0.3
-"""The same of a voice that training knows, where noise makes its phones unreliable; none where they are reliable."""
+SOUND_SHARES = (0.65, 0.35)
+"""Share of the motion that the general network hears, after all that is done for such a voice, where training knows
+nothing of it: where phones cannot be relied on at all, and where they can (docs/results/voices.md)."""
 CONFIRMED = -0.5
 """An unreliable p, b or m closes the lips where the general network hears them less open than so many deviations."""
 NEAR_S = 0.2  # seconds before and after speech in which that holds: elsewhere the mouth rests
@@ -298,15 +296,14 @@ class UnseenSpeaker:
     units: Timeline[Unit]  # phones in time, in T frames
     frames: int
     reliability: Array | float  # of the phones in time, 0 to 1 [shape=(T,)]
-    voice: float  # how well training knows the voice, 0 to 1; at 1 it only follows the sound in noise
+    voice: float  # how well training knows the voice, 0 to 1; at 1 its motion stays
 
     def follow_sound(self, statistics: Predict, articulators: Array) -> Predict:
         """Draw motion in and near speech towards articulators that the general network hears [shape=(T, 8)]."""
         spoken = ~mark_distant(self.units, self.frames, NEAR_S)[:, None]
         unsure, sure = SOUND_SHARES
         reliability = np.broadcast_to(self.reliability, self.frames)[:, None, None]
-        strange = count_unseen(self.voice)
-        share = strange * (unsure + reliability * (sure - unsure)) + (1 - strange) * NOISY_SHARE * (1 - reliability)
+        share = (1 - self.voice) * (unsure + reliability * (sure - unsure))
         share = share * smooth_steps(spoken.astype(float))[:, :, None]
         return draw_towards(self.prior.centre + articulators @ self.prior.matrix, share, statistics)
 

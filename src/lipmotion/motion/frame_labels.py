@@ -73,18 +73,12 @@ def rate_phones(speech: Speech, distortion: Array | None, frames: int) -> Array:
     """
     if speech.units_known or distortion is None or not list_speech_intervals(speech.units):
         return np.ones(frames)
-    return np.maximum(rate_clearness(distortion), speech.confidence)
-
-
-def rate_clearness(distortion: Array) -> Array:
-    """Return how free of noise and room a recording is, 0 to 1, from the distortion of its frames [each shape=(T,)]."""
-    frames = len(distortion)
-    reach = int(DISTORTION_S * FRAME_RATE_HZ)
-    total, numbers = np.concatenate([[0.0], np.cumsum(distortion)]), np.arange(frames)
+    reach, numbers = int(DISTORTION_S * FRAME_RATE_HZ), np.arange(frames)
+    total = np.concatenate([[0.0], np.cumsum(distortion)])
     first, stop = np.maximum(numbers - reach, 0), np.minimum(numbers + reach + 1, frames)
     mean = (total[stop] - total[first]) / (stop - first)
-    clear: Array = np.clip((DISTORTIONS[1] - mean) / (DISTORTIONS[1] - DISTORTIONS[0]), 0, 1)
-    return clear
+    clear = np.clip((DISTORTIONS[1] - mean) / (DISTORTIONS[1] - DISTORTIONS[0]), 0, 1)
+    return np.maximum(clear, speech.confidence)
 
 
 REST_STATE = -1  # the number of the one state of the rest pose: silence far from speech

@@ -108,8 +108,8 @@ class LearnedMotion:
 
         The steps are blending with the table of articulation, variance scaling, parameter generation with pins,
         closures in p, b and m, the modulation filter, the check of the limits, and the restoration of all channels.
-        Voices that training does not know part their lips to speak and have typical talkers' range; they, and known
-        ones in noise, follow what the general network hears (``motion.articulation``).
+        Voices that training does not know part their lips to speak, have typical talkers' range, and follow what the
+        general network hears; it confirms closures, those of known voices too (``motion.articulation``).
         statistics    : returns the predicted means and precisions of a range of frames [each shape=(N, 3, Q)]
         frames, units : length of the whole recording, T, and its phones in time
         constraints   : pins of channels that are modelled as they are
@@ -117,7 +117,7 @@ class LearnedMotion:
         closing_units : units that close the lips where no phone is known
         reliability   : of the phones in time, 0 to 1 [shape=(T,)]
         voice         : how well training knows the voice, 0 to 1: others move as far as people do on average
-        articulators  : what the general network hears [shape=(T, 8)], for voices not known to training, and in noise
+        articulators  : what the general network hears [shape=(T, 8)], but of known voices whose words are given
         Raises InputError: a pin names no channel, lies outside the recording, is not finite, or contradicts another.
         Raises ModelFormatError: the motion leaves the limits, so that the model must be damaged.
         """

@@ -123,14 +123,16 @@ class SpeechPart(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ConditionSpectrum:
-    """The spectrum of a recording in another acoustic condition, for training.
+    """The spectrum of a recording in another acoustic condition, and its encoding, for training.
 
     values   : float16 array [shape=(T', 40)], the normalised log mel spectrum
+    encoding : float16 array [shape=(T', 64)], as ``Speech.encoding``
     tempo    : frames of the recording in one of these frames: frame n is that at ``tempo`` · n
     distortion : 0 (as recorded) to 1: by how much noise and room cover the speech
     """
 
     values: NDArray[np.float16]
+    encoding: NDArray[np.float16]
     tempo: float
     distortion: float
 

@@ -91,7 +91,7 @@ class SelectionConfig(Configuration):
     cluster: float = option(0.1, NOT_NEGATIVE)
     most: float = option(3.0, Rule(above=0))
     components: int = option(16, Rule(least=1))
-    conditions: int = option(15, Rule(least=0))
+    conditions: int = option(8, Rule(least=0))
     epochs: int = option(100, Rule(least=1))
     joint_recogniser: bool = True
     closures: bool = True

@@ -76,7 +76,7 @@ class TrajectoryConfig(Configuration):
     variance_scaling: bool = True
     closures: bool = True
     joint_recogniser: bool = True
-    conditions: int = option(15, Rule(least=0))
+    conditions: int = option(8, Rule(least=0))
     epochs: int = option(100, Rule(least=1))
     articulation: bool = True
     units: str = "phone"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.hmm.loudness import find_loud_frames
 from lipmotion.speech.features.mfcc import HOP, WINDOW, check_samples, log_energy, spectrum
+from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.types import SPEECH_RATE_HZ, Audio, ConditionSpectrum
 
 NOISE_KINDS = ("white", "babble")
@@ -101,12 +102,12 @@ Samples = NDArray[np.float64]
 
 
 def list_conditions(audio: Audio, voices: Sequence[Audio], count: int, seed: Sequence[int]) -> list[ConditionSpectrum]:
-    """Return the spectrum of a recording as it is, and in ``count`` - 1 random conditions.
+    """Return spectrum and encoding of a recording as it is, and in ``count`` - 1 random conditions.
 
     voices : other recordings, whose voices, at other speeds, make the babble
     Raises InputError: as ``spectrum``.
     """
-    result = [ConditionSpectrum(spectrum(audio).astype(np.float16), 1.0, 0.0)]
+    result = [ConditionSpectrum(spectrum(audio).astype(np.float16), analysed(audio).encoding, 1.0, 0.0)]
     for number in range(1, count):
         rng = np.random.default_rng([*seed, number])
         warp = float(np.exp(rng.uniform(-LARGEST_WARP, LARGEST_WARP))) if rng.random() < WARP_PROBABILITY else 1.0
@@ -115,7 +116,8 @@ def list_conditions(audio: Audio, voices: Sequence[Audio], count: int, seed: Seq
         if tempo != 1.0 and len(samples := _resample(audio.samples, tempo)) >= WINDOW:
             sped = Audio(samples.astype(np.float32), audio.rate_hz)
         varied, distortion = apply_condition(sped, voices, rng)
-        result.append(ConditionSpectrum(spectrum(varied, warp).astype(np.float16), tempo, distortion))
+        warped = spectrum(varied, warp).astype(np.float16)
+        result.append(ConditionSpectrum(warped, analysed(varied).encoding, tempo, distortion))
     return result
 
 
