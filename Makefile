@@ -23,7 +23,9 @@ SEED ?= 0
 WORKERS ?= 2
 READER ?=
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
+# A module is compiled when it is first imported: most of what the packages hold never is.
+INSTALL := -m pip --disable-pip-version-check install --quiet --no-compile
+PIP := $(BIN)/python $(INSTALL)
 SOURCES := $(shell find src -type f -not -name '*.pyc') pyproject.toml README.md
 DRAWING := $(addprefix tests/,addons appearance architecture articulation cli/test_face.py cli/test_render.py engines export faces \
   formats fuzz hmm measures meshes motion oracles pipeline/film pipeline/test_scenes.py portable programs stats storage \
@@ -127,5 +129,5 @@ $(VENV)/dev: $(BIN)/python requirements/dev.txt $(SOURCES)
 
 $(AGENTS)/ready: requirements/agents.txt
 	$(PYTHON) -m venv $(AGENTS)
-	$(AGENTS)/bin/python -m pip --disable-pip-version-check install --quiet --no-deps --require-hashes -r requirements/agents.txt
+	$(AGENTS)/bin/python $(INSTALL) --no-deps --require-hashes -r requirements/agents.txt
 	touch $@

@@ -20,6 +20,9 @@ from pathlib import Path
 from typing import IO
 
 LIPMOTION = (sys.executable, "-m", "lipmotion.cli.main")
+FEW_STEPS = "from lipmotion.motion import posterior_network as n; n.STEPS = n.RECURRENT_STEPS = 4.0"
+HASTY = (sys.executable, "-c", f"{FEW_STEPS}\nfrom lipmotion.cli.main import main\nraise SystemExit(main())")
+"""The command line, whose networks are trained for a few steps: where it counts that training runs, not how well."""
 LIMIT_S = 600.0  # a test that hangs fails after this time; none takes a tenth of it, however much else the machine does
 ORPHANED_S = 30  # how long a process may go on after its limit where nobody is left who kills it
 PIPE, NOWHERE, TO_STDOUT = subprocess.PIPE, subprocess.DEVNULL, subprocess.STDOUT

@@ -13,36 +13,30 @@ import sys
 import time
 import wave
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator, Iterator
 from contextlib import ExitStack, suppress
 from functools import partial
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
-from numpy.typing import NDArray
 
 from lipmotion import Corpus, Model, load_model, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import ExportError
 from lipmotion.measures import curves
 from lipmotion.motion import posterior_network
-from lipmotion.speech.features import encoding
-from lipmotion.speech.recognition.general import GeneralModel
-from lipmotion.speech.recognition.network.posteriors import PhoneRecogniser
 from lipmotion.storage.locks import lock_folder
 from lipmotion_faces.filmed.face import FilmedFace, save_face  # also where no entry point is installed
+from testing.heard import hear_once
 from testing.toy import SMALL, ToySentence, toy_sentences, toy_utterances
 from testing.toy_face import toy_face
 
 if sys.platform == "linux":  # arrays of a megabyte go back to the system when they are freed: a worker runs 2,000 tests
     ctypes.CDLL(None).mallopt(-3, 1 << 20)  # M_MMAP_THRESHOLD
 SENTENCES = 12
-MAX_HEARD, MAX_HEARD_BYTES = 40, 1_000_000
-"""How many sounds are those of which is kept what models said: of the toy, and some before; all of them short."""
 FIXED, EXPLORE = "fixed", "explore"
 """Profiles of Hypothesis: the same examples every time; and ``--hypothesis-profile=explore``: others, and more."""
 MORE_SENTENCES = 10  # how many times the examples of a test are tried by ``explore``
@@ -151,28 +145,7 @@ def released(request: pytest.FixtureRequest) -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def heard_once() -> Iterator[None]:
-    """Networks and general models hear the same toy sentences all the time: what they said is known by the sound."""
-
-    def remember(hear: Callable[..., NDArray[np.float32]]) -> Callable[..., NDArray[np.float32]]:
-        said: dict[bytes, NDArray[np.float32]] = {}
-
-        def answer(*given: Any) -> NDArray[np.float32]:
-            key = next(sha256(each.tobytes()).digest() for each in given if isinstance(each, np.ndarray))
-            if key not in said:
-                said[key] = hear(*given)
-            for oldest in list(said)[:-MAX_HEARD]:
-                del said[oldest]
-            return said[key].copy() if said[key].nbytes < MAX_HEARD_BYTES else said.pop(key)
-
-        return answer
-
-    with pytest.MonkeyPatch.context() as patched:
-        for owner, name in (
-            (PhoneRecogniser, "log_posteriors"),
-            (encoding, "encode_window"),
-            (GeneralModel, "log_density"),
-        ):
-            patched.setattr(owner, name, remember(getattr(owner, name)))
+    with hear_once():
         yield
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from children import LIPMOTION, run_child
+from children import HASTY, LIPMOTION, run_child
 
 ROOT = Path(__file__).parent.parent
 README, START = ((ROOT / page).read_text(encoding="utf-8") for page in ("README.md", "docs/start.md"))
@@ -31,7 +31,7 @@ def needs_training(command: list[str]) -> bool:
 
 def run(command: list[str], folder: Path) -> str:
     if command[0] == "lipmotion":
-        command = [*LIPMOTION, *command[1:]]
+        command = [*(HASTY if command[1] == "train" else LIPMOTION), *command[1:]]
     return run_child(command, folder=folder, check=True).stdout
 
 

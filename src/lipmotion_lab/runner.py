@@ -262,7 +262,7 @@ class Stamp:
             "corpus": {"name": corpus.path.resolve().name, "SHA-256": digest_corpus(corpus), **lists},
             "seed": settings.seed,
             "options": {"workers": settings.workers, "lexicon": lexicon},
-            "commit": commit(ROOT),
+            "commit": find_commit(ROOT),
             "engines": {name: digest_engine(name) for name in ENGINES.built_in},
             **_describe_machine(),
         }
@@ -292,7 +292,7 @@ def _describe_machine() -> dict[str, Any]:
     return {"machine": machine, "versions": versions}
 
 
-def commit(root: Path) -> str | None:
+def find_commit(root: Path) -> str | None:
     """Return the commit of a checkout of the source, and whether its ``src`` was changed since; None: it is none."""
     git = shutil.which("git")
     if git is None or not (root / ".git").exists():

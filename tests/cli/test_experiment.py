@@ -1,4 +1,5 @@
 import json
+import shutil
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
@@ -43,7 +44,10 @@ def test_the_table_is_that_of_the_figures(figures_of, toy_corpus, here):
     assert [path.name for path in here.iterdir()] == ["a.json"]
 
 
-def test_all_engines(figures_of, run, toy_corpus, here):
+def test_all_engines(figures_of, run, toy_corpus, here, toy_model_file, coupled_model_file):
+    (here / "models").mkdir()
+    for name, file in (("trajectory", toy_model_file), ("coupled", coupled_model_file)):
+        shutil.copy(file, here / "models" / f"{name}.lipmotion")  # the third is trained
     chosen = ("engines", toy_corpus.path, "--split", "test", "--models", "models")
     section = sections.build_engines_section
     figures = figures_of(section, *chosen)

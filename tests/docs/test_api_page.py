@@ -13,11 +13,10 @@ from pathlib import Path
 import pytest
 
 import lipmotion
-from children import environment, run_child
+from children import FEW_STEPS, environment, run_child
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
-FEW_STEPS = "from lipmotion.motion import posterior_network as n; n.STEPS = n.RECURRENT_STEPS = 4.0"
 BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
 
 

@@ -113,10 +113,6 @@ def choose(hmm: UnitHmm, features: np.ndarray, words: Sequence[Sequence[Sequence
     return [item.spoken for item in placed]
 
 
-def chosen_units(hmm: UnitHmm, features: np.ndarray, words: Sequence[Sequence[Sequence[str]]]) -> tuple[str, ...]:
-    return tuple(unit for part in choose(hmm, features, words) for unit in part.units)
-
-
 def recordings(seed: int, count: int, who: Speaker, pauses: bool = False):
     """Return utterances with their transcripts, the units spoken in each, and their first frames."""
     draw = np.random.default_rng([seed, 3])

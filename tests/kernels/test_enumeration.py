@@ -187,7 +187,7 @@ def of_chains(draw, spread, extreme):
     """Forward–backward of chains without skips, two of them padded to one size."""
     sizes = [(int(draw.integers(1, 7)), int(draw.integers(1, 5))) for _ in range(2)]
     alone = [chain(draw, *size, spread, extreme) for size in sizes]
-    frames, states = np.array(sizes).T
+    frames, states = np.array(sizes).T.copy()
     log_emission = np.full((frames.max(), 2, states.max()), draw.choice([0.0, 50.0, -1e4, 1e4]))
     stay, move = np.zeros((2, 2, states.max()))
     for u, (emission, *moves) in enumerate(alone):

@@ -34,7 +34,7 @@ def test_the_definition_agrees_with_the_enumeration_of_all_paths(seed, frames, s
     draw = np.random.default_rng(seed)
     emission, ends = draw.normal(0, spread, (frames, 3)), np.log(draw.dirichlet(np.ones(3), 2))
     arcs = {(a, b): np.log(draw.uniform()) for a in range(3) for b in range(3) if draw.uniform() < 0.6}
-    arrays = *np.array(list(arcs), np.intp).reshape(-1, 2).T, np.array(list(arcs.values()))
+    arrays = *np.array(list(arcs), np.intp).reshape(-1, 2).T.copy(), np.array(list(arcs.values()))
     log_posterior, counts, log_likelihood = log_forward_backward(ends[0], emission, *arrays, ends[1])
     wanted, wanted_counts, wanted_log_likelihood = paths.posteriors(emission, np.arange(3), arcs, *ends)
     assert np.exp(log_posterior) == pytest.approx(wanted, abs=1e-9)

@@ -85,11 +85,6 @@ def chain_posteriors(log_emission, log_stay, log_move):
     return posterior, stay, log_likelihood
 
 
-def path_cost(path, start, steps) -> float:
-    """Return the cost of a path, which begins in a state before the first step."""
-    return float(start[path[0]] + sum(steps[i, j, frame] for frame, (i, j) in enumerate(pairwise(path))))
-
-
 def arrivals(start, steps):
     """Return the cost of the cheapest path to each last state, frame by frame."""
     for step in steps.transpose(2, 0, 1):

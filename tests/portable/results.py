@@ -15,6 +15,7 @@ from lipmotion.motion import posterior_network
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.types import Audio, Generation
+from testing.heard import hear_once
 from testing.toy import SMALL, toy_sentences, toy_utterances
 
 RATE_HZ = 16_000
@@ -71,7 +72,8 @@ def trained() -> Results:
 
 
 def main(output: str) -> None:
-    results = dict(front_ends()) | dict(animated("the shipped model", None, WELCOME)) | dict(trained())
+    with hear_once():
+        results = dict(front_ends()) | dict(animated("the shipped model", None, WELCOME)) | dict(trained())
     np.savez(output, **results)
 
 

@@ -30,16 +30,17 @@ LEFT_OUT = ["-m", "not long and not video", "-k", "not memory"]
 
 
 def settings() -> dict[str, dict[str, str]]:
-    """Return the variables of every setting by its name: each kind of kernels, in turn with one thread and with two.
+    """Return the variables of every setting by its name: each kind of kernels, in turn with two threads and with one.
 
-    No processor has the oldest kernels beside AVX in NumPy: they are run without it.
+    With this processor's own kernels ``make test`` runs the tests. No processor has the oldest kernels beside AVX in
+    NumPy: they are run without it.
     """
     found = {
         f"{core}, {threads} thread{'s' * (threads > 1)}": {
             "OPENBLAS_CORETYPE": core,
             "OPENBLAS_NUM_THREADS": str(threads),
         }
-        for core, threads in zip(different_cores(), itertools.cycle((1, 2)))
+        for core, threads in zip(different_cores(), itertools.cycle((2, 1)))
         if core != BEFORE_AVX["OPENBLAS_CORETYPE"]
     }
     return found | {"no AVX, in NumPy neither": BEFORE_AVX}

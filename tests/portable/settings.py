@@ -30,8 +30,8 @@ def environment(changes: dict[str, str]) -> dict[str, str]:
 
 @cache
 def kernels(core: str) -> str:
-    """Return the kernels that a process actually uses with the core type ``core``."""
-    changed = environment({"OPENBLAS_CORETYPE": core})
+    """Return the kernels that a process actually uses with the core type ``core``; empty: with this processor's own."""
+    changed = environment({"OPENBLAS_CORETYPE": core} if core else {})
     return children.run_child([sys.executable, "-c", KERNELS], variables=changed, check=True).stdout.strip()
 
 
@@ -44,6 +44,6 @@ def possible_cores() -> list[str]:
 
 
 def different_cores() -> list[str]:
-    """Return the possible core types without those whose kernels an earlier one has: a build may contain few."""
-    found = {kernels(core): core for core in reversed(possible_cores())}
+    """Return the possible core types without those whose kernels an earlier one, or this processor by itself has."""
+    found = {kernels(core): core for core in reversed(possible_cores())} | {kernels(""): ""}
     return [core for core in possible_cores() if core in found.values()]

@@ -1,7 +1,6 @@
 """Faces that are none, and what does not go with a face."""
 
 import shutil
-from pathlib import Path
 
 import numpy as np
 
@@ -11,17 +10,15 @@ from speech.sounds import tone, write_sound
 GROUP = "faces"
 
 
-def _copy(bench: Bench, changes: dict[str, bytes | None], /, **header: object) -> Path:
-    """Return a copy of the good face with other members or another header."""
-    return bench.changed_model(changes, bench.face, **header).rename(bench.folder / "changed.face")
-
-
 def _face(
     name: str, code: int, messages: tuple[str, ...], changes: dict[str, bytes | None], /, **header: object
 ) -> None:
-    case(GROUP, name, code, *messages)(
-        lambda bench: bench.animate(None, "--face", _copy(bench, changes, **header), output="a.mp4")
-    )
+    """Add a case of the good face with other members or another header."""
+
+    @case(GROUP, name, code, *messages)
+    def _(bench: Bench) -> list[object]:
+        changed = bench.changed_model(changes, bench.face, **header).rename(bench.folder / "changed.face")
+        return bench.animate(None, "--face", changed, output="a.mp4")
 
 
 case(GROUP, "a model named .face", 6, "not a face; give a file that `lipmotion face build` wrote")(

@@ -66,12 +66,8 @@ def _vowel(start: Formants, end: Formants | None = None) -> PhoneTargets:
     return steady, replace(steady, formants=end, voicing=0.9)
 
 
-def _glide(formants: Formants) -> PhoneTargets:
-    return (TargetSegment(1.0, formants, (60.0, 110.0, 180.0), voicing=0.6),)
-
-
-def _nasal(formants: Formants) -> PhoneTargets:
-    return (TargetSegment(1.0, formants, (70.0, 300.0, 350.0), voicing=0.45),)
+def _sonorant(formants: Formants, widths_hz: Formants, voicing: float) -> PhoneTargets:
+    return (TargetSegment(1.0, formants, widths_hz, voicing=voicing),)
 
 
 def _fricative(
@@ -116,8 +112,8 @@ SCHWA: Formants = (500, 1400, 2450)
 
 _KINDS: dict[str, Callable[..., PhoneTargets]] = {
     "vowel": _vowel,
-    "glide": _glide,
-    "nasal": _nasal,
+    "glide": partial(_sonorant, widths_hz=(60.0, 110.0, 180.0), voicing=0.6),
+    "nasal": partial(_sonorant, widths_hz=(70.0, 300.0, 350.0), voicing=0.45),
     "fricative": _fricative,
     "affricate": _affricate,
     "voiced stop": partial(_stop, voiced=True),

@@ -83,7 +83,7 @@ def infer_factorial(
     Cost: time O(T·Na·Nv·(Ua + Uv)), memory O(stretch + T/stretch) times Na·Nv.
     """
     order = np.lexsort(logs.pairs.T[::-1])
-    logs = logs._replace(pair=logs.pair[:, order], pairs=logs.pairs[order])
+    logs = logs._replace(pair=logs.pair.take(order, axis=1), pairs=logs.pairs[order])
     share = np.prod([np.mean(log > -np.inf) for log in (logs.audio, logs.visual)])
     probabilities = (p for loop in (audio, visual) for p in (*_moves(loop), loop.initial, loop.final))
     lowest = min(float(part.min(where=part > 0, initial=1.0)) for part in probabilities)
@@ -234,7 +234,7 @@ class _InLogs:
     min_log_overlap = -math.inf  # of a recording without a path
 
     def __init__(self, audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -> None:
-        self.loops, self.logs = (LogTransitions.of(audio), LogTransitions.of(visual)), logs
+        self.loops, self.logs = (LogTransitions.of(audio), LogTransitions.of(visual)), logs.to_doubles()
         self.back_loops = self.loops[0].reverse(), self.loops[1].reverse()
         self.initial, self.final = log_ends(audio, visual)
         possible = []

@@ -62,6 +62,11 @@ class FactorialLogLikelihoods(NamedTuple):
     pair: Logs
     pairs: Index
 
+    def to_doubles(self) -> FactorialLogLikelihoods:
+        """Return the same in double precision and C order, which the kernels of logarithms are compiled for alone."""
+        audio, visual, pair = (np.ascontiguousarray(log, np.float64) for log in (self.audio, self.visual, self.pair))
+        return FactorialLogLikelihoods(audio, visual, pair, self.pairs)
+
     def densities(self, start: int, stop: int) -> list[tuple[Logs, Logs, Logs, float]]:
         """Return, for each frame, densities relative to an upper bound, and its logarithm; those of pairs in full."""
         logs = self.audio[start:stop], self.visual[start:stop], self.pair[start:stop]
@@ -132,7 +137,7 @@ def find_factorial_path(
     Source: the Viterbi recursion, along one loop's axis and then along the other's.
     Cost: time O(T·Na·Nv·(Ua + Uv)), memory O(stretch + T/stretch) times Na·Nv.
     """
-    frames, loops = len(logs.audio), (LogTransitions.of(audio), LogTransitions.of(visual))
+    frames, logs, loops = len(logs.audio), logs.to_doubles(), (LogTransitions.of(audio), LogTransitions.of(visual))
     initial, final = log_ends(audio, visual)
     stretch = stretch or count_cached_frames(frames, initial.nbytes)
     path, heads = np.zeros((frames, 2), np.intp), [initial + join_logs(logs, 0)]

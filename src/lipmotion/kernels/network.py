@@ -134,8 +134,8 @@ class ForwardBackwardNetwork(NamedTuple):
                 log_likelihood = (np.log(scales) + best).sum() + best_first + (len(root) - 1) * weights.best
                 return NetworkPosteriors(root, counts, float(log_likelihood))
         arc_to = np.repeat(np.arange(len(self.arc_start)), np.diff(self.arc_start, append=len(self.arc_from)))
-        parts = _joint(logs, columns)[:, layout.place], self.arc_from, arc_to, log_arcs, np.zeros(len(log_first))
-        log_posterior, counts, log_likelihood = log_forward_backward(log_first, *parts)
+        parts = _joint(logs, columns).take(layout.place, axis=1), self.arc_from, arc_to, log_arcs
+        log_posterior, counts, log_likelihood = log_forward_backward(log_first, *parts, np.zeros(len(log_first)))
         return NetworkPosteriors(np.exp(log_posterior)[:, layout.order].astype(precision), counts, log_likelihood)
 
 

@@ -20,14 +20,6 @@ from oracles.sequences import segmentations, sequences
 WEIGHTS = StreamWeights(0.8, 0.5, 1.0, 0.3, 0.0)
 
 
-def slow_densities(hmm, data, weights):
-    @cache
-    def density(state, frame):
-        return slow.log_density(hmm, data, state, frame, weights)
-
-    return density
-
-
 def candidates(hmm, frames):
     counts = {unit: hmm.inventory.count(unit) for unit in hmm.inventory.names}
     return sequences([unit for unit in hmm.inventory.names if unit != "sp"], counts, frames)
@@ -41,7 +33,7 @@ def test_nothing_else_is_more_probable(seed, states, frames, bigram, both):
         seed, states=states, components=1 + seed % 2, both_neighbours=both, recognition=WEIGHTS, **language
     )
     data = observed(np.random.default_rng([seed, 1]), frames)
-    density = slow_densities(hmm, data, WEIGHTS)
+    density = cache(lambda state, frame: slow.log_density(hmm, data, state, frame, WEIGHTS))
     best, units, lengths = max(slow.everything(hmm, density, frames, candidates(hmm, frames)))
     said, edges = recognise_units(hmm, data)
     assert said == units

@@ -297,19 +297,28 @@ def command(*words: object) -> list[str]:
     return [*LIPMOTION, "batch", *map(str, words), "--machine-readable"]
 
 
-def many(folder: Path, speech: Path, count: int) -> Path:
-    folder.mkdir()
-    for number in range(count):
-        shutil.copy(speech, folder / f"line{number:03}.wav")
-    return folder
+LINES, BEFORE = 24, 4
 
 
-def after_items(process: Child, count: int, act: Callable[[], None]) -> None:
-    """Wait for the process to end; act when that many lines are done."""
+@pytest.fixture(scope="module")
+def many(
+    tmp_path_factory: pytest.TempPathFactory, toy_speech: Path, toy_model_file: Path
+) -> tuple[Path, dict[str, bytes]]:
+    """A folder of recordings, and the outputs as one process writes them."""
+    folder = tmp_path_factory.mktemp("many")
+    (folder / "sounds").mkdir()
+    for number in range(LINES):
+        shutil.copy(toy_speech, folder / "sounds" / f"line{number:03}.wav")
+    batch(folder / "sounds", folder / "out", Job(Request(model=toy_model_file, recogniser="own")), jobs=1)
+    return folder / "sounds", contents(folder / "out")
+
+
+def after_items(process: Child, act: Callable[[], None]) -> None:
+    """Wait for the process to end; act when the first lines are done."""
     items = 0
     for event in map(json.loads, process.stdout):
         items += event["type"] == "item"
-        if items == count and event["type"] == "item":
+        if items == BEFORE and event["type"] == "item":
             act()
     process.wait()
 
@@ -317,20 +326,19 @@ def after_items(process: Child, count: int, act: Callable[[], None]) -> None:
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize("whom", ["first process", "a worker"])
-def test_kills(toy_speech, settings, tmp_path, whom):
+def test_kills(many, settings, tmp_path, whom):
     """The same command again gives the same files, each written once; a worker's death alone changes nothing."""
-    sounds = many(tmp_path / "sounds", toy_speech, 40)
-    batch(sounds, tmp_path / "whole", settings, jobs=1)
+    sounds, wanted = many
     how = [sounds, "--out", tmp_path / "out", "--model", settings.request.model, "--recogniser", "own", "--jobs", 2]
     with child(command(*how)) as process:
         killed = lambda: process.pid if whom == "first process" else worker_of(process.pid)  # noqa: E731
-        after_items(process, 10, lambda: os.kill(killed(), signal.SIGKILL))
+        after_items(process, lambda: os.kill(killed(), signal.SIGKILL))
     if whom == "first process":
         assert process.returncode == -signal.SIGKILL
         assert run_child(command(*how)).returncode == 0
-    assert contents(tmp_path / "out") == contents(tmp_path / "whole")
+    assert contents(tmp_path / "out") == wanted
     names = Counter(row["name"] for row in ledger_rows(tmp_path / "out"))
-    assert (len(names), max(names.values())) == (40, 1)
+    assert (len(names), max(names.values())) == (LINES, 1)
 
 
 def worker_of(process: int) -> int:
@@ -367,19 +375,16 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[Child]]]:
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.filterwarnings("ignore")
-def test_a_worker_of_a_cluster_is_killed(cluster, toy_speech, settings, tmp_path):
+def test_a_worker_of_a_cluster_is_killed(cluster, many, settings, tmp_path):
     """Nothing is lost, and nothing is done twice."""
-    address, processes = cluster
-    sounds = many(tmp_path / "sounds", toy_speech, 60)
-    batch(sounds, tmp_path / "whole", settings, jobs=1)
-    model = settings.request.model
+    (address, processes), (sounds, wanted), model = cluster, many, settings.request.model
     how = [sounds, "--out", tmp_path / "out", "--model", model, "--recogniser", "own", "--cluster", address]
     with child(command(*how)) as process:
-        after_items(process, 15, processes[1].kill)
+        after_items(process, processes[1].kill)
     assert process.returncode == 0
-    assert contents(tmp_path / "out") == contents(tmp_path / "whole")
+    assert contents(tmp_path / "out") == wanted
     names = Counter(row["name"] for row in ledger_rows(tmp_path / "out"))
-    assert (len(names), max(names.values())) == (60, 1)
+    assert (len(names), max(names.values())) == (LINES, 1)
     with pytest.raises(InputError, match="no Dask scheduler answers"):
         batch(sounds, tmp_path / "other", settings, cluster="tcp://127.0.0.1:9")
 

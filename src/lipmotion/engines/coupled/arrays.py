@@ -112,13 +112,14 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
         )
         if structure.state_counts[0] > (count := arrays["group_0/tie"].size):
             raise ValueError(f"{structure.state_counts[0]} states of the first chain, of {count} in all")
-        transitions = _transitions(arrays, structure)
+        transitions = _read_transitions(arrays, structure)
         visual = tuple(
-            _visual(select_arrays(arrays, f"visual_{number}/"), name, space.dimensions, config.dynamic)
+            _read_visual_stream(select_arrays(arrays, f"visual_{number}/"), name, space.dimensions, config.dynamic)
             for number, name in enumerate(streams[1:])
         )
-        chains = Chains(streams, transitions, _groups(arrays, transitions.product.chain_states.shape[1], visual))
-        regression = _regression(arrays, structure, visual) if config.dynamic and config.acoustic_regression else None
+        chains = Chains(streams, transitions, _read_groups(arrays, transitions.product.chain_states.shape[1], visual))
+        is_regressed = config.dynamic and config.acoustic_regression
+        regression = _read_regression(arrays, structure, visual) if is_regressed else None
         encoding = predictor_from_arrays(arrays, space.dimensions)
         scaling, rest = poses["gain"], poses["rest"]
         model = CoupledModel(chains, space, visual, regression, scaling, rest, closure, prior, encoding)
@@ -163,7 +164,7 @@ VISUAL_REGRESSION = {
 """The arrays of a model: of its chains, visual streams, stream groups, and regressions of visual means."""
 
 
-def _transitions(arrays: Arrays, structure: Structure) -> Transitions | FactorialTransitions:
+def _read_transitions(arrays: Arrays, structure: Structure) -> Transitions | FactorialTransitions:
     of_chains = [select_arrays(arrays, f"chain_{number}/") for number in range(len(structure.chains))]
     chains = [check_arrays(each, CHAIN, U=len(units)) for each, units in zip(of_chains, structure.units, strict=True)]
     for chain in chains:
@@ -189,7 +190,7 @@ def _transitions(arrays: Arrays, structure: Structure) -> Transitions | Factoria
     return Transitions(product, rows, advance)
 
 
-def _visual(arrays: Arrays, name: str, dimensions: int, dynamic: bool) -> VisualStream:
+def _read_visual_stream(arrays: Arrays, name: str, dimensions: int, dynamic: bool) -> VisualStream:
     columns = check_arrays(arrays, VISUAL)["columns"]
     check_index(f"columns of {name}", columns, dimensions)
     if len(set(columns.tolist())) < len(columns):
@@ -200,7 +201,7 @@ def _visual(arrays: Arrays, name: str, dimensions: int, dynamic: bool) -> Visual
     return VisualStream(name, columns, dynamic, mean, deviation)
 
 
-def _groups(arrays: Arrays, joint_states: int, visual: tuple[VisualStream, ...]) -> tuple[StreamGroup, ...]:
+def _read_groups(arrays: Arrays, joint_states: int, visual: tuple[VisualStream, ...]) -> tuple[StreamGroup, ...]:
     groups, widths = [], [FEATURES, *(len(stream.mean) for stream in visual)]
     for number in range(sum(key.endswith("/tie") for key in arrays)):
         of_group = select_arrays(arrays, f"group_{number}/")
@@ -216,7 +217,7 @@ def _groups(arrays: Arrays, joint_states: int, visual: tuple[VisualStream, ...])
     return tuple(groups)
 
 
-def _regression(
+def _read_regression(
     arrays: Arrays, structure: Structure, visual: tuple[VisualStream, ...]
 ) -> tuple[RegressionInputs, tuple[VisualRegression, ...]]:
     of_inputs = select_arrays(arrays, "around/")

@@ -99,7 +99,7 @@ def fit_selection(
     weights = np.ones(len(deviations))
     weights[:count] = [CHANNEL_WEIGHTS.get(name, 1.0) for name in motion.space.direct_names]
     scale = np.sqrt(weights) / deviations
-    rest, unknown = _rest_pose(examples, values, recorded, motion.space), np.ones((3, len(scale)))
+    rest, unknown = _find_rest_pose(examples, values, recorded, motion.space), np.ones((3, len(scale)))
     model = SelectionModel(motion, inventory, scale, rest, unknown, guide, recogniser)
     costs, errors = model.costs(config), []
     numbers = np.unique(np.linspace(0, len(examples) - 1, LEFT_OUT_RECORDINGS).astype(int)).tolist()
@@ -148,7 +148,7 @@ def build_inventory(examples: Sequence[Example], values: Sequence[Array], guide:
     return RecordedUnits(names, windows, usable, first, np.array(stored, np.intp), motion, predicted)
 
 
-def _rest_pose(examples: Sequence[Example], values: Sequence[Array], recorded: Array, space: MotionSpace) -> Array:
+def _find_rest_pose(examples: Sequence[Example], values: Sequence[Array], recorded: Array, space: MotionSpace) -> Array:
     """Return the mean pose in silence away from speech, or that of the least open frames [shape=(Q,)]."""
     away = (example.valid & mark_distant(example.speech.units, len(example.valid), REST_AWAY_S) for example in examples)
     poses = np.concatenate([x[frames] for x, frames in zip(values, away, strict=True)])

@@ -141,10 +141,6 @@ class Emission:
         ends = np.cumsum([0, *(len(tree.leaves) for tree in self.forest.values())])
         return dict(zip(self.forest, ends.tolist(), strict=False))
 
-    @cached_property
-    def _names(self) -> dict[tuple[str, int], str]:
-        return {}
-
     def row(self, state: FullContextState) -> int:
         """Return the number of the density of a full-context state: its row in ``means``."""
         if state == self.layout.rest:
@@ -161,14 +157,10 @@ class Emission:
         """Return the origin of the density of a state, in words: its tree, its leaf, and the frames of the leaf."""
         if state == self.layout.rest:
             return "rest"
-        name = self.layout.name(state)
+        name, (left, unit, right) = self.layout.name(state), state.context
         tree = self.forest[name]
-        rank = tree.rank(state.context)
-        if (name, rank) not in self._names:
-            leaf = int(tree.leaves[rank])
-            self._names[name, rank] = f"{tree.name(leaf)} ({tree.frames[leaf]:.0f} frames)"
-        left, unit, right = state.context
-        return f"{left}-{unit}+{right} {name}: {self._names[name, rank]}"
+        leaf = int(tree.leaves[tree.rank(state.context)])
+        return f"{left}-{unit}+{right} {name}: {tree.name(leaf)} ({tree.frames[leaf]:.0f} frames)"
 
     def statistics(
         self, rows: NDArray[np.intp], features: NDArray[np.float32], frames: slice | NDArray[np.intp]

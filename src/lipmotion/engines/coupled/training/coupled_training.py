@@ -135,7 +135,7 @@ def grow_models(
         for example in examples
         if not mark_known_dynamics(example.valid).any()
     ]
-    rest_pose, closure = _rest_pose(moving, values, valid), fit_closure(space.direct_names, values, moving)
+    rest_pose, closure = _find_rest_pose(moving, values, valid), fit_closure(space.direct_names, values, moving)
     prior = fit_articulation_prior(space, values, moving) if config.articulation else None
     encoding: Predictor | None = None
     if config.uses_encoding and all(example.speech.encoding is not None for example in moving):
@@ -147,7 +147,7 @@ def grow_models(
         if speech_only:
             second_monitor = sub_monitor(monitor, first_share, second_share)
             doublings = max(config.speech_only_mixtures // config.mixtures, 1).bit_length()
-            report = _reporter("more speech", config.speech_only_steps * doublings, second_monitor)
+            report = _make_report("more speech", config.speech_only_steps * doublings, second_monitor)
             chains = train_on_speech(chains, data, speech_only, config, report, work)
         model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest_pose, closure, prior)
         model = replace(model, encoding=encoding)
@@ -165,12 +165,12 @@ def grow_models(
     weight_of = {GEOMETRY: config.visual_weight, EIGENLIPS: config.eigenlips_weight}
     names, weights = (SPEECH, *(s.name for s in visual)), (config.audio_weight, *(weight_of[s.name] for s in visual))
     mixtures = (config.mixtures, *(config.visual_mixtures for _ in visual if structure.kind != HMM))
-    report = _reporter("chains", MAX_STEPS * max(mixtures).bit_length(), sub_monitor(monitor, 0, first_share))
+    report = _make_report("chains", MAX_STEPS * max(mixtures).bit_length(), sub_monitor(monitor, 0, first_share))
     for grown in grow_chains(structure, names, data, mixtures, weights, report, work, start.chains if start else None):
         yield partial(finish, grown)
 
 
-def _reporter(stage: str, max_steps: int, monitor: Monitor) -> Report:
+def _make_report(stage: str, max_steps: int, monitor: Monitor) -> Report:
     """Return a function that reports the steps of a stage of training, ``max_steps`` at most, to the monitor."""
     numbers = itertools.count(1)
 
@@ -181,7 +181,7 @@ def _reporter(stage: str, max_steps: int, monitor: Monitor) -> Report:
     return report
 
 
-def _rest_pose(examples: Sequence[Example], values: Sequence[Array], valid: Sequence[NDArray[np.bool_]]) -> Array:
+def _find_rest_pose(examples: Sequence[Example], values: Sequence[Array], valid: Sequence[NDArray[np.bool_]]) -> Array:
     """Return the median pose of silence away from speech, or that of all frames if there is none [shape=(Q,)]."""
     away = (mark_distant(example.speech.units, len(example.valid), AWAY_FROM_SPEECH_S) for example in examples)
     poses = np.concatenate([x[mask & silent] for x, mask, silent in zip(values, valid, away, strict=True)])
