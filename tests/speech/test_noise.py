@@ -97,10 +97,13 @@ def test_the_same_seed_gives_the_same_spectra_and_another_does_not(voices: list[
     assert not all(a.shape == b.shape and np.allclose(a, b) for a, b in zip(one, other, strict=True))
 
 
-def test_the_length_follows_the_tempo(voices: list[types.Audio]) -> None:
-    frames = len(spectrum(voices[0]))
-    for version in acoustic_conditions.list_conditions(voices[0], voices, 8, [1]):
-        assert len(version.values) == pytest.approx(frames / version.tempo, abs=2)
+def test_the_length_follows_the_tempo_and_the_encoding_is_of_the_noise(voices: list[types.Audio]) -> None:
+    versions = acoustic_conditions.list_conditions(voices[0], voices, 8, [1])
+    recorded = versions[0].encoding.mean(axis=0)
+    for version in versions:
+        assert len(version.values) == pytest.approx(len(versions[0].values) / version.tempo, abs=2)
+        assert len(version.encoding) == len(version.values)
+        assert version.distortion < 0.3 or np.abs(version.encoding.mean(axis=0) - recorded).max() > 0.05
 
 
 def test_conditions_leave_speech_recognisable_and_finite(voices: list[types.Audio]) -> None:
