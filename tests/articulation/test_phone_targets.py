@@ -15,8 +15,8 @@ def said(*phones: str, each_s: float = 0.12) -> Timeline[Unit]:
     return Timeline(tuple(Span(i * each_s, (i + 1) * each_s, Unit(phone)) for i, phone in enumerate(phones)))
 
 
-def middle(phones: tuple[str, ...], number: int, name: str) -> float:
-    return float(gesture_curves(said(*phones), np.array([(number + 0.5) * 0.12]), [name])[name][0])
+def middle(phones: tuple[str, ...], number: int, name: str, each_s: float = 0.12) -> float:
+    return float(gesture_curves(said(*phones, each_s=each_s), np.array([(number + 0.5) * each_s]), [name])[name][0])
 
 
 def test_a_phone_reaches_its_target_whatever_is_beside_it():
@@ -33,6 +33,10 @@ def test_lips_round_before_the_vowel_that_needs_it_and_other_targets_end_where_t
     assert middle(("f", "m", "v"), 1, "lip_tuck") < 0.05  # no tuck while the lips are closed
     for pause in ("sil", "sp"):
         assert middle(("s", pause, "s"), 1, "teeth") < 0.1
+    quick = {"teeth": (("t", "ae", "t"), ("z", "uw", "z")), "tongue": (("th", "ih", "th"), ("l", "ah", "l"))}
+    quick["protrusion"] = ("uw", "f", "w"), ("ao", "th", "r")
+    for name, heard in quick.items():  # of 70 ms
+        assert max(middle(phones, 1, name, 0.07) for phones in heard) < (0.7 if name == "teeth" else 0.4)
 
 
 def test_without_phones_there_is_the_pose_of_speech():

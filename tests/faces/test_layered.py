@@ -49,10 +49,7 @@ def test_colours_and_order():
     assert layer[20, 30].tolist() == [255, 0, 0, 1]
 
 
-@pytest.mark.parametrize(
-    ("inside", "words"),
-    DRAWINGS["refused"],
-)  # fmt: skip
+@pytest.mark.parametrize(("inside", "words"), DRAWINGS["refused"])
 def test_what_is_unsafe_or_would_be_drawn_wrongly_is_refused(inside, words):
     with pytest.raises(InputError, match=words):
         parse_drawing(svg(inside))

@@ -41,10 +41,7 @@ def grid(end: float = 2, /, **tiers: Sequence[tuple[float, float, str]]) -> str:
     return f'File type = "ooTextFile"\n"TextGrid"\n0\n{end}\n<exists>\n{len(tiers)}\n{rows}'
 
 
-@pytest.mark.parametrize(
-    ("name", "said", "sounds"),
-    SAID,
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "said", "sounds"), SAID)
 def test_the_words_and_phones_that_are_said(name: str, said: str, sounds: str) -> None:
     assert not said or words(CASES / name) == said
     assert not sounds or phones(CASES / name) == sounds.split()

@@ -159,10 +159,7 @@ def test_every_reply_has_the_headers_that_keep_others_out(place):
 ORIGINS = json.loads(Path(__file__).with_name("origins.json").read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize(
-    ("headers", "status"),
-    ORIGINS,
-)  # fmt: skip
+@pytest.mark.parametrize(("headers", "status"), ORIGINS)
 def test_only_the_page_itself_by_its_own_names_gets_an_answer(place, headers, status):
     application = create_application(place.study, {}, place.store, ["study.example.org"])
     assert ask(application, "/api/study", headers=headers).status == status

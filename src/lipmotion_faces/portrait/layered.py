@@ -134,8 +134,8 @@ MOUTHS = {
     "eh": MouthPose(0.2, 1.05, teeth=0.57, oval=0.2),
     "aa": MouthPose(0.2, 0.97, teeth=0.45, oval=0.85),
     "r": MouthPose(0.1, 0.91, tongue=0.2, protrusion=0.5, teeth=0.4),
-    "oh": MouthPose(0.16, 0.89, protrusion=0.75, teeth=0.15),
-    "oo": MouthPose(0.07, 0.86, protrusion=1.0, teeth=0.0),
+    "oh": MouthPose(0.12, 0.9, protrusion=0.72, teeth=0.2),
+    "oo": MouthPose(0.07, 0.88, protrusion=0.9, teeth=0.08),
 }
 """The mouths that a drawing may have, as layers ``mouth-NAME``; ``rest`` is required, what is missing is replaced."""
 _WEIGHTS = {"gap": 5.0, "width": 1.5, "tongue": 1.0, "tuck": 0.9, "protrusion": 1.0, "teeth": 1.8, "oval": 1.0}

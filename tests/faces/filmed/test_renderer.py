@@ -16,7 +16,6 @@ from testing.toy import toy_motion, toy_sentences
 from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, toy_chin_px, toy_frames, toy_places
 
 FRAMES = 24  # more than one batch
-MOUTH_ALONE = StitchingOptions(jaw=False)
 
 
 @pytest.fixture(scope="module")
@@ -143,6 +142,15 @@ def test_a_recorded_mouth_is_made_as_wide_as_the_motion(appearance: Appearance, 
     assert 1.06 * reach[0] < reach[1]
 
 
+def test_half_of_the_noise_of_the_camera_is_added(appearance: Appearance, spoken: Motion) -> None:
+    codes = appearance.predict_codes(spoken)
+    clean, half, full = (
+        np.stack(list(Stitcher(appearance, options).draw_mouths(codes))).astype(float)
+        for options in (StitchingOptions(noise=0), StitchingOptions(), StitchingOptions(noise=1))
+    )
+    assert 0.4 < (half - clean).std() / (full - clean).std() < 0.6
+
+
 @pytest.mark.long
 def test_a_silent_mouth_onto_a_talking_one(
     appearance: Appearance, backgrounds: list[Background], spoken: Motion
@@ -162,18 +170,15 @@ def test_a_silent_mouth_onto_a_talking_one(
     assert dark[0].sum(axis=(1, 2)).max() < 60
 
 
-def test_the_light_is_that_of_the_footage(appearance: Appearance, backgrounds: list[Background]) -> None:
+def test_the_light_is_the_footages(appearance: Appearance, backgrounds: list[Background], spoken: Motion) -> None:
     """Under another lamp the same frames are made, under that lamp."""
     lamp = np.array([(1.1, 0.9, 0.7)])
     lit = [replace(each, frame=lower_face.relight(each.frame[None], lamp)[0]) for each in backgrounds[:8]]
-    codes = appearance.predict_codes(Motion(np.tile([[0.2, 0.55, 0.42]], (8, 1)), 25.0, TOY))
+    codes = appearance.predict_codes(Motion(np.tile([[0.2, 0.55, 0.42]], (8, 1)), 25.0, spoken.channels))
     plain, made = (stitched(appearance, codes, each) for each in (backgrounds[:8], lit))
     wanted = lower_face.relight(plain.astype(np.uint8), np.repeat(lamp, 8, axis=0)).astype(int)
     assert np.abs(made - wanted).mean() < 0.5
     assert np.abs(made - wanted).max() <= 16  # what is sharpened is so in all colours alike
-
-
-TOY = toy_motion(toy_sentences(3)[0].units, 25.0).channels
 
 
 def test_frames_do_not_depend_on_the_batch_they_are_made_in(
@@ -200,7 +205,7 @@ def test_frames_are_taken_a_few_at_a_time(appearance: Appearance, spoken: Motion
             taken += 1
             yield backgrounds[taken % 4]
 
-    frames = Stitcher(appearance, MOUTH_ALONE).stitch(appearance.predict_codes(spoken), endless())
+    frames = Stitcher(appearance, StitchingOptions(jaw=False)).stitch(appearance.predict_codes(spoken), endless())
     next(frames)
     assert taken == BATCH
     assert len(list(frames)) == FRAMES - 1
