@@ -19,9 +19,6 @@ def check_face(face: Face) -> None:
     """Check that a face draws motion as ``Face.render`` says, and is staged as ``Stageable`` says if it can be.
 
     Raises ContractError: what was found.
-
-    >>> from lipmotion_faces import make_face
-    >>> check_face(make_face("portrait"))
     """
     one = example(("m", "aa"))
     motion, units = one.motion, one.speech.units

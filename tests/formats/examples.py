@@ -26,31 +26,26 @@ def of_motion(motion: Motion, units: Timeline[Unit] = NOTHING_SAID, stepped: tup
 
 
 def written(path: Path, generation: Generation, /, **source: str) -> Path:
-    """Write motion of a source; return the path."""
     write_motion(path, generation, source=source, model={})
     return path
 
 
 def timeline(phones: Sequence[tuple[str, float]]) -> Timeline[Unit]:
-    """Return a timeline of phones, each with its duration in seconds."""
     ends = list(accumulate((duration_s for _, duration_s in phones), initial=0.0))
     return Timeline(tuple(Span(a, b, Unit(phone)) for a, b, (phone, _) in zip(ends, ends[1:], phones, strict=False)))
 
 
 def result(units: Timeline[Unit], motion: Motion | None = None) -> Generation:
-    """Return a generation with these phones; its motion is that of the toy face, unless another is given."""
     return of_motion(motion or toy_motion(units, 100.0), units)
 
 
 def timed(path: Path, **choice: str) -> TimedTranscript:
-    """Return the words in time of a file."""
     transcript = read_transcript(path, **choice)
     assert isinstance(transcript, TimedTranscript)
     return transcript
 
 
 def spoken(text: str, duration_s: float = 0.1, silence_s: float = 0.3) -> Generation:
-    """Return a generation of phones of equal length between silences, with the motion of the toy face."""
     said = [(phone, duration_s) for phone in text.split()]
     return result(timeline([("sil", silence_s), *said, ("sil", silence_s)]))
 

@@ -158,6 +158,7 @@ def test_timecodes_without_frames_are_counted(tmp_path: Path, caplog: pytest.Log
         ("timestamp", lambda n: f"{n * 1e6 / 30:.0f}"),
         ("Unnamed: 0,time", lambda n: f"{n},{n / 30:.6f}"),
         ("image,seconds", lambda n: f"take_{n}.png,{n / 30:.6f}"),
+        ("timestamp,time_ms,isTracked", lambda n: f"{n * 1e7 / 30:.0f},{n * 1e3 / 30:.2f},True"),
     ],
 )
 @pytest.mark.parametrize("names", ["jawOpen,mouthClose", "blendShapes.JawOpen,blendShapes.MouthClose", "JAW_OPEN,x_9"])
@@ -185,9 +186,10 @@ def test_what_cannot_be_trusted_is_named(tmp_path: Path, caplog: pytest.LogCaptu
     assert motion["jawOpen"] == pytest.approx(JAW[:30])
     read(path, take([f"{n / 30},nan,0.1" if n == 3 else f"{n / 30},0,0.1" for n in range(30)], "time,a,b"))
     assert "1 of 30 rows" in caplog.text
+    assert "1 columns have no name of a blendshape and count as eye distances, up to 0.1: b" in caplog.text
     read(path, take([f"{0.3 if n == 10 else n / 30},0" for n in range(30)], "time,a"))
     assert "1 of 30 rows are not later than those before, as row 11" in caplog.text
-    rows = [f"{n},{face},{n / 30},{int(n != 9)},{JAW[n] * (face == 0)}" for n in range(30) for face in (0, 1)]
+    rows = [f"{n},{face},{n / 30},{n != 9},{JAW[n] * (face == 0)}" for n in range(30) for face in (0, 1)]
     motion = read(path, take(rows, "frame, face_id, timestamp, success, jawOpen"))
     assert "30 rows are of other faces than the first one (0)" in caplog.text
     assert (motion.names, motion["jawOpen"][9]) == (("jawOpen",), pytest.approx((JAW[8] + JAW[10]) / 2))
@@ -237,6 +239,9 @@ def test_frames_of_weights_that_contradict_one_another(tmp_path: Path, caplog: p
     assert (len(motion.values), "10 of 60 rows" in caplog.text) == (60, True)
     faceless = [{"time": n / 30, "blendshapes": {"jawOpen": JAW[n]} if n > 4 else None} for n in range(60)]
     assert read(tmp_path / "a.json", json.dumps(faceless))["jawOpen"] == pytest.approx([0] * 5 + JAW[5:])
+    numbered = [{"frame": n, "success": n != 9, "jawOpen": 0.5 * (n != 9)} for n in range(60) if n % 7 != 2]
+    motion = read(tmp_path / "a.json", json.dumps({"fps": 30, "frames": numbered}))
+    assert (len(motion.values), motion["jawOpen"].min()) == (60, 0.5)
     for documents, message in (
         ([azure(0, 20), azure(20, 40) | {"FrameIndex": 10}], "frames from 10 on are there twice"),
         ({"FrameIndex": 0, "BlendShapes": [[0.0] * 52]}, "52 weights, required 55"),
@@ -269,6 +274,7 @@ def test_timecodes_that_count_whole_frames_of_television(write, tmp_path, counte
     [
         *("jawOpen.001", "blendShape1.jawOpen", "head_jawOpen", "Face_JawOpen", "JAWOPEN", "jaw_open"),
         *("Head|jawOpen_12", "jawOpen_Head", "jawOpenShape", "Face.jawOpen_MeshShape", "jawOpen copy"),
+        *("jawOpen [0..1]", "jawOpen%", "iphone/jawOpen", "jawOpen_Value", "R_jawOpen", "jawOpen.Mesh"),
     ],
 )
 def test_spellings_in_a_table(tmp_path: Path, name: str) -> None:

@@ -117,7 +117,6 @@ RATE_HZ = 60.0
 
 @pytest.fixture
 def curves() -> Motion:
-    """Ten seconds of all curves: slow waves between 0 and 1."""
     time_s = np.arange(601) / RATE_HZ
     phase = np.linspace(0, 3, len(COLUMNS))
     values = 0.5 + 0.5 * np.sin(2 * np.pi * 1.5 * time_s[:, None] + phase)

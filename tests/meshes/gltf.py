@@ -13,7 +13,6 @@ WIDE = np.array([[-1.0, 0, 0], [1, 0, 0], [0, 0, 0], [0, 0, 0]], "<f4")
 
 
 def document() -> tuple[dict, bytes]:
-    """The square as JSON and bytes."""
     arrays = [POSITIONS, OPEN, WIDE, INDICES]
     views, offset = [], 0
     for array in arrays:
@@ -31,7 +30,6 @@ def document() -> tuple[dict, bytes]:
 
 
 def with_array(content: dict, binary: bytes, array: np.ndarray, form: str, **more: object) -> tuple[bytes, int]:
-    """Add an array as a view and an accessor of a form; return the bytes, and the number of the accessor."""
     kind = {"f4": 5126, "u1": 5121, "u2": 5123, "i2": 5122}[array.dtype.str[1:]]
     width = 1 if form == "SCALAR" else int(form[-1])
     content["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": array.nbytes})
@@ -41,7 +39,6 @@ def with_array(content: dict, binary: bytes, array: np.ndarray, form: str, **mor
 
 
 def with_skin(content: dict, binary: bytes, joints: np.ndarray, weights: np.ndarray) -> bytes:
-    """Add the joints of each vertex [shape=(4, 4), uint8] and their weights; return the bytes."""
     binary, first = with_array(content, binary, joints, "VEC4")
     binary, second = with_array(content, binary, weights, "VEC4")
     content["meshes"][0]["primitives"][0]["attributes"] |= {"JOINTS_0": first, "WEIGHTS_0": second}
@@ -52,7 +49,6 @@ UV = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]], "<f4")  # of the
 
 
 def textured_document(picture: bytes, material=None, extension=None) -> tuple[dict, bytes]:
-    """The square with a picture on it."""
     content, binary = document()
     binary, number = with_array(content, binary, UV, "VEC2")
     content["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": len(picture)})
@@ -65,7 +61,6 @@ def textured_document(picture: bytes, material=None, extension=None) -> tuple[di
 
 
 def with_colours(content: dict, binary: bytes, colours: np.ndarray, *, normalised: bool = False) -> tuple[dict, bytes]:
-    """A document whose first primitive has colours of its vertices [shape=(4, 3 or 4)]."""
     width = colours.shape[1]
     step = -(-width * colours.itemsize // 4) * 4
     padded = np.zeros((4, step), np.uint8)
@@ -81,7 +76,6 @@ def with_colours(content: dict, binary: bytes, colours: np.ndarray, *, normalise
 
 
 def animated_document(time_s: list[float], values, kind: str = "LINEAR", target=None) -> tuple[dict, bytes]:
-    """The square with two animations: one of a rotation, and one of its targets, or of what ``target`` says."""
     content, binary = document()
     rows = np.array(values, "<f4")
     binary, _ = with_array(content, binary, np.array(time_s, "<f4"), "SCALAR")
@@ -99,7 +93,6 @@ def animated_document(time_s: list[float], values, kind: str = "LINEAR", target=
 
 
 def glb(content: dict, binary: bytes) -> bytes:
-    """A document and its bytes as GLB."""
     text = json.dumps(content).encode()
     text += b" " * (-len(text) % 4)
     binary += b"\0" * (-len(binary) % 4)
@@ -109,5 +102,4 @@ def glb(content: dict, binary: bytes) -> bytes:
 
 
 def data_uri(binary: bytes) -> str:
-    """Bytes inside a document."""
     return "data:application/octet-stream;base64," + base64.b64encode(binary).decode()

@@ -18,7 +18,6 @@ SIZE = 10.0  # units of the mesh in an eye distance
 
 
 def head(*, shapes: bool = True, slit: bool = True, size: float = SIZE) -> Mesh:
-    """The face, and teeth as a piece of their own."""
     vertices, triangles = _sheet(slit)
     first, stop = len(triangles), len(triangles) + 1
     parts = (MeshPart("face", 0, first), MeshPart("teeth", first, stop))
@@ -31,7 +30,6 @@ def head(*, shapes: bool = True, slit: bool = True, size: float = SIZE) -> Mesh:
 
 
 def lip_points(mesh: Mesh, size: float = SIZE) -> dict[int, int]:
-    """The vertices of corners and of the middles of the inner lips."""
     places = mesh.vertices / size
     names = {}
     for point, x in ((61, -HALF), (291, HALF)):
@@ -41,7 +39,6 @@ def lip_points(mesh: Mesh, size: float = SIZE) -> dict[int, int]:
 
 
 def _sheet(slit: bool) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Vertices and triangles of a grid; along the seam the lower lip has others than the upper lip."""
     seam = int(np.abs(ROWS - SEAM).argmin())
     x, y = np.meshgrid(COLUMNS, ROWS)
     y[seam] = SEAM
@@ -98,7 +95,6 @@ def _shapes(mesh: Mesh):
 
 
 def _under(mesh: Mesh):
-    """Whether each vertex is of the lower lip or below: the last ones of the sheet but for teeth are of the cut."""
     sheet = len(COLUMNS) * len(ROWS)
     under = mesh.vertices[:, 1] < SEAM - 1e-9
     under[sheet:] = True
@@ -106,7 +102,6 @@ def _under(mesh: Mesh):
 
 
 def shaped(mesh: Mesh, weights: dict[str, float]) -> NDArray[np.float64]:
-    """The vertices under weights of blendshapes; the others have weight 0."""
     assert weights.keys() <= set(mesh.shape_names)
     vertices = mesh.vertices.copy()
     for shape in mesh.shapes:
@@ -115,15 +110,10 @@ def shaped(mesh: Mesh, weights: dict[str, float]) -> NDArray[np.float64]:
 
 
 def write_glb(path: Path, mesh: Mesh, weights: Motion | None = None) -> None:
-    """A mesh with its blendshapes, and their weights over time, as a file."""
     gltf_writer.write_gltf_scene(path, scene.Scene(mesh, weights))
 
 
 def write_obj(path: Path, mesh: Mesh, vertices: NDArray[np.float64] | None = None) -> None:
-    """Write a mesh as an OBJ file, without blendshapes: give their result as ``vertices`` [shape=(V, 3)].
-
-    Parts are written as objects, with their names.
-    """
     places = mesh.vertices if vertices is None else vertices
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.writelines(f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in places.tolist())
@@ -141,7 +131,6 @@ VISEMES = {
 
 
 def renamed(names: Mapping[str, str]) -> Mesh:
-    """The head with these of its shapes alone, under other names."""
     mesh = head()
     kept = tuple(replace(shape, name=names[shape.name]) for shape in mesh.shapes if shape.name in names)
     return replace(mesh, shapes=kept)

@@ -22,13 +22,7 @@ def timecode(time_s: float, rate: float = 60.0, mark: str = ":") -> str:
 def write_take(
     path: Path, motion: Motion, times_s: np.ndarray | None = None, *, start_s: float = 62_000.0, rate: float = 60.0
 ) -> None:
-    """Write motion as a take of the app; curves that it has not are 0.
-
-    motion  : channels with the names of ``COLUMNS``, in any capitals
-    times_s : of the rows, from the start of the take; the values are taken from the motion at these times
-    start_s : the timecode of the start, seconds since midnight
-    rate    : frames a second of the timecode
-    """
+    """Write motion as a take of the app, with rows at some times; curves that it has not are 0."""
     times_s = motion.time_s if times_s is None else times_s
     held = motion.at(times_s)
     lower = [name.lower() for name in motion.names]

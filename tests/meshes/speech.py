@@ -12,7 +12,6 @@ WIDTHS = (0.59, 0.58, 0.60, 0.57, 0.50, 0.59)
 
 
 def said(*spans: tuple[float, float, str]) -> Timeline[Unit]:
-    """Return phones in time, each given with its start and its end, seconds."""
     return Timeline(tuple(Span(start, end, Unit(phone)) for start, end, phone in spans))
 
 
@@ -21,7 +20,6 @@ def units() -> Timeline[Unit]:
 
 
 def motion(*, points: bool = True, rate_hz: float = 100.0) -> Motion:
-    """Curves through the middles of the phones; with points, the lips open about the seam and the chin follows."""
     time_s = np.arange(int(2.0 * rate_hz) + 1) / rate_hz
     middles = [start + share * (end - start) for _, start, end in PHONES for share in (0.3, 0.5, 0.7)]
     opening, width, jaw = (np.interp(time_s, middles, np.repeat(values, 3)) for values in (OPENINGS, WIDTHS, JAWS))

@@ -189,6 +189,12 @@ def test_mouths_that_do_not_open_are_refused():
     with pytest.raises(InputError, match="parts no lips"):
         lip_placement.place_lips_by_shape(Mesh(mesh.vertices, mesh.triangles, shapes=(whole,)), build_surface(mesh))
     mesh = head()
+    for turn, message in (("xzy", "of 'jawOpen' is 90° off down"), ("zyx", "is 82° off the axis x")):
+        order = ["xyz".index(axis) for axis in turn]
+        turned = [replace(s, displacements=s.displacements[:, order]) for s in mesh.shapes]
+        lying = Mesh(mesh.vertices[:, order], mesh.triangles, shapes=tuple(turned))
+        with pytest.raises(InputError, match=message):
+            lip_placement.place_lips_by_shape(lying, build_surface(lying))
     closed = Mesh(mesh.vertices, mesh.triangles, shapes=tuple(s for s in mesh.shapes if s.name == "mouthPucker"))
     with pytest.raises(InputError, match="the mesh has: mouthPucker"):
         lip_placement.place_lips_by_shape(closed, build_surface(closed))

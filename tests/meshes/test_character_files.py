@@ -1,6 +1,8 @@
 import json
 import os
+import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +11,7 @@ import pytest
 from lipmotion import errors, types
 from lipmotion_faces.characters import character_files, file_limits, gltf_writer
 from meshes.gltf import document, glb
-from meshes.heads import head, shaped, write_obj
+from meshes.heads import head, shaped, write_glb, write_obj
 
 QUAD = (
     "mtllib look.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
@@ -24,7 +26,8 @@ def _obj(tmp_path, text, name="head.obj"):
 
 def test_polygons_become_triangles_and_materials_parts(tmp_path):
     (tmp_path / "look.mtl").write_text("newmtl skin\nKd 0.5 0.25 2\nNs 60\n")
-    mesh = character_files.read_obj(_obj(tmp_path, QUAD + "usemtl teeth\nf -1 -2 -3\n"))
+    text = "\ufeff" + QUAD.replace("look.mtl", "C:\\old\\look.mtl") + "usemtl teeth\nf -1 -2 -3\n"
+    mesh = character_files.read_obj(_obj(tmp_path, text))
     assert [(part.name, part.first, part.stop) for part in mesh.parts] == [("skin", 0, 2), ("teeth", 2, 3)]
     assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [3, 2, 1]]
     assert mesh.parts[0].material.colour == (0.5, 0.25, 1.0)
@@ -46,6 +49,22 @@ def test_a_folder_has_a_neutral_mesh_and_shapes(tmp_path):
     read = character_files.read_character(tmp_path)
     assert read.shape_names == ("jawOpen", "mouthPucker")
     np.testing.assert_allclose(shaped(read, {"jawOpen": 1}), shaped(mesh, {"jawOpen": 1}), atol=1e-3)
+
+
+def test_both_sides_are_one_and_shapes_that_no_mouth_makes_or_of_the_other_side_are_named(tmp_path):
+    mesh, path = head(), tmp_path / "a.glb"
+    write_glb(path, replace(mesh, triangles=np.concatenate([mesh.triangles, mesh.triangles[:, ::-1]]), parts=()))
+    assert "jawOpen" in character_files.load_character(path).shapes.names
+    write_glb(path, replace(mesh, shapes=tuple(replace(s, displacements=99 * s.displacements) for s in mesh.shapes)))
+    with pytest.raises(
+        errors.InputError, match=r"'jawOpen' moves lips or chin by \d+ eye distances, required up to 2.5"
+    ):
+        character_files.load_character(path)
+    other = {"Left": "Right", "Right": "Left"}
+    swapped = [replace(s, name=re.sub("Left$|Right$", lambda side: other[side[0]], s.name)) for s in mesh.shapes]
+    write_glb(path, replace(mesh, shapes=tuple(swapped)))
+    with pytest.warns(UserWarning, match="blendshapes of the left move the right side"):
+        character_files.load_character(path)
 
 
 def test_what_is_written_is_read_but_no_library_elsewhere(tmp_path):

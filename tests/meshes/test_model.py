@@ -153,6 +153,7 @@ def test_names_as_files_spell_them():
         "blendShape1.mouthPress_R": "mouthPressRight", "Face_mouthLowerDownRight": "mouthLowerDownRight",
         "jawOpen.001": "jawOpen", "mouth_smile_left.002": "mouthSmileLeft", "Face_mouthSmileL": "mouthSmileLeft",
         "JAW_OPEN": "jawOpen", "A25_Jaw_Open": "jawOpen", "Head|jawOpen_12": "jawOpen",
+        "mouthSmile.L": "mouthSmileLeft", "leftMouthSmile": "mouthSmileLeft", "R_mouth_smile": "mouthSmileRight",
         "mouthSmile": None, "Fcl_MTH_A": None, "": None, "001": None,
     }  # fmt: skip
     assert {spelled: shape_names.to_arkit(spelled) for spelled in arkit} == arkit

@@ -21,12 +21,13 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
+from lipmotion.meshes.model.rig_tables import CONTROL
 from lipmotion.meshes.model.shape_names import is_known
 from lipmotion.storage.archive import UNREADABLE
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json
 from lipmotion.storage.sources import check_kind, check_regular
-from lipmotion.types import EYE_DISTANCE, WEIGHT, Generation, Motion, Timeline, Unit
+from lipmotion.types import Generation, Motion, Timeline, Unit
 
 LOG = logging.getLogger("lipmotion")
 Array = NDArray[np.float64]
@@ -34,6 +35,7 @@ About = Mapping[str, str]
 LARGEST_MOTION_BYTES = 1 << 31  # most bytes of a motion file: four hours of a hundred channels
 LARGEST_UNITS_BYTES = 1 << 28  # most bytes of a file of units alone: phones of a day
 LARGEST_WEIGHT = 4.0  # largest weight of a blendshape that is read; captures and sculpted faces go a little over 1
+WIDEST_LIPS, NARROWEST_LIPS = 2.5, 0.1  # eye distances of lips at their widest: more, or less, is in another unit
 TOLERATED_WEIGHT = 0.1  # by how much weights may go beyond 0 to 1 without a warning
 
 
@@ -179,14 +181,10 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
 
     Raises InputError: unknown suffix, no such file, or not a motion file.
 
-    >>> import lipmotion, tempfile
     >>> from pathlib import Path
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = Path(folder) / "welcome.npz"
-    ...     lipmotion.write(lipmotion.animate("examples/welcome.flac"), path)
-    ...     motion, units = read_motion(path)
-    >>> motion.rate_hz, units[0].label.phone
-    (100.0, 'sil')
+    >>> _ = Path("take.csv").write_text("time,jawOpen\\n0,0.1\\n0.04,0.2")
+    >>> read_motion("take.csv")[0].rate_hz
+    25.0
     """
     path = Path(path)
     check_kind(path, "motion file")
@@ -211,13 +209,13 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
         beyond = []
         lips = {"opening", "width", "outer"} & {*motion.names}
         widest = max((float(motion[name].max(initial=0.0)) for name in lips), default=0.0)
-        if widest > LARGEST_WEIGHT:
+        if widest > WIDEST_LIPS or ("width" in lips and widest < NARROWEST_LIPS):
             raise InputError(f"the lips are {widest:g} apart, required eye distances; divide millimetres by 90")
         for channel, curve in zip(motion.channels, motion.values.T, strict=True):
-            if channel.unit in {WEIGHT, EYE_DISTANCE} and is_known(channel.name):
+            if channel.unit != CONTROL and is_known(channel.name):
                 low, high = float(curve.min(initial=0.0)), float(curve.max(initial=0.0))
-                if high > LARGEST_WEIGHT:
-                    wrong = f"the weight {channel.name} goes up to {high:g}"
+                if (worst := max(low, high, key=abs)) and abs(worst) > LARGEST_WEIGHT:
+                    wrong = f"the weight {channel.name} goes {'up' if worst > 0 else 'down'} to {worst:g}"
                     raise InputError(f"{wrong}, required 0 to 1; divide percent by 100")
                 if not -TOLERATED_WEIGHT <= low <= high <= 1 + TOLERATED_WEIGHT:
                     beyond.append(f"{channel.name} from {low:.2f} to {high:.2f}")

@@ -302,8 +302,16 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
         analog = content.analog[:, : len(content.analog_labels)]
         values = np.concatenate([analog, places], axis=1) if len(analog) else places
         return Motion(values, content.rate_hz, tuple(channels)), Timeline(())
-    named = {label.split(":")[-1].strip(): column for column, label in enumerate(content.labels)}
-    named = {name: column for name, column in named.items() if name and not _UNLABELLED.match(name)}
+    subjects, named = dict[str, dict[str, int]](), dict[str, int]()
+    for column, label in enumerate(content.labels):
+        subject, _, name = label.replace("|", ":").rpartition(":")
+        if name.strip() and not _UNLABELLED.match(name.strip()):
+            subjects.setdefault(subject, {}).setdefault(name.strip(), column)
+    for subject, those in subjects.items():
+        if named.keys() & those.keys():
+            LOG.warning("%s: the markers of %r have names of another subject: they are left out", path, subject)
+        else:
+            named |= those
     markers, frames = dict[str, Array](), np.arange(len(content.points))
     for name, column in named.items():
         places = content.points[:, column]
@@ -330,7 +338,9 @@ def _points(motion: Motion) -> list[int]:
 MOTION_FORMAT = MotionFormat(write, read, check, min_frames=1, max_bytes=1 << 28)
 MILLIMETRES = 90.0  # the distance between the outer eye corners of a grown person, where markers do not show it
 UNITS = {"mm": 1.0, "millimeter": 1.0, "cm": 10.0, "m": 1000.0, "meter": 1000.0, "in": 25.4, "inch": 25.4}
-"""Units of length in millimetres."""
+UNITS |= {"millimetre": 1.0, "centimeter": 10.0, "centimetre": 10.0, "metre": 1000.0, "inche": 25.4}
+"""Units of length in millimetres, without the ``s`` of several."""
+SMALLEST_FACE = 0.2  # eye distances that the markers of a face lie apart at least
 LEFT_EYE = frozenset(("eyel", "leye", "lefteye", "eyeleft", "exl", "lex", "leyeouter", "eyelouter", "lefteyeouter"))
 """Names of a marker at the outer corner of the speaker's left eye: without capitals, spaces and underscores."""
 RIGHT_EYE = frozenset(("eyer", "reye", "righteye", "eyeright", "exr", "rex", "reyeouter", "eyerouter", "righteyeouter"))
@@ -371,11 +381,16 @@ def to_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
     """
     millimetres = UNITS.get(unit.strip().lower().removesuffix("s"))
     if millimetres is None:
-        raise InputError(f"its unit of length is {unit[:20]!r}, required one of {', '.join(UNITS)}")
+        raise InputError(f"its unit of length is {unit[:20]!r}, required mm, cm, m or inch")
     if max(float(np.abs(places).max()) for places in markers.values()) > LARGEST_COORDINATE:
         raise InputError(f"a marker is further than {LARGEST_COORDINATE:g} {unit} away; export the capture again")
     left, right = (next((name for name in markers if _plain(name) in names), "") for names in (LEFT_EYE, RIGHT_EYE))
     if not (left and right):
+        size = float(np.ptp([places.mean(axis=0) for places in markers.values()], axis=0).max()) * millimetres
+        if len(markers) > 1 and size < SMALLEST_FACE * MILLIMETRES:
+            required = f"required {SMALLEST_FACE * MILLIMETRES:g}: is its unit of length {unit!r} right?"
+            raise InputError(f"the markers lie at most {size:.2g} mm apart, {required}")
+        LOG.warning("no markers EYE_L and EYE_R: required a still head, x to its left, y up, z out, of grown people")
         return {name: places * millimetres / MILLIMETRES for name, places in markers.items()}
     rigid = [left, right]
     for name in markers:

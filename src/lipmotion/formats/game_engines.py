@@ -206,7 +206,6 @@ LIVE2D = MotionFormat(write_live2d, needs=SHOWING, min_frames=2, mouth=True)
 SCRIPT_MODULES = ("takes.py", "curves.py", "keying.py", "script.py")
 """The modules of the add-on that a script holds, one after another."""
 COPIED = "# -- what follows is copied into scripts\n"
-PROGRAMS = ("blender",)
 FOLDER = "lipmotion_blender"
 ADDON_PLACES = (Path(__file__).parents[1] / "addons", Path(__file__).parents[3] / "extras")
 """Where the add-on's folder is: in an installed package; in a copy of the repository."""
@@ -249,8 +248,8 @@ def read_addon(names: Iterable[str]) -> dict[str, str]:
 def write_addon(program: str, path: str | Path) -> None:
     """Write the add-on for Blender 4.2 and later to a ``.zip``. Raises ExportError: another program or suffix."""
     path = Path(path)
-    if program not in PROGRAMS:
-        raise ExportError(f"there is no add-on for {program!r}, required one of {', '.join(PROGRAMS)}")
+    if program != "blender":
+        raise ExportError(f"there is no add-on for {program!r}, required blender")
     if path.suffix.lower() != ".zip":
         raise ExportError(f"{path}: unknown format {path.suffix!r}; Blender installs a .zip")
     check_target(path)

@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
+from lipmotion.formats import steady_rate
 from lipmotion.formats.base import MotionFormat, iterate_json, read_members, write_json
 from lipmotion.formats.steady_rate import TIME_COLUMN, clean_column, convert_times, resample_rows, tabulate_frames
 from lipmotion.meshes.model.shape_names import ARKIT_52, is_known
@@ -203,6 +204,7 @@ AZURE_NAMES, AZURE_HZ = (*ARKIT_52, "headRoll", "leftEyeRoll", "rightEyeRoll"), 
 TICKS_PER_S = 1e7
 ANIMATION, AUDIO_OFFSET = ("animation", "privanimation"), ("audiooffset", "privaudiooffset")
 RATES = ("fps", "framerate", "exportfps", "ratehz")
+NUMBERED = ("frame", "frameindex", "framenumber", "frameid")  # members that are the number of a frame
 NAMED, SCORED = ("categoryname", "blendshape", "blendshapename", "name", "shape"), ("score", "value", "weight")
 DEEPEST, MAX_FRAMES = 6, 1 << 22
 
@@ -246,6 +248,9 @@ def read_frames(path: Path) -> tuple[Motion, Timeline[Unit]]:
         if pieces:
             return _place_azure(pieces), Timeline(())
         frames = [(each, weights) for each in objects if (weights := _find_weights(each)) is not None]
+        for each, weights in frames:
+            if any(steady_rate.is_unseen(value, name) for name, value in each.items()):
+                weights.clear()
         if not any(weights for _, weights in frames):
             raise InputError("no frames of blendshapes by their names, required a list of {time, blendshapes}")
         timed = next((key for key in frames[0][0] if TIME_COLUMN.fullmatch(key)), None)
@@ -259,7 +264,8 @@ def read_frames(path: Path) -> tuple[Motion, Timeline[Unit]]:
             rate_hz = next((float(each[key]) for each in objects for key in RATES if each.get(key)), 0.0)
             if not rate_hz > 0:
                 raise InputError(f"{len(frames)} frames have no time, required one in each, or a member fps")
-            time_s = np.arange(len(frames)) / rate_hz
+            counted = next((key for key in NUMBERED if key in frames[0][0]), "")
+            time_s = np.array([float(each.get(counted, n)) for n, (each, _) in enumerate(frames)]) / rate_hz
         return resample_rows(names, time_s, values)[0], Timeline(())
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, shorten, shorten_list
 from lipmotion.meshes.model.shape_names import is_known, to_arkit
 from lipmotion.motion.frame_labels import find_runs
-from lipmotion.types import WEIGHT, Channel, Motion
+from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Motion
 from lipmotion.types.motion import RADIAN
 
 Array = NDArray[np.float64]
@@ -38,11 +38,14 @@ TIME_COLUMN = re.compile(
     rf"(?:(?:time(?:stamp|code)?|t)(?:s|secs?|seconds?|{'|'.join(PER_SECOND)})?|seconds?|milliseconds)"
 )
 """Names of columns of times, without blanks, brackets and underscores."""
+SEEN = r"(?:is|has|face)*(?:blendshapecount|success|confidence|valid|detected|track(?:ed|ing\w*)|found|present)|hasface"
+"""Names of columns that say whether there is a face: where they hold 0, false or no, there is none (``is_unseen``)."""
 LATEST_START_S = 60.0  # rows that begin later are cut from a longer take, or have the time of day
 BACKWARDS_S = 0.5
 """A row whose time is earlier than that of the row before by less than this is left out; more is an error."""
 LEFT_OUT_SHARE, LEFT_OUT = 0.1, 3  # so many rows may be left out: a share of all, or a few
-LONGEST_STEP_S = 2.0  # rows that are further apart are not seconds apart: the column of times has another unit
+LONGEST_STEP_S, SLOW_STEP_S = 2.0, 0.25
+"""Rows that are further apart than the first have times in another unit than seconds; in it, they are nearer."""
 
 
 def exact_rate(hertz: float, off_hz: float = 1e-6) -> float:
@@ -104,6 +107,12 @@ def clean_column(name: str) -> str:
     return re.sub(r"[\s_()\[\].-]+", "", name).lower()
 
 
+def is_unseen(flag: object, column: str) -> bool:
+    """Return whether a flag, as text or of JSON, says that there is no face, in a column of such flags."""
+    no = r"0+(?:[.,]0*)?|false|no?"
+    return bool(re.fullmatch(SEEN, column) and re.fullmatch(no, str(flag).strip().lower()))
+
+
 def tabulate_frames(frames: Sequence[Mapping[str, float]]) -> tuple[list[str], Array]:
     """Return the names of all curves of some frames, and their values [shape=(N, P)]; NaN where a frame has none."""
     names = [name for name in dict.fromkeys(name for frame in frames for name in frame) if name != "_neutral"]
@@ -117,7 +126,7 @@ def convert_times(times: Array, key: str) -> Array:
     per_second = next((scale for unit, scale in PER_SECOND.items() if key.endswith(unit)), 1.0)
     step = float(np.median(np.diff(times))) / per_second if len(times) > 1 else 0.0
     if per_second == 1 and step > LONGEST_STEP_S:
-        per_second = next(scale for scale in (1e3, 1e6, 1e9) if step / scale <= LONGEST_STEP_S or scale == 1e9)
+        per_second = next((scale for scale in (1e3, 1e6, 1e7, 1e9) if step / scale <= SLOW_STEP_S), 1e9)
         LOG.warning("the times rise by %g a row: read as parts of a second, %g of them", step, per_second)
     return np.asarray(times / per_second)
 
@@ -146,6 +155,10 @@ def resample_rows(
     names = [name for name, there in zip(names, measured, strict=True) if there]
     values = values[:, measured]
     channels = [_channel(name, unit) for name in names]
+    foreign = [column for column, channel in enumerate(channels) if channel.unit == EYE_DISTANCE]
+    if foreign:
+        what = f"{len(foreign)} columns have no name of a blendshape and count as eye distances, up to"
+        LOG.warning("%s %g: %s", what, np.nanmax(values[:, foreign]), shorten_list([names[n] for n in foreign], 8))
     angles = [column for column, channel in enumerate(channels) if channel.unit == RADIAN]
     if angles and (largest := float(np.nanmax(np.abs(values[:, angles])))) > 2 * np.pi:
         LOG.warning("angles go up to %g: they are read as degrees", largest)

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats import steady_rate
 from lipmotion.formats.base import MotionFormat, format_rows
+from lipmotion.formats.steady_rate import SEEN, TIME_COLUMN, is_unseen
 from lipmotion.meshes.model.shape_names import ARKIT_52, is_known, to_arkit
 from lipmotion.storage.text_table import LONGEST_LINE, open_table, parse_numbers
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, Timeline, Unit
@@ -41,12 +42,10 @@ TICKS_HZ = 60
 """The frames of a timecode are counted in 60ths of a second at any rate: Unreal's importer divides them by 60."""
 TAKE_DECIMALS = 6
 BEFORE_CURVES = ("Timecode", "BlendshapeCount")
-FIRST, COUNT = (name.lower() for name in BEFORE_CURVES)
-"""Names of the first two columns of the app; capitals do not matter, for versions of the app differ."""
 NO_CURVES = re.compile(
-    r"(?:|unnamed:?0|(?:frame|face)?(?:index|idx|id|number|no|num)?s?|blendshapecount|neutral|success|confidence)"
+    rf"(?:|unnamed:?0|(?:frame|face)?(?:index|idx|id|number|no|num)?s?|neutral|{SEEN}|{TIME_COLUMN.pattern})"
 )
-"""Names of columns that are not curves: numbers of frames and faces, and what MediaPipe calls neutral."""
+"""Names of columns that are not curves: numbers of frames and faces, further times, whether there is a face."""
 SCORES = ("score", "value", "weight", "coefficient")
 TIMECODE_RATES = (24, 25, 30, 48, 50, 60, 120)
 APP_RATE = 60  # frames a second of the timecode where a take does not show it: what the app has by default
@@ -84,7 +83,7 @@ def read_table_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """
     with open_table(path) as table:
         if table.names[0] != TIME or len(table.names) < 2:
-            return read_curve_motion(path)
+            return read_curve_table(path)[0], Timeline(())
         columns, numbers = len(table.names), array("d")
         for line, fields in table.rows:
             if len(fields) != columns:
@@ -132,13 +131,9 @@ def is_live_link_file(path: Path) -> bool:
             names = table.names
     except (OSError, ValueError):
         return False
+    first, count = (name.lower() for name in BEFORE_CURVES)  # capitals differ between versions of the app
     lower = [name.lower() for name in names[:2]]
-    return lower[:1] == [FIRST] and (lower[1:] in ([], [COUNT]) or (is_known(names[1]) and "." not in names[1]))
-
-
-def read_curve_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
-    """Return the curves of a table as of ``read_curve_table``, and an empty timeline."""
-    return read_curve_table(path)[0], Timeline(())
+    return lower[:1] == [first] and (lower[1:] in ([], [count]) or (is_known(names[1]) and "." not in names[1]))
 
 
 def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
@@ -152,16 +147,16 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
     with open_table(path) as table:
         names = table.names
         keys = list(map(steady_rate.clean_column, names))
-        timed = next((column for column, key in enumerate(keys) if steady_rate.TIME_COLUMN.fullmatch(key)), None)
-        used = [n for n, key in enumerate(keys) if n != timed and not NO_CURVES.fullmatch(key)]
+        timed = next((column for column, key in enumerate(keys) if TIME_COLUMN.fullmatch(key)), None)
+        used = [n for n, key in enumerate(keys) if not NO_CURVES.fullmatch(key)]
         if timed is None or not 0 < len(used) <= MAX_CURVES:
             raise ValueError(
                 f"the first line is {shorten(','.join(names))!r}, required 'time_s,opening,...', or curves "
                 "beside a column of times: Timecode,BlendshapeCount,JawOpen,... or timestamp_ms,jawOpen,..."
             )
-        counted = next((keys.index(name) for name in (COUNT, "success") if name in keys), None)
+        flags = {n: key for n, key in enumerate(keys) if re.fullmatch(SEEN, key)}
         rows = _choose_face(table.rows, keys.index("faceid")) if "faceid" in keys else table.rows
-        times, names, values = _read_rows(rows, names, timed, used, counted)
+        times, names, values = _read_rows(rows, names, timed, used, flags)
         coded = bool(re.search("[:;]", times[0][1]))
         if coded:
             time_s = _read_timecodes([_parse_timecode(text, line) for line, text in times])
@@ -186,7 +181,7 @@ def _choose_face(rows: Iterator[tuple[int, list[str]]], column: int) -> Iterator
 
 
 def _read_rows(
-    rows: Iterator[tuple[int, list[str]]], names: list[str], timed: int, used: list[int], counted: int | None
+    rows: Iterator[tuple[int, list[str]]], names: list[str], timed: int, used: list[int], flags: dict[int, str]
 ) -> tuple[list[tuple[int, str]], list[str], Array]:
     """Return the lines and times of the rows, and names and values of curves [shape=(N, P)]: NaN without a face."""
     times: list[tuple[int, str]] = []
@@ -196,9 +191,7 @@ def _read_rows(
     for line, fields in rows:
         times.append((line, fields[timed].strip() if timed < len(fields) else ""))
         curves = [fields[column] for column in used if column < len(fields)]
-        if not any(map(str.strip, curves)) or (
-            counted is not None and [field.strip() for field in fields[counted : counted + 1]] == ["0"]
-        ):
+        if not any(map(str.strip, curves)) or any(is_unseen(f, flags[n]) for n, f in enumerate(fields) if n in flags):
             continue
         if len(fields) != columns:
             count = len(fields) - columns + len(used)
@@ -208,7 +201,7 @@ def _read_rows(
             used = [column for column in used if column not in texts]
             if not used:
                 raise ValueError(f"line {line} has no numbers beside the time")
-            of_names = [c for c in texts if is_known(fields[c].strip()) or fields[c].strip() == "_neutral"]
+            of_names = [c for c in texts if len(t := fields[c].strip()) > 1 and (is_known(t) or t == "_neutral")]
             if of_names:
                 return _read_single_scores(chain([(line, fields)], rows), names, timed, of_names[0], used)
             if texts:
@@ -311,4 +304,4 @@ def _drop_frames(seconds: Array, frames: Array, rate: int) -> Array:
 
 
 TABLE = MotionFormat(write_table, read_table_motion, check_table)
-LIVE_LINK = MotionFormat(write_take, read_curve_motion, curves="face", rate_hz=float(TICKS_HZ))
+LIVE_LINK = MotionFormat(write_take, read_table_motion, curves="face", rate_hz=float(TICKS_HZ))

@@ -31,12 +31,8 @@ ENCODING = "cp932"
 ENCODINGS = (ENCODING, "gb18030", "euc_jp", "utf-8", "big5", "euc_kr")
 """Encodings of names, the usual one first: programs in other countries write their own."""
 BONE_KEY, MORPH_KEY, COUNT = struct.Struct("<15sI3f4f64s"), struct.Struct("<15sIf"), struct.Struct("<I")
-_SLOW, _FAST = bytes([20]), bytes([107])
-LINEAR = (
-    *(_SLOW * 2 + bytes(2) + _SLOW * 4 + _FAST * 8),
-    *(_SLOW * 7 + _FAST * 8 + bytes(1)),
-    *(_SLOW * 6 + _FAST * 8 + bytes(2)),
-    *(_SLOW * 5 + _FAST * 8 + bytes(3)),
+LINEAR = bytes.fromhex(
+    "14140000" + "14" * 4 + "6b" * 8 + "".join("14" * n + "6b" * 8 + "00" * (8 - n) for n in (7, 6, 5))
 )
 """The bytes of a bone's key that say: straight on to the next one."""
 LAST_FRAME = 86_400 * 30  # frames of a day
@@ -81,7 +77,7 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     with path.open("wb") as file:
         file.write(MARK.ljust(MARK_BYTES, b"\0") + _encode_name("lipmotion", MODEL_BYTES) + COUNT.pack(len(bones)))
         for frame, bone, turn in bones:
-            file.write(BONE_KEY.pack(_encode_name(bone, 15), frame, 0, 0, 0, *turn, bytes(LINEAR)))
+            file.write(BONE_KEY.pack(_encode_name(bone, 15), frame, 0, 0, 0, *turn, LINEAR))
         file.write(COUNT.pack(len(morphs)))
         for frame, morph, value in sorted(morphs, key=lambda key: key[0]):
             file.write(MORPH_KEY.pack(_encode_name(morph, 15), frame, value))

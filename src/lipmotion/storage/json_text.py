@@ -50,16 +50,6 @@ def as_json_rows(content: Mapping[str, Any], *, ensure_ascii: bool = True) -> st
 
     It is what people read and compare line by line, and is made faster than text with an indent.
     Raises ExportError: as ``as_json``.
-
-    >>> print(as_json_rows({"format": "x", "rows": [[1, 2], [3]], "none": []}), end="")
-    {
-     "format": "x",
-     "rows": [
-      [1, 2],
-      [3]
-     ],
-     "none": []
-    }
     """
     members = []
     for name, value in content.items():

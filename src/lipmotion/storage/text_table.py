@@ -23,7 +23,7 @@ from lipmotion.storage.sources import read_text_file
 
 LONGEST_LINE = 1 << 20  # most characters of a line
 SEPARATORS = ",;\t"
-MISSING = frozenset(("", "nan", "na", "n/a", "none", "null", "-", "-nan", "nan(ind)", "-nan(ind)"))
+MISSING = frozenset("|nan|na|n/a|#n/a|none|null|-|--|-nan|nan(ind)|-nan(ind)|1.#qnan|1.#ind|-1.#ind".split("|"))
 """Fields that hold no number, in lower case."""
 QUOTE = "'"
 Rows = list[tuple[int, list[str]]]  # rows of a table: the number of the last line of each, and its fields

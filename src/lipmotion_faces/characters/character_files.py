@@ -45,7 +45,7 @@ from lipmotion_faces.characters.lip_placement import (
     place_lips_by_shape,
     separate_named_lips,
 )
-from lipmotion_faces.characters.surface import build_surface
+from lipmotion_faces.characters.surface import build_surface, drop_back_sides
 from lipmotion_faces.characters.textures import read_texture
 
 SOURCES = (*ARKIT_52, *(f"viseme_{name}" for name in VISEMES_15), *VRM_VOWELS, CLOSED, *VRM_EMOTIONS)
@@ -82,7 +82,7 @@ class _Surface:
     parts: array[int] = field(default_factory=lambda: array("i"))
     names: dict[tuple[str, str], int] = field(default_factory=dict)
     here: tuple[str, str] = ("", "")
-    library: str = ""
+    libraries: list[str] = field(default_factory=list)
 
     def add(self, kind: bytes, words: list[bytes]) -> None:
         """Add a line. Raises ValueError: it is damaged, or there are too many."""
@@ -113,7 +113,8 @@ class _Surface:
         elif kind == b"usemtl":
             self.here = (self.here[0], _join_words(words))
         elif kind == b"mtllib":
-            self.library = _join_words(words)
+            named = [_join_words(words), *(_join_words([word]) for word in words)]
+            self.libraries += [re.split(r"[/\\]", each)[-1] for each in named]
 
 
 def read_obj(path: Path) -> Mesh:
@@ -138,7 +139,7 @@ def read_obj(path: Path) -> Mesh:
     if not surface.corners:
         raise InputError(f"{path}: there are no polygons in it, required a mesh; export the surface, not points alone")
     used = {material for _, material in surface.names}
-    materials = _read_materials(path.parent, surface.library, used, budget)
+    materials = _read_materials(path.parent, surface.libraries, used, budget)
     part = np.array(surface.parts)
     order = np.argsort(part, kind="stable")
     stops = np.cumsum([0, *np.bincount(part, minlength=len(surface.names))])
@@ -240,15 +241,14 @@ def _join_words(words: list[bytes]) -> str:
     return b" ".join(words).decode("utf-8", "replace")
 
 
-def _read_materials(folder: Path, library: str, used: Collection[str], budget: Budget) -> dict[str, Material]:
-    """Return those materials of an MTL file in a folder that are used; none if there is no such file."""
-    path = _find_sibling(folder, library)
-    if path is None or path.stat().st_size > LARGEST_LIBRARY_BYTES:
-        return {}
+def _read_materials(folder: Path, libraries: list[str], used: Collection[str], budget: Budget) -> dict[str, Material]:
+    """Return those materials of MTL files in a folder that are used; none if there are no such files."""
+    paths = dict.fromkeys(path for each in libraries if (path := _find_sibling(folder, each)))
+    read = [budget.read_bytes(p, "material library") for p in paths if p.stat().st_size <= LARGEST_LIBRARY_BYTES]
     materials: dict[str, Material] = {}
     pictures: dict[str, str] = {}
     name = ""
-    for _, (kind, *words) in _list_lines(budget.read_bytes(path, "material library"), _LOOKS, budget):
+    for _, (kind, *words) in _list_lines(b"\n".join(read), _LOOKS, budget):
         if kind == b"newmtl":
             name = _join_words(words)
             materials[name] = Material(name)
@@ -402,7 +402,7 @@ def load_character(
             surface = separate_named_lips(mesh, named)
             placement = place_lips_by_points(mesh, surface, named)
         else:
-            surface = build_surface(mesh)
+            surface = build_surface(drop_back_sides(mesh))
             placement = place_lips_by_shape(mesh, surface)
         if mesh.shapes and not by_points and binding is None:
             return PosedCharacter(mesh, placement, find_face_shapes(mesh, placement), table, path)
@@ -415,6 +415,8 @@ def load_character(
         raise InputError(text if str(path) in text else f"{path}: {text}") from error
 
 
+MAX_DISPLACEMENT = 2.5  # eye distances by which a known blendshape of the mouth moves lips or chin at most
+MIRRORED = 0.1  # eye distances that blendshapes of the left move places right of those of the right, together
 MIN_DISPLACEMENT = 0.02  # a blendshape that moves no lip point by this many eye distances is none of the mouth
 MAX_SHAPES = 200
 
@@ -429,8 +431,18 @@ def find_face_shapes(mesh: Mesh, placement: LipPlacement) -> FaceShapes:
     Raises InputError: none moves the mouth, or a table lets some follow visemes and others ``jawOpen``.
     """
     moved = placement.to_motion(mesh.displacements(placement.vertices))
-    strong = np.abs(moved).max(axis=(1, 2), initial=0.0) > MIN_DISPLACEMENT
-    shapes, style = _choose_mouth(mesh, strong)
+    furthest = np.abs(moved).max(axis=(1, 2), initial=0.0)
+    shapes, style = _choose_mouth(mesh, furthest > MIN_DISPLACEMENT)
+    for number in [number for known, numbers in shapes for number in numbers if known]:
+        if furthest[number] > MAX_DISPLACEMENT:
+            what = f"the blendshape {shorten(mesh.shape_names[number])!r} moves lips or chin by {furthest[number]:.0f}"
+            limit = f"required up to {MAX_DISPLACEMENT:g}: another unit, place or order of vertices? export it again"
+            raise InputError(f"{what} eye distances, {limit}")
+    across = mesh.vertices @ placement.axes[:, 0]
+    sides = {to_arkit(each.called): float(across[each.rows].mean()) for each in mesh.shapes if len(each.rows)}
+    pairs = [(sides[name], sides.get(f"{name[:-4]}Right")) for name in sides if name and name.endswith("Left")]
+    if sum(left - right for left, right in pairs if right is not None) < -MIRRORED * placement.scale:
+        warnings.warn("blendshapes of the left move the right side: mirrored, or turned?", UserWarning, stacklevel=2)
     if not shapes:
         there = shorten(", ".join(mesh.shape_names)) or "none"
         raise InputError(f"no blendshape moves the mouth; the mesh has {there}. Drive it by control points")

@@ -5,6 +5,7 @@ docs/meshes.md states the same table.
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from collections import Counter
 from pathlib import Path
 
@@ -38,7 +39,7 @@ class Budget:
         try:
             self.spend("bytes of files", size)
             with path.open("rb") as file:
-                return file.read(size)
+                return file.read(size).removeprefix(BOM_UTF8)
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
         except OSError as error:

@@ -418,11 +418,7 @@ _ENDS = {"top", "end", "nub", "tip", "target", "ctrl"}
 
 
 def find_bone_kind(name: str) -> str | None:
-    """Return which bone of the head a name stands for, or None: ``mixamorig:Head``, ``J_Bip_C_Neck``, ``JawBone``.
-
-    >>> find_bone_kind("J_Adj_L_FaceEye"), find_bone_kind("CC_Base_JawRoot"), find_bone_kind("HeadTop_End")
-    ('leftEye', 'jaw', None)
-    """
+    """Return which bone of the head a name stands for, or None: ``mixamorig:Head``, ``J_Bip_C_Neck``, ``JawBone``."""
     words = [word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name)]
     words = [re.sub(r"^mixamorig", "", word) or word for word in words]
     plain = {re.sub(r"(bone|root|joint)$", "", word) or word for word in words}

@@ -43,6 +43,11 @@ MAX_PAIRS, MAX_DISTANCES = 1_000_000, 1 << 30
 """Pairs of vertices that are compared, about, and distances that are looked at for it: of meshes that are so dense
 around the mouth, only some vertices are compared."""
 DISTANCES_AT_ONCE = 1 << 22
+STEEPEST, FURTHEST_TURN = 65, 40
+"""Degrees by which the way of an opening mouth, and the line between its corners, may be off; jaws go back as well."""
+UPRIGHT = (
+    "turn the character so that it stands upright (+y up), looks along +z, its faces outwards, or name its lip points"
+)
 NEEDED = (RIGHT_CORNER, LEFT_CORNER, UPPER_MIDDLE, LOWER_MIDDLE)
 """The points that a list must name, where nothing is found by blendshapes."""
 
@@ -55,6 +60,7 @@ def place_lips_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
     Raises InputError: no blendshape opens the mouth, or the lips are not found.
     """
     shape = find_opening_shape(mesh)
+    _check_way(f"the way of {shorten(shape.name)!r}", shape.displacements.sum(axis=0), [0, -1, 0], "down", STEEPEST)
     drop = np.zeros(len(mesh.vertices))
     drop[shape.rows] = -shape.displacements[:, 1]
     still, moved = drop < 0.1 * drop.max(initial=0.0), drop > 0.5 * drop.max(initial=0.0)
@@ -70,6 +76,7 @@ def place_lips_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
         )
     template = build_mouth()
     right, left = middle[middle[:, 0].argmin()], middle[middle[:, 0].argmax()]
+    _check_way("the line between the corners of the mouth", left - right, [1, 0, 0], "the axis x", FURTHEST_TURN)
     corners = [template.places[template.row(point)] for point in INNER_CORNERS]
     scale = float(left[0] - right[0]) / float(np.linalg.norm(corners[1] - corners[0]))
     order = np.argsort(middle[:, 0], kind="stable")
@@ -80,6 +87,12 @@ def place_lips_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
     upper = drop < share[_tree(middle).query(mesh.vertices)[1]]
     vertices = _choose_vertices(mesh.vertices, surface.normals[:, 2], targets, skin, upper)
     return LipPlacement(template.points, vertices, scale, np.eye(3))
+
+
+def _check_way(what: str, way: Places, axis: list[int], named: str, largest: int) -> None:
+    off = np.degrees(np.arccos(np.clip(way @ np.array(axis) / max(float(np.linalg.norm(way)), 1e-12), -1, 1)))
+    if off > largest:
+        raise InputError(f"{what} is {off:.0f}° off {named}, required up to {largest}°: {UPRIGHT}")
 
 
 def place_lips_by_points(mesh: Mesh, surface: MeshSurface, named: Mapping[int, int]) -> LipPlacement:
@@ -230,7 +243,7 @@ def _choose_vertices(
             points, rows = of_side & edge, np.flatnonzero(candidates)
             if points.any():
                 if not len(rows):
-                    raise InputError("no vertices are on one side of the lips; name the lip points by their vertices")
+                    raise InputError(f"no vertices of one lip face forwards: {UPRIGHT}")
                 chosen[points] = rows[_tree(places[rows] * stretch).query(targets[points] * stretch)[1]]
     return chosen
 

@@ -34,14 +34,6 @@ def list_prim(
     inside  : the lines of its attributes and of its own prims
     schemas : API schemas that are applied to it
     about   : further metadata, as ``kind``
-
-    >>> print("\\n".join(list_prim("Scope", "Looks", ["token purpose"], kind="group")))
-    def Scope "Looks" (
-        kind = "group"
-    )
-    {
-        token purpose
-    }
     """
     lines = [f'{INDENT}{key} = "{value}"' for key, value in about.items()]
     if schemas:
@@ -55,11 +47,7 @@ def list_prim(
 
 
 def name_prims(names: Iterable[str]) -> list[str]:
-    """Return names of letters, digits and low lines, as prims need them, none twice.
-
-    >>> name_prims(["mouthSmile_L", "head.mouthSmile_L", "head mouthSmile_L", "2"])
-    ['mouthSmile_L', 'head_mouthSmile_L', 'head_mouthSmile_L_2', '_2']
-    """
+    """Return names of letters, digits and low lines, as prims need them, none twice."""
     taken: dict[str, None] = {}
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9_]", "_", name) or "part"
@@ -73,11 +61,7 @@ def name_prims(names: Iterable[str]) -> list[str]:
 
 
 def format_tokens(names: Iterable[str]) -> str:
-    """Return names as an array of tokens; control characters are escaped, surrogates as in Python.
-
-    >>> print(format_tokens(['a"b', "c\\nd"]))
-    ["a\\"b", "c\\x0ad"]
-    """
+    """Return names as an array of tokens; control characters are escaped, surrogates as in Python."""
     escaped = (as_text(name).replace("\\", "\\\\").replace('"', '\\"') for name in names)
     plain = (_CONTROL.sub(lambda match: f"\\x{ord(match[0]):02x}", name) for name in escaped)
     return "[" + ", ".join(f'"{name}"' for name in plain) + "]"
@@ -87,9 +71,6 @@ def format_asset(path: str) -> str:
     """Return a path from the folder of the file, with slashes, as a reference to a file.
 
     Raises ExportError: a name with a line end or another control character, which USD cannot refer to.
-
-    >>> format_asset("welcome.flac"), format_asset("../a@b.wav"), format_asset("a@@@b.wav")
-    ('@./welcome.flac@', '@@@../a@b.wav@@@', '@@@./a\\\\@@@b.wav@@@')
     """
     if not is_line(path):
         raise ExportError(f"the name {shorten(path)!r} has a character that .usda cannot refer to; rename the file")

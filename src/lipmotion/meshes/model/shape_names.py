@@ -25,19 +25,23 @@ _VOWEL_SPELLINGS = {row["spelling"]: row["vowel"] for row in _SPELLINGS if row["
 _VOWEL_SPELLINGS |= dict(zip("あいうえお", VRM_VOWELS, strict=True))
 _ARKIT = {name.lower(): name for name in (*ARKIT_MOUTH, *ARKIT_OTHERS)}
 _SIDES = {"l": "left", "r": "right", "left": "left", "right": "right"}
-_COPY = re.compile(r"(?:[._ ](?:\d{1,4}|(?i:copy|mesh|head|face|body|weight|(?:mesh)?shape)))+$|(?<=[a-z])Shape$")
-"""What programs add to a name: ``jawOpen.001``, ``jawOpen_Head``, ``jawOpenShape``."""
+_COPY = re.compile(
+    r"(?:[._ ](?:\d{1,4}|(?i:copy|mesh|head|face|body|geo|key|value|weight|(?:mesh)?shape)))+$"
+    r"|(?<=[a-z])(?:Shape|Mesh|Geo)$|\s*(?:\[.*\]|\(.*\)|%)$"
+)
+"""What programs add to a name: ``jawOpen.001``, ``jawOpen_Head``, ``jawOpenShape``, ``jawOpen [0..1]``."""
 
 
 def to_arkit(name: str) -> str | None:
     """Return ARKit's name of a blendshape as files spell it, or None: ``head.mouthSmile_L`` is ``mouthSmileLeft``."""
-    text = re.sub(r"(?<=[a-z])([LR])$", r"_\1", re.split(r"[.:|]", _COPY.sub("", name))[-1])
-    words = [word for word in re.split(r"[\s_\-]+", text) if word]
-    for first in range(len(words)):
-        rest = [word.lower() for word in words[first:]]
-        joined = "".join([*rest[:-1], _SIDES.get(rest[-1], rest[-1])])
-        if joined in _ARKIT:
-            return _ARKIT[joined]
+    text = re.split(r"[.:|/]", re.sub(r"\.(?=(?i:[lr]|left|right)$)", "_", _COPY.sub("", name)))[-1]
+    text = re.sub(r"(?<=[a-z])([LR])$", r"_\1", text)
+    for spelled in (text, re.sub(r"^(?i:(left|right|[lr]))(?=[A-Z_ -])(.+)$", r"\2_\1", text)):  # the side may be first
+        words = [word.lower() for word in re.split(r"[\s_\-]+", spelled) if word]
+        for first in range(len(words)):
+            joined = "".join([*words[first:-1], _SIDES.get(words[-1], words[-1])])
+            if joined in _ARKIT:
+                return _ARKIT[joined]
     return None
 
 

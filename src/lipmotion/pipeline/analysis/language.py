@@ -126,11 +126,6 @@ def recognise_words(
     workers, monitor : as of ``animate``
     Raises InputError: the recording is not usable, or the recogniser does not recognise words.
     Raises MissingDependencyError: pocketsphinx is not installed.
-
-    >>> from lipmotion.pipeline.analysis.language import recognise_words
-    >>> found = recognise_words("examples/welcome.flac")
-    >>> found.words[0].label.text, found.word_s > found.phone_s
-    ('please', True)
     """
     request = as_request(speech)
     chosen = model if isinstance(model, Model) else load_model(model or request.model)

@@ -89,11 +89,7 @@ def check_line(line: BatchLine, request: Request) -> CheckedLine:
 
 
 def count_letters(words: Sequence[str]) -> float:
-    """Return how many letters words have, those of other scripts as many as take as long to say.
-
-    >>> count_letters(["ab", "c"]), count_letters(["你"])
-    (3.0, 4.0)
-    """
+    """Return how many letters words have, those of other scripts as many as take as long to say."""
     return sum((LETTERS_OF.get(find_script(letter), 1.0) for word in words for letter in word), 0.0)
 
 
@@ -204,11 +200,7 @@ def _find_problems(checked: Sequence[CheckedLine], orphans: Iterable[str]) -> It
 
 
 def estimate_time(letters: float) -> float:
-    """Return how long words of a number of letters usually take, without pauses, s.
-
-    >>> estimate_time(15)
-    1.3
-    """
+    """Return how long words of a number of letters usually take, without pauses, s."""
     return PAUSE_S + letters / LETTERS_PER_S
 
 

@@ -46,7 +46,7 @@ from lipmotion.pipeline.outputs.curve_sets import (
 from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth_poses
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_recorded_prosody
 from lipmotion.storage.files import as_text, sound_reference
-from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, Prosody, StateTrace, Timeline, Unit
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Prosody, StateTrace, Timeline, Unit
 from lipmotion.types.delivery import Staging
 from lipmotion.types.motion import RADIAN
 
@@ -252,8 +252,8 @@ def _blendshapes(motion: Motion) -> Motion | None:
 
 
 TOLERATED_S = 0.1  # sound and motion may differ so much in length without a warning
-SLOWEST_HZ, FASTEST_HZ = 1.0, 10_000.0
-"""Smallest and largest frame rate of motion that is read: a mistyped one must not fill the memory."""
+SLOWEST_HZ, FASTEST_HZ = 4.0, 1_000.0
+"""Smallest and largest frame rate of motion that is read: others are of times in another unit, or of frames."""
 LONGEST_S = 86_400.0  # longest motion that is read
 CUE_SUFFIXES = (".dat", ".tsv", ".xml", ".pgo")
 STATE = "file"  # the state of every frame of motion that was read
@@ -279,7 +279,7 @@ def read_generation(
     if not len(motion.values):
         raise InputError(f"{path}: the motion has no frames; export it again")
     if not SLOWEST_HZ <= motion.rate_hz <= FASTEST_HZ:
-        required = f"required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f}; export it again"
+        required = f"required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f}; if it has others, state them: --motion-rate"
         raise InputError(f"{path}: {motion.rate_hz:g} frames a second, {required}")
     lasts_s = (len(motion.values) - 1) / motion.rate_hz
     if lasts_s > LONGEST_S:
@@ -287,7 +287,7 @@ def read_generation(
     phones = stated if units is None else read_units(units) if isinstance(units, str | Path) else units
     channels = tuple(
         Channel(each.name, WEIGHT)
-        if each.unit == EYE_DISTANCE and (is_known(each.name) or is_mood(each.name))
+        if each.unit not in (CONTROL, RADIAN) and (is_known(each.name) or is_mood(each.name))
         else each
         for each in motion.channels
     )

@@ -163,9 +163,6 @@ class LanguageLexicon(Lexicon):
     """Pronunciations of the words of a language that is not English: the user's, then those of espeak-ng.
 
     language : its code, of ``LANGUAGES``
-
-    >>> LanguageLexicon({"perro": (("p", "eh", "r", "ow"),)}, "es").pronunciations("perro")
-    (('p', 'eh', 'r', 'ow'),)
     """
 
     language: str = ENGLISH
