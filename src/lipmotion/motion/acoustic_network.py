@@ -83,7 +83,7 @@ class AcousticNetwork(Predictor):
         """Return a network that is trained on all acoustic conditions of each example.
 
         Each example is used in one of its conditions, drawn at random, at a time.
-        Raises CorpusError: an example without acoustic conditions.
+        Raises CorpusError: an example without acoustic conditions or encoding.
         """
         examples = training.examples
         if not all(example.condition_spectra for example in examples):
@@ -97,8 +97,7 @@ class AcousticNetwork(Predictor):
         variances = measure_error_variances(training, predicted, scale)
         last = replace(training, monitor=sub_monitor(training.monitor, 0.8, 1))
         posterior_network: Any = PosteriorNetwork.fit(last).predictor if list_posteriors(examples) else None
-        encoded = all(example.speech.encoding is not None for example in examples)
-        encoding: Any = EncodingRegression.fit(training).predictor if encoded else None
+        encoding: Any = EncodingRegression.fit(training).predictor
         return PredictorFit(cls(network, mean, scale, variances, posterior_network, encoding))
 
     def predict(self, speech: Speech) -> tuple[Array, Array]:
