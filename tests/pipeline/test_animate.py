@@ -139,7 +139,7 @@ def test_speech_that_cannot_be_used(toy_model, tmp_path):
         with pytest.raises(InputError, match=message):
             lipmotion.animate(speech, model=toy_model)
     with pytest.raises(InputError, match="the edits: found a list, required Edits"):
-        lipmotion.animate("a.wav", model=toy_model, edits=["pin opening 0 at 1"])
+        lipmotion.animate("a.wav", model=toy_model, edits=["pin opening 0 at 1"])  # type: ignore[arg-type]
 
 
 def test_a_file_its_name_and_its_samples_are_the_same(toy_model, toy_speech):
