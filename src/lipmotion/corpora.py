@@ -212,13 +212,14 @@ class Corpus:
             is_there = path.is_dir()
         except PermissionError as error:
             raise CorpusError(f"{path}: cannot be read: {error.strerror}; ask its owner, or copy it") from error
-        if not is_there:
+        if not is_there and not path.exists():
             raise CorpusError(f"{path}: no such corpus; make one: lipmotion corpus prepare RECORDINGS -o {path}")
         try:
             content = from_json(read_text_file(path / MANIFEST, "manifest"))
             format_name, version = content["format"], content["version"]
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise CorpusError(f"{path}: not a corpus (no readable {MANIFEST}); give a prepared corpus") from error
+            found = f"not a corpus (no readable {MANIFEST})"
+            raise CorpusError(f"{path}: {found}; make one: lipmotion corpus prepare {path} -o CORPUS") from error
         file = path / MANIFEST
         if format_name != FORMAT:
             raise CorpusError(f"{file}: format is {format_name!r}, required {FORMAT!r}; give a prepared corpus")
@@ -279,10 +280,7 @@ class Corpus:
         return Corpus(self.path, entries, self._fetch)
 
     def required(self, split: str | None, speakers: Sequence[str] = ()) -> tuple[str, ...]:
-        """Return the same names as ``names``, at least one.
-
-        Raises CorpusError: there are none, or no such speaker.
-        """
+        """Return the same names as ``names``, at least one. Raises CorpusError: there are none, or no such speaker."""
         unknown = sorted(set(speakers) - set(self.speakers))
         if unknown:
             known = ", ".join(filter(None, self.speakers)) or "no speaker by name"
@@ -292,7 +290,7 @@ class Corpus:
             counts = ", ".join(f"{each}: {len(self.names(each, speakers))}" for each in SPLITS)
             who = f" by {', '.join(speakers)}" if speakers else ""
             found = f"no utterances of split {split!r}{who} (there are {counts})"
-            raise CorpusError(f"{self.path}: {found}; choose another, or list some in test.txt (docs/corpora.md)")
+            raise CorpusError(f"{self.path}: {found}; choose another, or list some in test.txt and prepare these again")
         return names
 
     def selected(self, selection: Selection) -> tuple[str, ...]:

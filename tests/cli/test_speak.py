@@ -32,7 +32,8 @@ def test_files(run, basics, here):
 
 
 def test_it_is_the_function_of_the_same_name(run, basics, toy_model_file, here):
-    run(*basics, "--voice", "one", "-o", "command.json", "command.wav")
+    done = run(*basics, "--voice", "one", "-o", "command.json", "command.wav", "--machine-readable")
+    assert json.loads(done.out[1])["stage"] == "speaking"
     model = load_model(toy_model_file)
     sound, result = speak(TEXT, voice="stand-in:one", model=model)
     (here / "function").mkdir()

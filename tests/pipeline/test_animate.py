@@ -110,31 +110,24 @@ def test_a_pin_that_cannot_be_met(move):
 
 
 def test_constraints_and_units_that_are_none(move):
-    with pytest.raises(InputError, match="the constraints are a tuple, required Constraints"):
+    with pytest.raises(InputError, match="the constraints: found a tuple, required Constraints"):
         move(constraints=(Pin(0.5, "opening", 0.1),))
     with pytest.raises(InputError, match="units: found a list, required a path, or a Timeline"):
         move(units=[])
     without_time = ((-math.inf, 0.5), (0.5, 1e308), (1e308, math.inf))
     for spans, message in (
         ((), "the units are an empty list"),
-        ((Span(0, 1, "p"),), "a unit is 'p', required a Unit"),
+        ((Span(0, 1, "p"),), "the label of a unit: found 'p', required a Unit"),
         ((Span(0.0, 0.5, Unit("qq")),), "unknown phone 'qq' in the units at 0"),
-        *(
-            ((Span(*times_s, Unit("p")),), "the units last from .* s, required times of this")
-            for times_s in without_time
-        ),
-        (
-            [Span(i / 1e4, (i + 1) / 1e4, Unit("p")) for i in range(2000)],
-            "2000 units in time, required at most 1276 for",
-        ),
+        *(((Span(*each, Unit("p")),), "the units last from .* s, required times of this") for each in without_time),
+        ([Span(i / 1e4, (i + 1) / 1e4, Unit("p")) for i in range(2000)], "2000 units in time, required at most 1276"),
     ):
         with pytest.raises(InputError, match=message):
             move(units=Timeline(tuple(spans)))
 
 
 def test_units_need_no_recogniser(move):
-    silent = Timeline((Span(0.0, 2.0, Unit("sil")),))
-    assert move(units=silent).motion["opening"].max() < 0.01  # nothing is said
+    assert move(units=Timeline((Span(0.0, 2.0, Unit("sil")),))).motion["opening"].max() < 0.01  # nothing is said
 
 
 def test_speech_that_cannot_be_used(toy_model, tmp_path):
@@ -145,6 +138,8 @@ def test_speech_that_cannot_be_used(toy_model, tmp_path):
     ):
         with pytest.raises(InputError, match=message):
             lipmotion.animate(speech, model=toy_model)
+    with pytest.raises(InputError, match="the edits: found a list, required Edits"):
+        lipmotion.animate("a.wav", model=toy_model, edits=["pin opening 0 at 1"])  # type: ignore[arg-type]
 
 
 def test_a_file_its_name_and_its_samples_are_the_same(toy_model, toy_speech):

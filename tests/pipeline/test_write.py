@@ -20,7 +20,7 @@ from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
 from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth_poses
 from lipmotion.pipeline.outputs.motion_files import with_articulation
 from lipmotion.pipeline.outputs.output import OutputSettings, create_outputs, plan, shift_prosody
-from lipmotion.types import Audio, Generation, Prosody, Timeline
+from lipmotion.types import Audio, Prosody, Timeline
 from lipmotion.types.delivery import MoodKey
 from lipmotion_faces import Staging
 from lipmotion_faces.outputs import drawn_video
@@ -77,7 +77,7 @@ def test_nothing_is_written_unless_everything_can_be(result, toy_model, toy_spee
     plain = {"speech": toy_speech, "model": toy_model}
     odd = (replace(result.motion.channels[0], name="a,b"), *result.motion.channels[1:])
     broken = np.full_like(result.motion.values, np.nan)
-    cases: list[tuple[Generation, str, dict[str, Any], type[Exception], str]] = [
+    cases: list[tuple[Any, str, dict[str, Any], type[Exception], str]] = [
         (result, "a.xyz", {}, ExportError, r"a.xyz: unknown format '.xyz'; required one of: .json .csv .npz "),
         (result, "missing/a.json", {}, ExportError, r"the folder .*missing does not exist; create it first"),
         (result, "folder.json", {}, ExportError, r"folder.json: is a folder"),
@@ -86,9 +86,11 @@ def test_nothing_is_written_unless_everything_can_be(result, toy_model, toy_spee
         (result, "a.json", {"rate_hz": float("nan")}, InputError, r"frame rate is nan"),
         (result, "a.mp4", {"fps": -25.0}, InputError, r"frame rate is -25 "),
         (result, "a.mp4", {"fps": 1e-5}, InputError, r"frame rate is 1e-05"),
+        (result.motion, "a.json", {}, InputError, "the generation: found a Motion, required what animate returned"),
+        (result, "a.json", {"delivery": "game"}, InputError, r"the delivery: found 'game', required Delivery\("),
         (result, "a.mp4", {"staging": CLEAR}, ExportError, "cannot be transparent"),
         (result, "a.json", {"face": "nobody"}, InputError, "face"),
-        (result, "a.json", {"channels": ["smile"]}, InputError, "no motion channel 'smile'"),
+        (result, "a.json", {"channels": "opening,smile"}, InputError, "no motion channel 'smile'"),
         (result.selected(["width"]), "a.mp4", {}, ExportError, r"a\.mp4: the motion has no channel 'opening' to draw"),
         (replace(result, motion=replace(result.motion, channels=odd)), "a.json", {}, ExportError, "'a,b' does not fit"),
         (replace(result, motion=replace(result.motion, values=broken)), "a.json", {}, ExportError, "not finite"),
@@ -115,7 +117,7 @@ CLEAR = Staging(background="transparent")
 
 
 def test_articulatory_channels_are_written_where_they_are_asked_for(result, toy_speech, tmp_path):
-    write(result, tmp_path / "a.json", speech=toy_speech, channels=["opening", "tongue", "teeth"])
+    write(result, tmp_path / "a.json", speech=toy_speech, channels="opening,tongue,teeth")
     motion, _ = read_motion(tmp_path / "a.json")
     assert motion.names == ("opening", "tongue", "teeth")
     assert [channel.unit for channel in motion.channels] == ["eye_distance", "weight", "weight"]
@@ -173,6 +175,8 @@ def test_cues_beside_other_outputs_are_those_of_the_function(result, tmp_path):
     write(result, [tmp_path / "a.cues.tsv", tmp_path / "a.csv"])
     write_cues(cues(result), tmp_path / "b.tsv")
     assert (tmp_path / "a.cues.tsv").read_bytes() == (tmp_path / "b.tsv").read_bytes()
+    with pytest.raises(InputError, match=r"the generation: found .*, required what animate returned"):
+        cues("a.wav")  # type: ignore[arg-type]
     with pytest.raises(ExportError, match="has no phones"):
         cues(replace(result, units=Timeline(())))
     broken = result.motion.values.copy()

@@ -62,9 +62,9 @@ def _(corpus: Path) -> None:
     np.save(first / "crops.npy", np.zeros((_entry(first)["frames"], 9, 9, 3), np.uint8))
 
 
-_damaged("a manifest of 100,000 brackets", 4, "not a corpus (no readable corpus.json); give a prepared corpus")(
-    lambda corpus: (corpus / "corpus.json").write_text("[" * 100_000)
-)
+_damaged(
+    "a manifest of 100,000 brackets", 4, "not a corpus (no readable corpus.json); make one: lipmotion corpus prepare"
+)(lambda corpus: (corpus / "corpus.json").write_text("[" * 100_000))
 _damaged("a newer version", 4, "corpus version 9, this lipmotion reads version 2; upgrade lipmotion")(
     lambda corpus: _change_manifest(corpus, version=9)
 )

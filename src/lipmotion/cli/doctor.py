@@ -143,14 +143,12 @@ def _voices() -> str:
     found, others = [], []
     for each in SYNTHESISERS.values():
         try:
-            count = len(each.voices()) + len(each.others())
+            if count := len(each.voices()) + len(each.others()):
+                found.append(f"{each.name} {count}")
+            else:
+                others.append(f"no {each.name} ({explain_install(each)})")
         except LipMotionError as error:
             others.append(f"{each.name} does not work ({error})")
-            continue
-        if count:
-            found.append(f"{each.name} {count}")
-        else:
-            others.append(f"no {each.name} ({explain_install(each)})")
     if not found:
         raise _AbsentError(f"{EXTRAS['text']}; {explain_missing_synthesiser()}")
     return "; ".join([*found, *others])
@@ -208,9 +206,8 @@ def _compiled_kernels() -> str:
 
 def _temporary_folder() -> str:
     try:
-        with tempfile.TemporaryFile() as file:
+        with tempfile.TemporaryFile(buffering=0) as file:
             file.write(b"lipmotion")
-            file.flush()
     except OSError as error:
         raise LipMotionError(f"{error}; set TMPDIR to a folder that can be written") from error
     return tempfile.gettempdir()

@@ -13,7 +13,7 @@ import json
 import socket
 import struct
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -116,10 +116,8 @@ def read_address(to: str, port: int) -> tuple[str, int]:
 
 
 def _send(channel: socket.socket, packet: bytes, place: tuple[str, int]) -> None:
-    try:
+    with suppress(ConnectionRefusedError):  # nobody listens yet: whoever begins later is sent the frames from then on
         channel.sendto(packet, place)
-    except ConnectionRefusedError:
-        return  # nobody listens yet: whoever begins to listen later is sent the frames from then on
 
 
 def json_line(frame: LiveFrame) -> str:

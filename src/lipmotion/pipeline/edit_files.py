@@ -117,6 +117,8 @@ def edit_file(edits: EditFile | Edits | str | Path | None) -> EditFile:
     """Return edits as the content of a file: of its path, or of a value; None: there are none. Raises InputError."""
     if isinstance(edits, EditFile):
         return edits
+    if not isinstance(edits, Edits | str | Path | None):
+        raise InputError(f"the edits: found {describe_value(edits)}, required Edits().then('EDIT')")
     return EditFile(edits or Edits()) if isinstance(edits, Edits | None) else read_edits(edits)
 
 
@@ -162,7 +164,7 @@ def read_edits(path: str | Path, *, phones: bool = True) -> EditFile:
 
 def _check_suffix(path: Path) -> None:
     if path.suffix.lower() != SUFFIX:
-        raise InputError(f"{path}: a file of edits is called .json, not {path.suffix!r}; rename it")
+        raise InputError(f"{path}: no file of edits, as FILE.json; write one: lipmotion edit FILE.json --of RECORDING")
 
 
 def write_edits(file: EditFile, path: str | Path) -> None:

@@ -12,7 +12,7 @@ from typing import Any, get_type_hints
 from lipmotion.errors import InputError, shorten
 from lipmotion.types import FRAME_RATE_HZ, CurveEdit, DrawnCurve, Gain, Hold, Pin, SlopedPin, Span, Timeline, Unit
 from lipmotion.types.delivery import Delivery, MoodKey, Staging, format_moods, parse_moods, sort_moods
-from lipmotion.types.values import describe_value, parse_number, parse_whole
+from lipmotion.types.values import check_class, parse_number, parse_whole
 from lipmotion.units import Pronunciation, is_silent, require_phone, split_words
 
 MIN_PHONE_S = 0.01  # shortest phone that an edit may leave
@@ -429,8 +429,7 @@ def parse_step(sentence: str) -> Step:
     >>> str(parse_step("pin  jawOpen .2 at 1"))
     'pin jawOpen 0.2 at 1.0'
     """
-    if not isinstance(sentence, str):
-        raise InputError(f"an edit is {describe_value(sentence)}, required a sentence: {FORMS[0]!r}")
+    check_class(sentence, str, "edit", f"a sentence: {FORMS[0]!r}")
     for form, kind in STEPS.items():
         pattern, readers = _read_form(form, kind)
         if match := pattern.fullmatch(sentence.strip()):

@@ -124,6 +124,8 @@ def load_model(path: str | Path | Model | None = None) -> Model:
 
 def read_header(path: Path) -> dict[str, Any]:
     """Return the header of a model file. Raises as ``load_model``."""
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder, required a model file; a corpus comes after it: evaluate MODEL CORPUS")
     if not path.is_file():
         raise InputError(f"{path}: no such model; train one (lipmotion train), or use the one of: lipmotion info")
     return read_header_of(path, FORMAT, VERSION, "lipmotion model", "give a file that `lipmotion train` wrote")

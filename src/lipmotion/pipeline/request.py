@@ -12,11 +12,12 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar, get_args
 
-from lipmotion.errors import InputError, shorten
+from lipmotion.errors import InputError
 from lipmotion.extensions import load_provided
 from lipmotion.storage.sources import is_file, read_shipped_table
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
+from lipmotion.types.values import check_class
 
 if TYPE_CHECKING:
     from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
@@ -134,8 +135,7 @@ class Request(Configuration):
             from lipmotion.types import Unit
 
             for span in self.units:
-                if not isinstance(span.label, Unit):
-                    raise InputError(f"a unit is {shorten(repr(span.label))}, required a Unit: Unit('p')")
+                check_class(span.label, Unit, "label of a unit", "a Unit: Unit('p')")
 
 
 SpeechInput: TypeAlias = "str | Path | Audio | Request"  # a recording alone, or a request

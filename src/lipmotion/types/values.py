@@ -44,6 +44,13 @@ def require(schema: Schema, value: Any, what: str) -> Any:
         raise InputError(f"{what}{error.place} is {error.found}, required {error.required}") from error
 
 
+def check_class(value: object, kind: Any, name: str, required: str) -> None:
+    """Raise InputError unless an argument has a class; ``required``: how one is made."""
+    if not isinstance(value, kind):
+        found = describe_value(value) if isinstance(value, str) else f"a {type(value).__name__}"
+        raise InputError(f"the {name}: found {found}, required {required}")
+
+
 def parse_number(
     text: str, what: str = "the number is", required: str = "a number, as 1.24", *, finite: bool = True
 ) -> float:

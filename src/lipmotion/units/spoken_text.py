@@ -81,7 +81,7 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
     def leave_out_name(match: re.Match[str]) -> str:
         name = match[1] or match[2]
         in_capitals = name == name.upper() != name.lower()
-        is_bold = match[0].endswith(("**", "__")) and name.lower() not in WORDS["no_names"]  # the colon, too
+        is_bold = name.lower() not in WORDS["no_names"] and (match[0].endswith(("**", "__")) or text.count("**:") > 1)
         has_remark = match[1] or (name[0].isupper() and (match[3] or is_bold))
         numbered = MARKS["NUMBERED"].fullmatch(name)
         return leave_out(match) if in_capitals or has_remark or numbered or name in speakers else match[0]
@@ -92,7 +92,7 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
     for name in ("RECORDING", "DATED", "STAMP"):
         text = leave_out_marks(name, text)
     speakers = find_speaker_names([text]) if names is None else names
-    for name in ("NUMBER", "BARE_NUMBER"):
+    for name in ("NUMBER", "BARE_NUMBER", "ASKED"):
         text = leave_out_marks(name, text)
     cues = list(MARKS["CUE"].finditer(text))
     if len(cues) > 1 or any("(" in cue[1] for cue in cues):
@@ -116,6 +116,8 @@ def _mark_lines(name: str, matches: list[re.Match[str]], text: str) -> bool:
         is_full = all(stamp[1].count(":") == 2 or "[" in stamp[0] for stamp in matches)  # no time of day that is said
         rise = len(times_s) > 1 and times_s == sorted({*times_s})
         return times_s[0] == 0 or (rise and (is_full or times_s[0] < 60))
+    if name == "ASKED":
+        return len({asked[1] for asked in matches}) > 1
     numbers = [int(line[1] or ord(line[2])) for line in matches]
     counted = len(numbers) > 1 and all(b in (a + 1, 1, ord("a")) for a, b in pairwise(numbers))
     if name == "NUMBER":

@@ -6,10 +6,12 @@ import argparse
 from typing import TYPE_CHECKING, cast
 
 from lipmotion.cli.arguments.declared import add_options, pick_part
-from lipmotion.cli.arguments.options import add_arguments
-from lipmotion.cli.terminal.printing import print_line, print_lines
+from lipmotion.cli.arguments.options import add_verb
+from lipmotion.cli.terminal.printing import print_line
+from lipmotion.cli.terminal.progress import Report
 from lipmotion.errors import InputError, shorten
 from lipmotion.pipeline.request import Outputs
+from lipmotion.types.progress import Progress
 from lipmotion.types.values import parse_number
 
 if TYPE_CHECKING:
@@ -25,12 +27,8 @@ POSES = ("open", "closed", "rounded")  # in which values of controls are stated
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
-    parser = verbs.add_parser(
-        "character", help="look into a character's files: lip points, blendshapes, control points"
-    )
-    add_arguments(parser, __package__, "character")
+    parser = add_verb(verbs, __package__, "character", run)
     add_options(parser, Outputs, "lip_points", "binding", "control_points")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -44,6 +42,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion_faces.characters.calibration import describe_character, write_rig_table
     from lipmotion_faces.characters.character_files import read_character
 
+    report = Report(options)
     stated, path = _read_values(options), options.character
     if path.suffix.lower() == ".csv":
         rows = read_rig_table(path)
@@ -52,6 +51,7 @@ def run(options: argparse.Namespace) -> None:
         _write_table(path, rows, path, stated)
         return
     by_points = bool(options.control_points or options.write_weights or options.write_binding)
+    report.receive(Progress("reading the character", 0, 1, 0.0))
     try:
         character = cast("PosedCharacter", open_character(pick_part(options, Outputs(), control_points=by_points)))
     except InputError:
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> None:
             write_rig_table(table, list_rig_rows(read_character(path), None, {}))
             print_line(table)
         raise
-    print_lines("\n".join(describe_character(character)))
+    report.finish("\n".join(describe_character(character)))
     if options.write_table or stated:
         _write_table(character.table_file, character.table_rows(), character, stated)
     if options.write_points:
@@ -70,7 +70,9 @@ def run(options: argparse.Namespace) -> None:
     if options.write_binding and character.binding is not None:
         save_binding(options.write_binding, character.binding, character.mesh)
     if options.picture:
+        report.receive(Progress("drawing the picture", 0, 1, 0.0))
         load_provided("write_picture")(options.picture, character)
+        report.close()
     for output in (options.write_points, options.write_weights, options.write_binding, options.picture):
         if output:
             print_line(output)

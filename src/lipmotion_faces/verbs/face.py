@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli.arguments.options import add_arguments, add_execution
+from lipmotion.cli.arguments.options import add_execution, add_verb
 from lipmotion.cli.terminal.printing import print_line
 
 
@@ -12,13 +12,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb and its actions to the parser of the command line."""
     parser = verbs.add_parser("face", help="make a video-realistic face from footage of a person")
     actions = parser.add_subparsers(title="actions", required=True, metavar="ACTION")
-    build = actions.add_parser("build", help="make a face from a video, a folder of videos or a corpus")
-    add_arguments(build, __package__, "face build")
+    build = add_verb(actions, __package__, "face build", run_build)
     add_execution(build)
-    build.set_defaults(run=run_build)
-    info = actions.add_parser("info", help="describe a face")
-    add_arguments(info, __package__, "face info")
-    info.set_defaults(run=run_info)
+    add_verb(actions, __package__, "face info", run_info)
 
 
 def run_build(options: argparse.Namespace) -> None:

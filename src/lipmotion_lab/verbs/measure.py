@@ -8,9 +8,9 @@ from pathlib import Path
 
 from lipmotion.cli.arguments.declared import add_input, add_options
 from lipmotion.cli.arguments.options import (
-    add_arguments,
     add_figures_arguments,
     add_machine_readable,
+    add_verb,
     list_or_all,
     report_figures,
 )
@@ -21,12 +21,11 @@ ADAPTERS = "LIPMOTION_LEAGUE"  # variable of the environment: the folder of adap
 
 def add_compare(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
-    parser = verbs.add_parser("compare", help="compare motion files or videos with a reference")
+    parser = add_verb(verbs, __package__, "compare", run_compare)
     what = "motion file (.json .csv .npz, or another that can be read), or video of a face"
     add_input(parser, "reference", what="recording", help=what)
     add_input(parser, "others", what="recording", nargs="+", metavar="OTHER", help="the same, compared with it")
     add_figures_arguments(parser, lexicon=False)
-    parser.set_defaults(run=run_compare)
 
 
 def run_compare(options: argparse.Namespace) -> None:
@@ -41,11 +40,9 @@ def run_compare(options: argparse.Namespace) -> None:
 
 def add_evaluate(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
-    parser = verbs.add_parser("evaluate", help="compare generated with recorded motion")
-    add_arguments(parser, __package__, "evaluate")
+    parser = add_verb(verbs, __package__, "evaluate", run_evaluate)
     add_options(parser, Request, "recogniser")
     add_figures_arguments(parser)
-    parser.set_defaults(run=run_evaluate)
 
 
 def run_evaluate(options: argparse.Namespace) -> None:
@@ -71,14 +68,12 @@ def run_evaluate(options: argparse.Namespace) -> None:
 
 def add_league(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
-    parser = verbs.add_parser("league", help="compare rivals and our engines on the same filmed recordings")
-    add_arguments(parser, __package__, "league")
+    parser = add_verb(verbs, __package__, "league", run_league)
     where = f"folder of adapters, extras/league of the sources (default: that of {ADAPTERS})"
     add_input(
         parser, "--adapters", what="folder of adapters", default=os.environ.get(ADAPTERS, "extras/league"), help=where
     )
     add_machine_readable(parser)
-    parser.set_defaults(run=run_league)
 
 
 def run_league(options: argparse.Namespace) -> None:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from lipmotion.cli.arguments.options import add_arguments
+from lipmotion.cli.arguments.options import add_verb
 from lipmotion.cli.terminal.printing import flush_output, print_line
 
 TOKEN_BYTES = 24
@@ -15,9 +15,7 @@ NAMES = ("127.0.0.1", "localhost")  # what browsers on this machine may call the
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
-    parser = verbs.add_parser("studio", help="see, edit, approve and export motion on a page of this machine")
-    add_arguments(parser, __package__, "studio")
-    parser.set_defaults(run=run)
+    add_verb(verbs, __package__, "studio", run)
 
 
 def run(options: argparse.Namespace) -> None:

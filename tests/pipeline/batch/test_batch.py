@@ -354,7 +354,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[Child]]]:
     where = tmp_path / "scheduler.json"
     base = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
     worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(where), "--nthreads", "1"]
-
+    worker += ["--no-dashboard", "--no-nanny", "--local-directory", str(tmp_path)]
     options = ["--port", "0", "--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(where)]
     with ExitStack() as all_of_them:
 
@@ -362,7 +362,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[Child]]]:
             return all_of_them.enter_context(child(words, stdout=NOWHERE, stderr=NOWHERE, folder=tmp_path))
 
         processes = [start([*base, *options])]
-        processes += [start([*worker, "--no-dashboard", "--no-nanny"]) for _ in range(2)]
+        processes += [start(worker) for _ in range(2)]
         from distributed import Client
 
         wait_until(lambda: where.is_file() and where.read_text())

@@ -86,6 +86,21 @@ KINDS: dict[str, dict[str, Any]] = {
 """Kinds of arguments in tables, and what they mean for ``add_argument``, ``add_input`` and ``add_output``."""
 
 
+def add_verb(
+    verbs: argparse._SubParsersAction[argparse.ArgumentParser], package: str, verb: str, run: Callable[..., None]
+) -> argparse.ArgumentParser:
+    """Return the parser of a verb, or of an action of one, with what ``arguments.csv`` of a package lists.
+
+    Its help stands in the row without a name.
+    """
+    rows = read_shipped_table(package, "arguments.csv")
+    text = next(row["help"] for row in rows if row["verb"] == verb and not row["name"])
+    parser = verbs.add_parser(verb.rpartition(" ")[2], help=text)
+    add_arguments(parser, package, verb)
+    parser.set_defaults(run=run)
+    return parser
+
+
 def add_arguments(parser: argparse.ArgumentParser, package: str, verb: str) -> None:
     """Add the arguments of a verb, as ``arguments.csv`` of a package lists them.
 
@@ -93,7 +108,7 @@ def add_arguments(parser: argparse.ArgumentParser, package: str, verb: str) -> N
     has words of ``KINDS``, or the values that are allowed, as ``rest|natural``.
     """
     for row in read_shipped_table(package, "arguments.csv"):
-        if row["verb"] != verb:
+        if row["verb"] != verb or not row["name"]:
             continue
         given: dict[str, Any] = {name: row[name] for name in ("metavar", "default", "dest", "help") if row[name]}
         for kind in row["kind"].split():

@@ -10,7 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from lipmotion.cli.arguments.options import add_arguments, add_machine_readable
+from lipmotion.cli.arguments.options import add_machine_readable, add_verb
 from lipmotion.cli.terminal.printing import print_line, print_lines
 from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.errors import InputError, LipMotionError
@@ -60,16 +60,13 @@ def list_model_citations(header: Mapping[str, Any]) -> str:
     return list_engine_citations(str(header.get("engine")), *keys, owners=others)
 
 
-SHELLS = ("bash", "zsh", "fish", "powershell")
 OF_PRIOR = ("engine", "corpus", "split", "utterances", "minutes", "licence", "attribution")
 """What ``info`` prints of the model on which a model stands and which is part of its file."""
 
 
 def add_addon(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb that writes the add-on for another program, as a file that it installs."""
-    parser = verbs.add_parser("addon", help="write the add-on for Blender, which keys characters from motion files")
-    add_arguments(parser, __package__, "addon")
-    parser.set_defaults(run=_run_addon)
+    add_verb(verbs, __package__, "addon", _run_addon)
 
 
 def _run_addon(options: argparse.Namespace) -> None:
@@ -81,9 +78,7 @@ def _run_addon(options: argparse.Namespace) -> None:
 
 def add_cite(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb that prints what to cite, as BibTeX."""
-    parser = verbs.add_parser("cite", help="print what to cite, as BibTeX: lipmotion, an engine's papers, a corpus")
-    add_arguments(parser, __package__, "cite")
-    parser.set_defaults(run=_run_cite)
+    add_verb(verbs, __package__, "cite", _run_cite)
 
 
 def _run_cite(options: argparse.Namespace) -> None:
@@ -105,9 +100,7 @@ def _run_cite(options: argparse.Namespace) -> None:
 
 def add_completion(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb that prints the script by which a shell completes the command line."""
-    parser = verbs.add_parser("completion", help="print the script by which a shell completes verbs and options")
-    parser.add_argument("shell", choices=SHELLS, help="bash and zsh: eval it; fish: | source")
-    parser.set_defaults(run=_run_completion)
+    add_verb(verbs, __package__, "completion", _run_completion)
 
 
 def _run_completion(options: argparse.Namespace) -> None:
@@ -127,9 +120,7 @@ def _run_completion(options: argparse.Namespace) -> None:
 
 def add_doctor(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb that prints what is installed, what is missing, and whether the main path works."""
-    parser = verbs.add_parser("doctor", help="print what is installed, what missing parts would bring, and what fails")
-    add_machine_readable(parser)
-    parser.set_defaults(run=_run_doctor)
+    add_machine_readable(add_verb(verbs, __package__, "doctor", _run_doctor))
 
 
 def _run_doctor(options: argparse.Namespace) -> None:
@@ -151,9 +142,7 @@ def _run_doctor(options: argparse.Namespace) -> None:
 
 def add_info(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb that prints the header of a model, or its decision trees."""
-    parser = verbs.add_parser("info", help="print what a model is, and whose recordings it was trained on")
-    add_arguments(parser, __package__, "info")
-    parser.set_defaults(run=run_info)
+    add_verb(verbs, __package__, "info", run_info)
 
 
 def run_info(options: argparse.Namespace) -> None:

@@ -15,7 +15,7 @@ from lipmotion.cli.arguments.declared import (
     read_pipe,
     write_pipe,
 )
-from lipmotion.cli.arguments.options import add_execution, animate_one_by_one, count_workers
+from lipmotion.cli.arguments.options import add_execution, add_verb, animate_one_by_one, count_workers
 from lipmotion.cli.terminal.printing import print_error
 from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.pipeline.job import run as run_job
@@ -25,14 +25,13 @@ from lipmotion.printable import printable
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
-    parser = verbs.add_parser("animate", help="turn speech into lip motion or an animated face")
+    parser = add_verb(verbs, __package__, "animate", run)
     many = {"nargs": "+", "help": "audio or video file, -: standard input; several, or a folder"}
     add_options(parser, Request, recording=many)
     add_outputs(parser, "FILE.mp4 .webm .mov %%05d.png .json .csv .vtt, ... (docs/formats.md); FOLDER/; -")
     add_options(parser, Outputs, "kinds")
     for add_more in (add_job_file, add_pipe_format, add_execution):
         add_more(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

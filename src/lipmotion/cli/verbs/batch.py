@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from lipmotion.cli.arguments.declared import add_detail, add_job_file, add_options, pick_part
-from lipmotion.cli.arguments.options import add_arguments, add_machine_readable
+from lipmotion.cli.arguments.options import add_machine_readable, add_verb
 from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Outputs, Request
@@ -17,8 +17,7 @@ from lipmotion.types.progress import Item
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
-    parser = verbs.add_parser("batch", help="turn thousands of recordings into lip motion, with a report")
-    add_arguments(parser, __package__, "batch")
+    parser = add_verb(verbs, __package__, "batch", run)
     kinds = "what animate writes (json csv glb mp4 ...) and cues.tsv .xml .json .dat .pgo .spine.json (default: json)"
     add_options(parser, Outputs, "kinds", kinds={"help": kinds})
     add_options(parser, Request, "recogniser", "model", "lexicon", "language", "speaker", "pauses", "asymmetry")
@@ -35,7 +34,6 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_detail(parser)
     add_job_file(parser)
     add_machine_readable(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

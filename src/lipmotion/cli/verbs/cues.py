@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.cli.arguments.declared import PIPE, add_options, add_output, is_pipe, pick_part, read_pipe
-from lipmotion.cli.arguments.options import Version
+from lipmotion.cli.arguments.options import Version, add_verb
 from lipmotion.cli.terminal.printing import flush_output, print_line, print_lines
 from lipmotion.cli.terminal.progress import LEVELS, print_status_lines
 from lipmotion.errors import shorten
@@ -61,9 +61,7 @@ def _name_file(text: str) -> Path:
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
-    parser = verbs.add_parser(
-        "cues", help="turn speech into mouth shapes for 2D animation (Rhubarb, Moho, OpenToonz, Papagayo)"
-    )
+    parser = add_verb(verbs, __package__, "cues", run)
     add_options(parser, Request)
     add = parser.add_argument
     outputs: dict[str, Any] = {"nargs": "+", "action": "extend", "default": [], "type": _name_file}
@@ -97,7 +95,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add("--threads", metavar="N", type=int, help="without effect: one recording needs one")
     add("-q", "--quiet", action="store_true", help="without effect: warnings and errors alone are printed")
     add("-v", "--version", action=Version, nargs=0, const=VERSION, help="print the version")
-    parser.set_defaults(run=run, letters=False)
+    parser.set_defaults(letters=False)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from lipmotion.cli.arguments.declared import add_options, pick_part
-from lipmotion.cli.arguments.options import add_arguments, add_machine_readable
+from lipmotion.cli.arguments.options import add_machine_readable, add_verb
 from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Request
@@ -14,12 +14,10 @@ from lipmotion.printable import printable
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
-    parser = verbs.add_parser("edit", help="change words, phones, curves of a recording's motion, in a file of edits")
-    add_arguments(parser, __package__, "edit")
+    parser = add_verb(verbs, __package__, "edit", run)
     known = ("transcript", "lexicon", "language", "model", "recogniser", "speaker", "pauses", "manner", "asymmetry")
     add_options(parser, Request, *known)
     add_machine_readable(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output, pick_part
-from lipmotion.cli.arguments.options import add_arguments, add_execution, count_workers
+from lipmotion.cli.arguments.options import add_arguments, add_execution, add_verb, count_workers
 from lipmotion.cli.terminal.printing import print_json, print_lines
 from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.pipeline.request import Request
@@ -44,14 +44,13 @@ def run(options: argparse.Namespace) -> None:
 
 def add_words(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
-    parser = verbs.add_parser("words", help="recognise the English words of a recording, as a transcript to edit")
+    parser = add_verb(verbs, __package__, "words", run_words)
     add_input(parser, "speech", what="recording", help="audio or video file")
     outputs: dict[str, Any] = {"type": str, "nargs": "+", "action": "extend", "default": []}
     written = "FILE.txt, or FILE.json with times and confidences (default: text on standard output)"
     add_output(parser, "-o", "--output", force=True, help=written, **outputs)
     add_options(parser, Request, "recogniser", "model")
     add_execution(parser)
-    parser.set_defaults(run=run_words)
 
 
 def run_words(options: argparse.Namespace) -> None:

@@ -11,7 +11,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from lipmotion.cli.arguments.options import add_arguments
+from lipmotion.cli.arguments.options import add_verb
 from lipmotion.cli.terminal.printing import flush_output, print_line
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.storage.sources import is_recording
@@ -21,11 +21,9 @@ CHUNK_S = 0.02  # sound is taken in pieces of so many seconds
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
-    parser = verbs.add_parser("live", help="move a mouth while somebody speaks: a microphone, a pipe, a file")
-    add_arguments(parser, __package__, "live")
+    parser = add_verb(verbs, __package__, "live", run)
     again: dict[str, Any] = {"nargs": "?", "default": argparse.SUPPRESS, "metavar": "DEVICE|FILE|-"}
     parser.add_argument("input", help="the same", **again)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

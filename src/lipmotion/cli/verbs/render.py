@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from lipmotion.cli.arguments.declared import add_options, add_outputs, add_pipe_format, pick_part, write_pipe
-from lipmotion.cli.arguments.options import add_arguments, add_machine_readable
+from lipmotion.cli.arguments.options import add_machine_readable, add_verb
 from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.errors import InputError
 from lipmotion.extensions import load_provided
@@ -24,14 +24,12 @@ SILENT_HZ = 16_000  # rate of the silence of videos without a sound
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
-    parser = verbs.add_parser("render", help="draw edited or imported motion, or write it in another form")
-    add_arguments(parser, __package__, "render")
+    parser = add_verb(verbs, __package__, "render", run)
     phones = "phones in time for motion without them: they move tongue and lips where the channels do not"
     add_options(parser, Request, "units", units={"help": phones})
     add_outputs(parser, "FILE.mp4 .webm .mov %%05d.png .json .csv .npz .TextGrid .vtt, ... (docs/formats.md)")
     add_pipe_format(parser)
     add_machine_readable(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

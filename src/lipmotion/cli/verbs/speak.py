@@ -6,23 +6,23 @@ import argparse
 from pathlib import Path
 
 from lipmotion.cli.arguments.declared import add_options, add_outputs, pick_part
-from lipmotion.cli.arguments.options import add_arguments, add_machine_readable
+from lipmotion.cli.arguments.options import add_machine_readable, add_verb
 from lipmotion.cli.terminal.progress import Report, report_progress
 from lipmotion.pipeline.job import Job, check_outputs, open_face, write_job_outputs
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
 from lipmotion.storage.sources import is_file, read_text_file
+from lipmotion.types.progress import sub_monitor
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
-    parser = verbs.add_parser("speak", help="turn text into speech, and into lip motion or an animated face")
-    add_arguments(parser, __package__, "speak")
+    parser = add_verb(verbs, __package__, "speak", run)
     add_options(parser, Request, "lexicon", "model", "speaker", "onto", "onto_speaker", "pauses", "asymmetry")
     suffixes = "FILE.mp4 .webm .mov %%05d.png .wav .flac .ogg .json .csv .npz .TextGrid .vtt, ... (docs/formats.md)"
     add_outputs(parser, suffixes, required=False)
     add_machine_readable(parser)
-    parser.set_defaults(run=run, wrong=parser.error)
+    parser.set_defaults(wrong=parser.error)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -69,6 +69,7 @@ def _speak(options: argparse.Namespace, report: Report) -> None:
         onto_speaker=request.onto_speaker,
         pauses=request.pauses,
         asymmetry=request.asymmetry,
+        monitor=sub_monitor(report.receive, 0.0, 0.5),
     )
-    write_job_outputs(job, face, result, sound, model=model, monitor=report.receive)
+    write_job_outputs(job, face, result, sound, model=model, monitor=sub_monitor(report.receive, 0.5, 1.0))
     report.finish("\n".join(map(printable, options.output)), files=options.output, seconds=round(sound.duration_s, 3))

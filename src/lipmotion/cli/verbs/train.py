@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from lipmotion.cli.arguments.declared import add_options
-from lipmotion.cli.arguments.options import add_arguments, add_machine_readable, count_workers, list_or_all
+from lipmotion.cli.arguments.options import add_machine_readable, add_verb, count_workers, list_or_all
 from lipmotion.cli.terminal.printing import print_line
 from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.errors import InputError
@@ -23,12 +23,10 @@ def count_or_address(text: str) -> int | str:
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
-    parser = verbs.add_parser("train", help="train a model on a prepared corpus; run it again to go on after a stop")
-    add_arguments(parser, __package__, "train")
+    parser = add_verb(verbs, __package__, "train", run)
     add_options(parser, Request, "lexicon")
     parser.add_argument("--workers", type=count_or_address, metavar="N|tcp://HOST:PORT", help=WORKERS)
     add_machine_readable(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -75,10 +73,8 @@ def run(options: argparse.Namespace) -> None:
 
 def add_adapt(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
-    parser = verbs.add_parser("adapt", help="adapt a model to a voice, from recordings without transcripts")
-    add_arguments(parser, __package__, "adapt")
+    parser = add_verb(verbs, __package__, "adapt", run_adapt)
     add_options(parser, Request, "model")
-    parser.set_defaults(run=run_adapt)
 
 
 def run_adapt(options: argparse.Namespace) -> None:

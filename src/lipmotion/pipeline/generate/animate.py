@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lipmotion.errors import InputError
 from lipmotion.pipeline.edits import CurveStep, Edits
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import SpeechInput, as_request
 from lipmotion.pipeline.session import Session
 from lipmotion.types import Constraints, Generation, Monitor, TimedTranscript, silent_monitor
+from lipmotion.types.values import check_class
 
 if TYPE_CHECKING:
     from lipmotion.pipeline.edit_files import EditFile
@@ -57,8 +57,7 @@ def animate(  # noqa: PLR0913
     >>> result.units[1].label.word
     'please'
     """
-    if not isinstance(constraints, Constraints | None):
-        raise InputError(f"the constraints are a {type(constraints).__name__}, required Constraints((Pin(...),))")
+    check_class(constraints, Constraints | None, "constraints", "Constraints((Pin(...),))")
     request = as_request(speech, transcript, language)
     model = load_model(model or request.model)
     edits = request.edits if edits is None else edits

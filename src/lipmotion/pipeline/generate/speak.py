@@ -26,6 +26,7 @@ from lipmotion.speech.sound.resampling import JoinedPieces, overlap_pieces, resa
 from lipmotion.speech.voices.installed import choose_voice, find_voice, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.types import SPEECH_RATE_HZ, Audio, Constraints, Span, SpokenText, Timeline, Unit
+from lipmotion.types.progress import Monitor, silent_monitor, sub_monitor, with_progress
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, split_words
 from lipmotion.units.phones import SHORT_PAUSE_S
 from lipmotion.units.spoken_text import parse_tagged_text, time_moods
@@ -142,6 +143,7 @@ def speak(  # noqa: PLR0913
     onto_speaker: str = "",
     pauses: Pauses = "rest",
     asymmetry: float = 0.0,
+    monitor: Monitor = silent_monitor,
 ) -> SpokenText:
     """Return a text as sound of a synthetic voice, and the lip motion for it, with 0.25 s of rest at both ends.
 
@@ -154,7 +156,7 @@ def speak(  # noqa: PLR0913
     constraints : values that the motion must take exactly, in the units of the speaker
     lexicon     : pronunciations of English words; they tell which vowels are reduced, not how the voice says the words
     speaker     : whose motion is generated, of the people whom the model was trained on; empty: the mean person
-    onto, onto_speaker, pauses, asymmetry : as of ``Request``
+    onto, onto_speaker, pauses, asymmetry : as of ``Request``;  monitor : as of ``animate``
     The phones and their times are the synthesiser's, so nothing is recognised. The sound is one of 16 bits, at the
     synthesiser's rate or 16 kHz if that is less; ``animate`` of a ``.wav`` or ``.flac`` of it, with the units, returns
     the same motion.
@@ -184,22 +186,22 @@ def speak(  # noqa: PLR0913
         chosen = find_voice(voice) if isinstance(voice, str) else voice or choose_voice()
         model = load_model(model)
         find_speaker_map(model.speakers, speaker)  # an unknown one is reported before anything is spoken
-        sound, units = _speak_sentences(sentences, chosen, lexicon)
+        sound, units = _speak_sentences(sentences, chosen, lexicon, sub_monitor(monitor, 0, 0.5))
         sound = quantise(sound)
         spoken_so = {"recording": resample_speech(sound), "units": units, "manner": ASKED, "spoken_so": True}
         request = replace(request, lexicon=None, **spoken_so)
-        generation = animate(request, model=model, constraints=constraints)
+        generation = animate(request, model=model, constraints=constraints, monitor=sub_monitor(monitor, 0.5, 1))
     return SpokenText(sound, replace(generation, moods=time_moods(tags, generation.units)))
 
 
 def _speak_sentences(
-    sentences: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None
+    sentences: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None, monitor: Monitor
 ) -> tuple[Audio, Timeline[Unit]]:
     """Return sentences one after the other, at the synthesiser's rate or 16 kHz, and their phones in time."""
     sounds: list[tuple[int, NDArray[np.float32]]] = []
     spans: list[Span[Unit]] = []
     rate_hz, at = SPEECH_RATE_HZ, 0
-    for start in range(0, len(sentences), SENTENCES_PER_RUN):
+    for start in with_progress(range(0, len(sentences), SENTENCES_PER_RUN), "speaking", monitor):
         with closing(speak_sentences(sentences[start : start + SENTENCES_PER_RUN], voice, lexicon)) as voiced:
             for sentence in voiced:
                 sound = sentence.own_sound()

@@ -18,6 +18,7 @@ from lipmotion.pipeline.outputs.curve_sets import show_edited_curves
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.storage.files import as_text, check_distinct, check_target
 from lipmotion.types import Generation
+from lipmotion.types.values import check_class
 from lipmotion.units.phones import OPTIONAL, SHAPES
 
 SHEET = ".cues."  # what the name of a cue sheet among other outputs has before its format
@@ -49,6 +50,7 @@ def cues(
     >>> sheet.cues[0]
     Span(start_s=0.0, end_s=0.5, label='X')
     """
+    check_class(generation, Generation, "generation", "what animate returned")
     check_cue_options(fps, hold_frames, shapes)
     if len(generation.motion.values) and not len(generation.units):
         raise ExportError("the motion has no phones, which cues need; give them by --units, or animate the recording")

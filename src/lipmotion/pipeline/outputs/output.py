@@ -33,6 +33,7 @@ from lipmotion.storage.sources import VIDEO_SUFFIXES
 from lipmotion.types import SPEECH_RATE_HZ, Audio, Generation, Monitor, Prosody, silent_monitor
 from lipmotion.types.delivery import Staging
 from lipmotion.types.progress import sub_monitor, with_progress
+from lipmotion.types.values import check_class
 
 LOG = logging.getLogger("lipmotion")
 Made = TypeVar("Made")
@@ -151,9 +152,8 @@ class Output(ABC):
     @classmethod
     def takes(cls, path: Path, settings: OutputSettings) -> bool:
         """Return whether a file of that name is such an output: whether it ends in one of the suffixes."""
-        return any(
-            len(path.name) > len(end) and path.name.lower().endswith(end.lower()) for end in cls.suffixes(settings)
-        )
+        name = path.name.lower()
+        return any(len(name) > len(end) and name.endswith(end.lower()) for end in cls.suffixes(settings))
 
     def check(self) -> None:
         """Raise ExportError or InputError if the file cannot be written; called before long work begins."""
@@ -218,7 +218,6 @@ def measure_prosody(speech: str | Path | Audio) -> Prosody:
     """Return loudness and pitch of a recording or a sound, for movements of brows and head.
 
     A sound that is shorter than one frame of speech is followed by silence. One that keeps its features keeps this.
-
     Raises InputError: the recording cannot be read.
     """
     if isinstance(speech, AnalysedAudio):
@@ -283,7 +282,7 @@ def write(  # noqa: PLR0913
     *,
     speech: str | Path | Audio | None = None,
     model: Model | None = None,
-    channels: Sequence[str] | None = None,
+    channels: str | Sequence[str] | None = None,
     rate_hz: float | None = None,
     fps: float | None = None,
     face: Any = "portrait",
@@ -304,8 +303,8 @@ def write(  # noqa: PLR0913
     speech   : the recording that was animated, or the sound, as of ``speak``; a video needs it for its sound
     model    : the model that generated the motion, whose corpus and licence motion files name; None: those that the
                generation names
-    channels : channels of motion files, in this order, also articulatory ones as ``tongue`` (docs/articulation.md);
-               None: all of the motion
+    channels : channels of motion files, in this order, also articulatory ones as ``tongue`` (docs/articulation.md), or
+               a text as ``opening,width``; None: all of the motion
     rate_hz  : frames per second of motion files, 1 to 1000; None: the 100 of the model (Live Link Face: 60)
     fps      : frames per second of videos, 1 to 240; None: 25 for drawn faces, those of the footage for filmed ones
     face     : the face of videos: ``portrait``, ``woman``, ``man``, ``cartoon``, one of an installed package, or a
@@ -332,6 +331,9 @@ def write(  # noqa: PLR0913
     ...     print((Path(folder) / "welcome.csv").read_text().splitlines()[0])
     time_s,opening,width
     """
+    check_class(generation, Generation, "generation", "what animate returned")
+    check_class(delivery, Delivery | None, "delivery", "Delivery(intensity=1.2)")
+    channels = channels.split(",") if isinstance(channels, str) else channels
     sound = speech if isinstance(speech, Audio) else None
     settings = OutputSettings(
         load_provided("shown_face")(face),

@@ -52,12 +52,12 @@ from lipmotion.types import (
     silent_monitor,
     sub_monitor,
 )
+from lipmotion.types.values import check_class
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent
 
 WARP_CYCLE = (1.0, 0.88, 1.0, 0.94, 1.12, 1.06)  # warps of the frequencies, of one recording after the other
 MIN_WARPED_RECORDINGS = 60
 """Fewer recordings than this are not warped: they are too few to train models of one speaker on, let alone several."""
-
 
 LOG = logging.getLogger("lipmotion")
 
@@ -143,6 +143,7 @@ def train(  # noqa: PLR0913
     >>> model.engine.name, len(report.used)
     ('trajectory', 1)
     """
+    check_class(corpus, Corpus, "corpus", "Corpus.open(FOLDER)")
     channels.check_visual(visual)
     if run.work is not None:
         check_apart((), [Source(corpus.path, "corpus")], folders=[run.work])

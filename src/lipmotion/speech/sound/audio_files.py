@@ -266,8 +266,8 @@ def _decode(path: Path, rate_hz: int, channel: int | None) -> _TrackDecoder:
         if isinstance(error, InputError):
             raise
         if is_text(path):
-            what = f"{path}: is text, required a recording; give the recording first,"
-            raise InputError(f"{what} its words with --transcript {path}") from error
+            what = "an audio or video file, whose words may be its transcript"
+            raise InputError(f"{path}: is text, required a recording: {what}") from error
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: not a readable recording ({reason}); give an audio or video file") from error
 
