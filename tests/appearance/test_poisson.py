@@ -131,13 +131,9 @@ def test_other_than_a_mask_is_refused() -> None:
             build_cloning_system(mask)  # type: ignore[arg-type]
 
 
-def disc(height: int, width: int) -> np.ndarray:
-    return np.pad(ellipse(height, width)[1:-1, 1:-1], 1)
-
-
 @pytest.mark.parametrize("shape", [(57, 71), (130, 101), (5, 40), (3, 3)])
 def test_filling_is_the_matrix(shape: tuple[int, int]) -> None:
-    grids = nest_grids(disc(*shape))
+    grids = nest_grids(np.pad(ellipse(*shape)[1:-1, 1:-1], 1))
     matrix = grids.build_matrix()
     for colours in (1, 3):
         filler = GridFiller(grids, 2, colours)

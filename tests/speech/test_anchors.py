@@ -105,12 +105,10 @@ class Search:
         return found_words(*starts, fits=np.where(starts == self.starts, -1.0, self.elsewhere).tolist())
 
 
-def many_lines(count: int) -> TimedTranscript:
-    return transcript(*(line("a", 10.0 * n, 10.0 * n + 1) for n in range(1, count + 1)))
-
-
 def aligned(search: Search, frames: int = 12_000) -> list[int]:
-    found = anchors.find_anchors(many_lines(len(search.starts)))
+    found = anchors.find_anchors(
+        transcript(*(line("a", 10.0 * n, 10.0 * n + 1) for n in range(1, len(search.starts) + 1)))
+    )
     placed, _ = anchors.align_within(found, np.full(len(search.starts), 3, np.intp), 3, frames, search)
     return [item.start for item in placed[1:]]
 

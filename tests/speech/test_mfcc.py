@@ -125,12 +125,8 @@ def test_it_says_what_is_wrong(measure: Callable[[types.Audio], object]) -> None
             measure(types.Audio(samples, rate_hz))
 
 
-def drawn_features(seed: int, frames: int = 200) -> types.Features:
-    return types.Features(np.random.default_rng(seed).normal(size=(frames, 39)).astype(np.float32), frames / 100)
-
-
 def test_the_map_that_ships_is_linear_and_local() -> None:
-    given = drawn_features(1)
+    given = types.Features(np.random.default_rng(1).normal(size=(200, 39)).astype(np.float32), 2.0)
     whole = sound_offset.predict_opening_speed(given)
     assert whole.shape == (200,)
     twice = types.Features(2 * given.values, given.duration_s)

@@ -149,10 +149,6 @@ def expected_log_likelihood(transitions: Transitions, counts) -> float:
     return float(counts @ transitions.arc_log)
 
 
-def random_counts(transitions, seed=0):
-    return np.random.default_rng(seed).gamma(0.5, 20, len(transitions.product.arc_from))
-
-
 @pytest.mark.parametrize(
     ("kind", "sets", "limit"),
     [
@@ -163,7 +159,7 @@ def random_counts(transitions, seed=0):
 )
 def test_no_other_tables_have_a_higher_expected_likelihood(kind, sets, limit):
     transitions = tiny.chains(structure(kind, sets, limit=limit)).transitions
-    counts = random_counts(transitions)
+    counts = np.random.default_rng(0).gamma(0.5, 20, len(transitions.product.arc_from))
     best = transitions.reestimated(counts)
     value = expected_log_likelihood(best, counts)
     assert value > expected_log_likelihood(transitions, counts)
