@@ -3,12 +3,13 @@
 import csv
 import json
 import re
+import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from children import LIPMOTION, child
+from children import LIPMOTION, PIPE, child
 from cli.conftest import RunCommand
 from lipmotion_faces.characters.character_files import load_character
 from meshes.heads import VISEMES, renamed, write_glb
@@ -38,6 +39,16 @@ def test_raw_sound_comes_on_a_pipe(tmp_path: Path) -> None:
         assert process.communicate()[0] == ""
         assert process.returncode == 0
     assert len((tmp_path / "a.csv").read_text("utf-8").splitlines()) == 101
+    with child([*command, "--to", "-"], stdin=PIPE) as process:
+        assert process.stdin
+        assert process.stdout
+        process.stdin.write("\0" * 64_000)
+        process.stdin.flush()
+        process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        assert process.wait() == 130
+    assert (tmp_path / "a.csv").read_text("utf-8").startswith("time_s")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.raw"]
     (tmp_path / "a.wav").write_bytes(b"RIFF" + bytes(1_000))
     with (tmp_path / "a.wav").open("rb") as sound, child([*LIPMOTION, "live", "-i", "-"], stdin=sound) as process:
         assert (process.communicate()[0], process.returncode) == ("", 3)

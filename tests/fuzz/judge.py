@@ -70,7 +70,8 @@ def _error_result(error: Exception) -> Result:
         return Result(ERROR, f"a long message {place_of(error)}", f"{len(line)} characters: {line[:400]!r}")
     if OBEYED.search(line):
         return Result(ERROR, f"a raw message {place_of(error)}", repr(line))
-    return Result(REFUSED, f"{code} {_shape(line)}", line)
+    shape = re.sub(r"\d+|'[^']*'|\"[^\"]*\"|/\S+|\(.*\)", "", line)[:80]  # without what quotes the input
+    return Result(REFUSED, f"{code} {shape}", line)
 
 
 def place_of(error: BaseException) -> str:
@@ -81,11 +82,6 @@ def place_of(error: BaseException) -> str:
 
 def _trace(error: BaseException) -> str:
     return "".join(traceback.format_exception(error))[-4000:]
-
-
-def _shape(line: str) -> str:
-    """Return a message without the parts that quote the input."""
-    return re.sub(r"\d+|'[^']*'|\"[^\"]*\"|/\S+|\(.*\)", "", line)[:80]
 
 
 def quiet() -> None:

@@ -69,7 +69,8 @@ def test_integers_and_channels_are_the_same_sound(sound: np.ndarray) -> None:
     alone = values_of(all_of(Stream(), rounded, [16_000]))
     stereo = values_of(all_of(Stream(), np.stack([rounded, rounded], axis=1), [16_000]))
     stream = Stream()
-    as_bytes = values_of(stream.push(rounded.tobytes()) + stream.flush())
+    every_other = memoryview(np.repeat(rounded.view(np.uint8), 2))[::2]
+    as_bytes = values_of(stream.push(every_other) + stream.flush())
     assert np.array_equal(alone, stereo)
     assert np.array_equal(alone, as_bytes)
 
@@ -81,7 +82,7 @@ def test_without_a_limit_it_is_what_animate_makes(sound: np.ndarray) -> None:
     frames = stream.flush()
     expected = animate(Request(Audio(sound[:48_000], 16_000))).motion.resampled(50.0)
     assert opening_of(frames) == pytest.approx(expected["opening"][: len(frames)], abs=1e-9)
-    assert {frame.known_s for frame in frames} == {3.0}
+    assert ({frame.known_s for frame in frames}, stream.time_s) == ({3.0}, 3.0)
 
 
 @pytest.mark.parametrize("look_ahead_ms", [80, *(pytest.param(each, marks=pytest.mark.long) for each in (0, 320))])
@@ -139,6 +140,17 @@ def test_an_interruption_takes_back_what_is_not_heard_yet(sound: np.ndarray) -> 
     assert frames[0].time_s == pytest.approx(1.02)
     assert frames[0]["opening"] < pushed[50]["opening"] + 1e-9
     assert stream.push(sound[:16_000])[0].time_s == pytest.approx(frames[-1].time_s + STEP_S)
+    stream.push(np.tile(sound, 3))  # what it looked like that long ago is forgotten
+    assert (frames := stream.interrupt(1.0))[0].time_s == pytest.approx(1.02)
+    assert frames[0]["opening"] < 0.005
+    assert max(frame["eyeBlinkLeft"] for frame in stream.push(np.zeros(160_000, np.float32))) > 0.5
+
+
+def test_a_damaged_sample_makes_nothing_quiet(sound: np.ndarray) -> None:
+    damaged = np.where(np.arange(48_000) == 8_000, 1e5, sound[:48_000])
+    one, other = (opening_of(all_of(Stream(seed=None), each, [1_600])) for each in (sound[:48_000], damaged))
+    assert np.corrcoef(one, other)[0, 1] > 0.85
+    assert 0.8 < other[60:].std() / one[60:].std() < 1.2
 
 
 def test_a_copy_goes_on_by_itself(sound: np.ndarray) -> None:

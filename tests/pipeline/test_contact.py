@@ -116,7 +116,8 @@ def _of_character(character: Any) -> Reader:
 def _of_curves(name: str) -> Reader:
     def read(generation: Generation, fps: float) -> Mask:
         curves = make_curves(generation.motion, generation.units, name)
-        return _closed(_sampled(generation, curves, fps))
+        whole = replace(generation, motion=curves, spread=np.zeros(curves.values.shape))
+        return _closed(resample_curves(whole, generation, fps).motion)
 
     return read
 
@@ -144,12 +145,6 @@ def _of_head_scene(generation: Generation, fps: float) -> Mask:
     moved = mesh.displacements(np.arange(len(character.skin.rest)))
     parting = dict(zip(mesh.shape_names, measure_lip_gap(moved[:, character.skin.list_lip_rows()]), strict=True))
     return np.asarray(sum(parting[name] * weights[name] for name in weights.names) < TOUCHING_GAP)
-
-
-def _sampled(generation: Generation, curves: Motion, fps: float) -> Motion:
-    """Return curves as files of another rate hold them."""
-    whole = replace(generation, motion=curves, spread=np.zeros(curves.values.shape))
-    return resample_curves(whole, generation, fps).motion
 
 
 def _closed(curves: Motion) -> Mask:

@@ -154,6 +154,13 @@ def test_a_constant_offset_hides_no_pause(offset: float) -> None:
     assert np.array_equal(of_samples(sound).samples, sound.astype(np.float32))
 
 
+def test_a_damaged_sample_makes_nothing_quiet() -> None:
+    sound = np.concatenate([hiss(2), spoken(0)])
+    plain, damaged = of_samples(sound), of_samples(np.where(np.arange(len(sound)) == 9_000, 1e6, sound))
+    assert [each.first for each in damaged.passages] == [each.first for each in plain.passages]
+    np.testing.assert_allclose(damaged.mfcc().values[:, 0], plain.mfcc().values[:, 0], atol=1.5)
+
+
 @pytest.mark.parametrize("size", [0.2, -0.5])
 def test_neither_does_an_offset_that_changes(size: float) -> None:
     sound = np.concatenate([hiss(2), spoken(0), hiss(1, 3), spoken(1)])

@@ -313,11 +313,6 @@ def same_speaker(toy_model: Model, voice: list[types.Audio]) -> EstimatedAdaptat
     return estimate_adaptation(toy_model.phones, voice)
 
 
-def through_a_telephone(audio: types.Audio) -> types.Audio:
-    samples = lfilter(*butter(2, [300 / 8000, 3000 / 8000], "band"), audio.samples)
-    return types.Audio(np.asarray(samples, np.float32), audio.rate_hz)
-
-
 def fit(model: Model, found: EstimatedAdaptation, audio: types.Audio) -> float:
     adapted = found.adaptation.own_features(read_sound(audio))
     return model.phones.fit(adapted) + log_determinant(found.adaptation.own)
@@ -346,7 +341,9 @@ def test_the_speaker_of_the_training_has_full_weight_and_changes_little(
 @pytest.mark.long
 def test_a_voice_in_another_channel_becomes_more_probable(toy_model: Model, voice: list[types.Audio]) -> None:
     """By features of a short recording that move apart from their deltas and these from theirs."""
-    one, other = (through_a_telephone(audio) for audio in voice[:2])
+    telephone = butter(2, [300 / 8000, 3000 / 8000], "band")
+    sounds = (np.asarray(lfilter(*telephone, audio.samples), np.float32) for audio in voice[:2])
+    one, other = (types.Audio(samples, 16_000) for samples in sounds)
     found = estimate_adaptation(toy_model.phones, [other])
     plain = toy_model.phones.fit(read_sound(one).mfcc(found.adaptation.warp).values)
     assert fit(toy_model, found, one) > plain + 0.5

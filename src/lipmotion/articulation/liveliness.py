@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 
 from lipmotion.articulation.contact import smooth_step
 from lipmotion.articulation.expression import list_action_units
@@ -198,9 +199,7 @@ def lid_closure(time_s: Curve, blink_s: list[float]) -> Curve:
 
 def _smooth(curve: Curve, deviation_s: float) -> Curve:
     """Return a curve at 100 Hz smoothed by a Gaussian; the ends are repeated."""
-    reach = max(1, int(4 * deviation_s * FRAME_RATE_HZ))
-    weights = np.exp(-np.square(np.arange(-reach, reach + 1) / (deviation_s * FRAME_RATE_HZ)) / 2)
-    return np.convolve(np.pad(curve, reach, mode="edge"), weights / weights.sum(), mode="valid")
+    return gaussian_filter1d(curve, deviation_s * FRAME_RATE_HZ, mode="nearest")
 
 
 def _find_accents(motion: Motion, prosody: Prosody | None) -> Curve:

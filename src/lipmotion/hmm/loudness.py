@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 DECIBEL = np.log(10) / 10  # a decibel, as natural logarithm of energy
 LEVEL_FRAMES = 25  # the loud level is that of the loudest quarter of a second: a click is shorter
@@ -34,8 +35,6 @@ def smooth_level(log_energy: NDArray[np.floating], smoothing: int = SMOOTHING_FR
 
 def average_power(log_energy: NDArray[np.floating]) -> NDArray[np.float64]:
     """Return the logarithm of the energy averaged over a quarter of a second around every frame [shape=(T,)]."""
-    from scipy.ndimage import uniform_filter1d
-
     highest = float(log_energy.max())
     power = np.exp(log_energy.astype(np.float64) - highest)
     return highest + np.log(np.maximum(uniform_filter1d(power, LEVEL_FRAMES, mode="constant"), 1e-12))
@@ -43,8 +42,6 @@ def average_power(log_energy: NDArray[np.floating]) -> NDArray[np.float64]:
 
 def measure_levels(log_energy: NDArray[np.floating]) -> tuple[float, float]:
     """Return the loud level of a recording and that of its noise, natural logarithms as ``log_energy`` [shape=(T,)]."""
-    from scipy.ndimage import minimum_filter1d
-
     loud = float(average_power(log_energy).max())
     smooth = smooth_level(log_energy)
     spoken = smooth > loud - NEAR_LOUD

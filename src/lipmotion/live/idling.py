@@ -57,8 +57,8 @@ class Idling:
         self._accent, self._talking, self._spoke, self._began_s = 0.0, 0.0, False, -BORDER_S
         self._turn = np.zeros(2)
         self._swayed = -1, np.zeros((0, 3))
-        self.target = np.zeros(2)
-        """Where somebody is to whom the face turns, to its left and upwards, radians."""
+        self.target, self.ahead_s = np.zeros(2), 0.0
+        """Where somebody is to whom the face turns, to its left and upwards, radians; and how far time was put back."""
 
     def step(self, time_s: float, opening: float, speaks: bool) -> dict[str, float]:
         """Return ARKit's weights of eyes and brows, and the angles of the head, radians, one step later.
@@ -66,7 +66,7 @@ class Idling:
         opening : of the mouth, in standard deviations of the speaker
         speaks  : whether it speaks now
         """
-        ended = self._spoke and not speaks
+        ended, time_s = self._spoke and not speaks, time_s + self.ahead_s
         self._began_s = time_s if speaks and not self._spoke else self._began_s
         self._spoke = speaks
         accent = min(max(opening / ACCENT_OPENING - 1, 0.0), 1.0) if speaks else 0.0

@@ -85,7 +85,7 @@ def mono_samples(samples: Any) -> NDArray[np.float32]:
             raise InputError(f"bytes of a file, which begin with {start!r}; required its samples: decode it first")
         if len(samples) % 2:
             raise InputError(f"{len(samples)} bytes of sound, required whole samples of 16 bits")
-        samples = np.frombuffer(samples, "<i2")
+        samples = np.frombuffer(bytes(samples), "<i2")
     try:
         values = np.asarray(samples)
     except ValueError as error:
@@ -116,6 +116,7 @@ START_LEVEL, QUIETEST_LEVEL = 1.0, -2.0
 FALL = 2.3 / (6 * FRAME_RATE_HZ)
 """The level that is assumed falls by so much a frame, 10 dB in 6 s: who begins too loud is not lost afterwards."""
 ATTACK = 0.25  # share of a frame in the power that raises the level: a click does not count as loud speech
+RISE, TOP = 0.5, 1.5  # the level rises by so much a frame, powers end so far above it: after a bump, speech is heard
 RANGE = 14.0  # powers are floored so far below the level, 60 dB
 SPEECH_RANGE = 7.0  # frames down to 30 dB under the level are speech, and teach how each band sounds in it
 KNOWN_FRAMES, REMEMBERED_FRAMES = 40, 300
@@ -160,10 +161,10 @@ class SoundFeatures:
         spectrum = np.fft.rfft((samples[1:] - np.float32(0.97) * samples[:-1]) * self._window, FFT_SIZE)
         powers = (np.square(spectrum.real) + np.square(spectrum.imag)).astype(np.float32) @ self._filters
         total = float(powers.sum()) + 1e-12
-        self._power += ATTACK * (total - self._power)
-        self._level = max(self._level - FALL, QUIETEST_LEVEL, float(np.log(self._power)))
+        self._power += ATTACK * (min(total, float(np.exp(self._level + TOP))) - self._power)
+        self._level = max(self._level - FALL, QUIETEST_LEVEL, min(float(np.log(self._power)), self._level + RISE))
         row = np.log(np.append(powers + np.float32(1e-12), np.float32(total))) - np.float32(self._level)
-        result: Array = np.maximum(row, np.float32(-RANGE))
+        result: Array = np.clip(row, np.float32(-RANGE), np.float32(TOP))
         return result
 
 

@@ -136,18 +136,20 @@ class Stream:
     def interrupt(self, time_s: float | None = None) -> list[LiveFrame]:
         """Return the frames in which the mouth comes to rest, 100 ms; sound that is not heard yet is forgotten.
 
-        time_s : of the frame after which it rests, for sound that was pushed ahead of what is heard; at most 10 s
-                 before the last frame. None: the last frame
+        time_s : of the frame after which it rests, for sound that was pushed ahead of what is heard; where that is
+                 more than 10 s before the last frame, the mouth rests at once. None: the last frame
         Sound that is pushed now follows these frames; words that were added are forgotten, too.
         Raises InputError: a time that is not finite.
         """
         if time_s is not None and not np.isfinite(time_s):
             raise InputError(f"a rest from {time_s} s on, required a time of the stream")
         last = self._next if time_s is None else min(max(int(time_s / STEP_S) + 1, 0), self._next)
-        for _ in range(min(self._next - last, len(self._poses) - 1)):
+        for _ in range(min(self._next - last, len(self._poses))):
             self._poses.pop()
-            self._next -= 1
-        pose, frames = self._poses[-1], []
+        if self._idling is not None:
+            self._idling.ahead_s += (self._next - last) * STEP_S
+        self._next, frames = last, []
+        pose = self._poses[-1] if self._poses else self._face.resting
         for number in range(1, REST_STEPS + 1):
             share = (1 - np.cos(np.pi * number / REST_STEPS)) / 2
             frames.append(self._frame(between(pose, self._face.resting, share), self._next * STEP_S))
@@ -279,7 +281,8 @@ class Stream:
         )
         motion, face, visemes = (each.resampled(1 / STEP_S) for each in (result.motion, *curves))
         frames = []
-        for pose, row, viseme_row in zip(motion.values, face.values, visemes.values, strict=False):
+        count = int(np.ceil(len(sound) / self.sample_rate / STEP_S - 1e-9))
+        for pose, row, viseme_row in zip(motion.values[:count], face.values, visemes.values, strict=False):
             mouth, living = np.split(row, [len(ARKIT_MOUTH)])
             frame = self._frame((pose, np.concatenate([mouth, viseme_row])), end_s)
             named = dict(zip(face.names[len(ARKIT_MOUTH) :], living.tolist(), strict=True))

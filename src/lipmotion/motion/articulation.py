@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING, REACH_S, find_closable_ranges
@@ -136,10 +137,7 @@ def trace_articulators(units: Timeline[Unit], frames: int) -> Array:
 def smooth_steps(steps: Array) -> Array:
     """Return values in frames [shape=(T, C)] smoothed by a Gaussian of ``SMOOTHING_S``; the ends are repeated."""
     deviation = SMOOTHING_S * FRAME_RATE_HZ
-    reach = int(np.ceil(4 * deviation))
-    weights = np.exp(-np.square(np.arange(-reach, reach + 1) / deviation) / 2)
-    padded = np.pad(steps, ((reach, reach), (0, 0)), mode="edge")
-    return np.stack([np.convolve(column, weights / weights.sum(), mode="valid") for column in padded.T], axis=1)
+    return gaussian_filter1d(steps, deviation, axis=0, mode="nearest", radius=int(np.ceil(4 * deviation)))
 
 
 @cache

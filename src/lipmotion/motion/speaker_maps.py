@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import convolve1d
 
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
@@ -91,8 +92,6 @@ def measure_restfulness(units: Timeline[Unit], frames: int) -> Array:
 
 def weigh_viseme_classes(units: Timeline[Unit], frames: int) -> Array:
     """Return the weights of visemes in frames at 100 Hz [shape=(frames, V)]; 0 far from speech and for no phone."""
-    from scipy.ndimage import convolve1d
-
     weights = np.zeros((frames, len(VISEME_NAMES)))
     for span in units:
         if span.label.phone in VISEME_OF:

@@ -23,7 +23,9 @@ def change(chance: Random, content: bytes) -> bytes:
         return raw.change(chance, content)
     found = list(places(tree, 2000))
     if not found or chance.random() < 0.05:
-        return _root(chance, content)
+        deep = b"[" * NESTING if chance.random() < 0.5 else b'{"a":' * NESTING
+        value = json.dumps(chance.choice(VALUES)).encode("utf-8", "surrogatepass")
+        return chance.choice((deep, value, content + content, b"[" + content + b"]"))
     within, key = chance.choice(found)
     _set(chance, within, key)
     return _written(chance, tree)
@@ -72,9 +74,3 @@ def _written(chance: Random, tree: Any) -> bytes:
         pair = json.dumps({key: chance.choice(VALUES)}).encode()[1:-1]
         return b"{" + pair + b", " + written[1:] if chance.random() < 0.5 else written[:-1] + b", " + pair + b"}"
     return written
-
-
-def _root(chance: Random, content: bytes) -> bytes:
-    deep = b"[" * NESTING if chance.random() < 0.5 else b'{"a":' * NESTING
-    value = json.dumps(chance.choice(VALUES)).encode("utf-8", "surrogatepass")
-    return chance.choice((deep, value, content + content, b"[" + content + b"]"))

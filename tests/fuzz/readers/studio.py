@@ -2,7 +2,6 @@
 
 import copy
 import json
-import math
 import os
 import shutil
 import socket
@@ -225,7 +224,8 @@ def check_live(folder: Path, good: Good) -> None:
             frames = stream.push(array if array.size < 1e6 else array.ravel()[:1_000_000])
         frames += stream.push(short_speech(good).samples[:8000]) + stream.flush()
         require([frame.number for frame in frames] == list(range(len(frames))), "frames that are missing")
-        require(all(_is_finite(frame) for frame in frames), "a frame that is not finite")
+        values = [value for frame in frames for value in (*frame.motion, *frame.weights.values())]
+        require(np.isfinite(values).all(), "a frame that is not finite")
 
 
 def _decoded(decode: Callable[[bytes], Any], content: bytes) -> Any:
@@ -234,10 +234,6 @@ def _decoded(decode: Callable[[bytes], Any], content: bytes) -> Any:
         return decode(content)
     except ValueError as error:
         raise InputError(str(error)) from error
-
-
-def _is_finite(frame: LiveFrame) -> bool:
-    return bool(np.isfinite(frame.motion).all()) and all(map(math.isfinite, frame.weights.values()))
 
 
 @cache

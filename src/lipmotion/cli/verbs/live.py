@@ -52,23 +52,27 @@ def run(options: argparse.Namespace) -> None:
         about = LiveSound(rate_hz, options.look_ahead, options.input != "-" and not is_file)
         consumers = [stack.enter_context(open_consumer(to, print_line, about)) for to in options.to or ["-"]]
         listeners = [each for each in consumers if isinstance(each, Listener)]
-        for piece in chain(sound, (None,)):  # None: the sound has ended
-            for listener in listeners if piece is not None else ():
-                listener.hear(piece)
-            frames = stream.flush() if piece is None else stream.push(piece)
-            for frame in map(dress, frames) if dress else frames:
-                for take in consumers:
-                    take(frame)
-            flush_output()
+        try:
+            for piece in chain(sound, (None,)):  # None: the sound has ended
+                for listener in listeners if piece is not None else ():
+                    listener.hear(piece)
+                frames = stream.flush() if piece is None else stream.push(piece)
+                for frame in map(dress, frames) if dress else frames:
+                    for take in consumers:
+                        take(frame)
+                flush_output()
+        except KeyboardInterrupt:
+            if is_file:
+                raise
+    options.stopper.check()  # nothing else ends a microphone: files keep what was said until then
 
 
 def _read_pipe(rate_hz: int) -> Iterator[bytes]:
     rest = b""
     while content := os.read(sys.stdin.fileno(), 2 * int(CHUNK_S * rate_hz)):
         content = rest + content
-        even = len(content) // 2 * 2
-        rest = content[even:]
-        yield content[:even]
+        rest = content[len(content) // 2 * 2 :]
+        yield content[: len(content) - len(rest)]
 
 
 def _in_time(pieces: Iterator[Any]) -> Iterator[Any]:

@@ -7,6 +7,7 @@ from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 
 from lipmotion.errors import InputError
 from lipmotion.hmm.loudness import find_loud_frames
@@ -173,8 +174,6 @@ def _babble(voices: Sequence[Audio], count: int, rng: np.random.Generator) -> Sa
 
 def _colour(count: int, rng: np.random.Generator) -> Samples:
     """Return noise of a random colour, sometimes with hum, of power 1 [shape=(count,)]."""
-    from scipy.fft import irfft, next_fast_len, rfft
-
     size = next_fast_len(count, real=True)
     hertz = np.maximum(np.fft.rfftfreq(size, 1 / SPEECH_RATE_HZ), 50.0)
     shape = 10 ** (np.interp(hertz, np.linspace(0, 8000, 8), rng.normal(0, 4, 8) * rng.integers(2)) / 20)
@@ -189,8 +188,6 @@ def _colour(count: int, rng: np.random.Generator) -> Samples:
 
 def _filter(samples: Samples, rng: np.random.Generator) -> Samples:
     """Return samples behind a smooth filter, or a telephone: a narrow band, coded in eight bits."""
-    from scipy.fft import irfft, next_fast_len, rfft
-
     size = next_fast_len(len(samples), real=True)
     hertz = np.fft.rfftfreq(size, 1 / SPEECH_RATE_HZ)
     gain = 10 ** (np.interp(hertz, np.linspace(0, 8000, 7), rng.normal(0, 5, 7)) / 20)

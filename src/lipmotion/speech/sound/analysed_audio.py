@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from lipmotion.hmm.loudness import average_power, find_sound_runs, find_spoken_frames, smooth_level
 from lipmotion.speech.features.encoding import WindowedEncoding
@@ -44,6 +45,7 @@ QUIETEST = 0.1  # so large a share of a passage, its most silent frames, say wha
 OFFSET_SHARE = 0.02  # an offset of so small a share of the level of the sound hides no pause
 MOVED_FRAMES, MOVED_SHARE = 101, 0.6  # in the median over a second, rumble changes by 0.45 of the level, knocks by 7
 SLOW_FRAMES, BLOCK = 11, 1 << 20  # the median over so many frames is slower than a voice; samples at a time
+SPIKE_SHARE = 1e-3  # as few samples beyond full scale are damage
 SILENT_ENERGY = -17.0  # the log energy between passages: 80 dB beneath their loudest moments
 
 
@@ -195,10 +197,8 @@ class AnalysedAudio(Audio):
                 del audio._mfcc[warp]
 
     def _new_mfcc(self, warps: Sequence[float]) -> list[Features]:
-        def join(warp: float) -> Features:
-            return Features(self.joined(lambda audio: audio.mfcc(warp).values), self.duration_s)
-
-        return list(map(join, warps))
+        rows = [self.joined(lambda audio: audio.mfcc(warp).values) for warp in warps]  # noqa: B023 # called at once
+        return [Features(values, self.duration_s) for values in rows]
 
     @cached_property
     def log_energy(self) -> NDArray[np.float32]:
@@ -378,8 +378,9 @@ def analysed(audio: Audio, features: Features | None = None) -> AnalysedAudio:
 
 def _without_offset(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return samples without offsets between digital silences; where one changes, without all slower than a voice."""
-    from scipy.ndimage import median_filter
-
+    if 1 < max(samples.max(initial=0), -samples.min(initial=0)) < np.inf:  # few such would make all others quiet
+        few = np.count_nonzero(np.abs(samples) > 1) < SPIKE_SHARE * np.count_nonzero(samples)
+        samples = np.clip(samples, -1, 1) if few else samples
     count = len(samples) // HOP
     sound, result = np.flatnonzero(samples[: count * HOP].reshape(count, HOP).any(axis=1)), samples
     for part in np.split(sound, np.flatnonzero(np.diff(sound) > SILENT_FRAMES) + 1) if len(sound) else ():

@@ -29,6 +29,9 @@ LOWEST_HZ, HIGHEST_HZ = 4000, 1_000_000
 """Lowest and highest sampling rate: below, speech is not intelligible; no recorder samples at a higher one."""
 MAX_CHANNELS = 64
 AGAIN = "export the recording again"
+UNTIMED = ("aac", "ac3", "avi", "eac3", "loas", "mp3", "wav")
+DELAYS = {"aac": 1024, "ac3": 256, "eac3": 256, "mp2": 481, "mp3": 1105}
+"""Samples by which encoder and decoder delay sound (AAC at least; MP3 by LAME and FFmpeg), which such formats keep."""
 PIECE_BYTES = 1 << 20  # sound is collected in pieces of this size, and without digital silence
 
 
@@ -53,7 +56,10 @@ class _TrackDecoder:
     def __init__(self, container: Any, rate_hz: int, channel: int | None) -> None:
         self._container = container
         self._name = container.name.removeprefix("file:")
-        self._stream = container.streams.audio[0]
+        self._stream = stream = container.streams.audio[0]
+        says = container.format.name == "mp3" and stream.start_time  # its first frame; the delay is left out then
+        is_untimed = container.format.name in UNTIMED and not says
+        self._delay = DELAYS.get(stream.codec_context.codec.canonical_name, 0) if is_untimed else 0
         self.rate_hz, self._channel = rate_hz, channel
         self._pieces = [(0, bytearray())]
         self._resampler: Any = None
@@ -130,6 +136,7 @@ class _TrackDecoder:
             time_s = float(frame.pts * frame.time_base)
             if self._clock_s is None:
                 offset_s = time_s - (self._container.start_time or 0) / 1e6 if list_video(self._container) else 0.0
+                offset_s -= self._delay / frame.sample_rate
                 self._count += self._silence(max(offset_s, 0.0))
                 self._cut = max(round(-offset_s * self.rate_hz), 0)
             elif time_s - self._clock_s > HOLE_S:
@@ -195,6 +202,8 @@ MIN_HOLES_S = 0.005  # holes that last less together are not mentioned: they wou
 CUT_SHORT_SHARE, ROUNDED_S, STATED = 0.9, 0.5, ("flac", "aiff", "mov,mp4,m4a,3gp,3g2,mj2")
 """A recording is called cut short when it holds less than this share of the duration that it states, or so many seconds
 less in a format that states it exactly."""
+HEADS = {"aiff": 8, "asf": 0, "caf": 0, "flv": 0, "mov,mp4,m4a,3gp,3g2,mj2": 4, "tta": 0}
+"""Formats of which FFmpeg reads the first of several joined files, and where eight bytes begin that all heads share."""
 GUESSED = ("aac", "ac3", "amr", "dts", "eac3")  # formats without a length, at which FFmpeg guesses by the first packets
 PCM, FLOAT, EXTENSIBLE = 1, 3, 0xFFFE
 """Forms of samples in a WAVE file; the last one says its form, and how many bits are valid, in a longer header."""
@@ -261,6 +270,10 @@ def _decode(path: Path, rate_hz: int, channel: int | None) -> _TrackDecoder:
             sound = _TrackDecoder(container, rate_hz, channel)
             sound.decode()
             sound.missing_s, sound.note = max(missing_s, sound.missing_s), note
+            if (first := HEADS.get(container.format.name, -1)) >= 0:
+                with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as whole:
+                    if whole.find(whole[first : first + 8], first + 8) > 0:
+                        sound.note = "other recordings are joined to its end, which are not read; give each by itself"
             return sound
     except (av.FFmpegError, ValueError) as error:
         if isinstance(error, InputError):
@@ -310,15 +323,17 @@ def _correct_wave(path: Path) -> tuple[_Wave | None, float, str]:
         valid, coding = struct.unpack_from("<H4xH", form, 18) if len(form) >= 40 else (-1, PCM)
     min_frame = -(-bits // 8) * channels
     frame = block if block * rate_hz == per_second and block >= min_frame else min_frame
-    if coding not in {PCM, FLOAT} or not channels or frame % channels:
+    if not channels or frame % channels:
         return None, missing_s, note
-    container = 8 * frame // channels
-    if not rewritten and bits == container and valid in {0, container}:
+    if is_plain := coding in {PCM, FLOAT}:
+        container = 8 * frame // channels
+        form = struct.pack("<HHIIHH", coding, channels, rate_hz, frame * rate_hz, frame, container)
+    if not rewritten and (not is_plain or (bits == container and valid in {0, container})):
         return None, missing_s, note
     size = min(size or len(content), len(content) - body)
-    header = struct.pack("<HHIIHH", coding, channels, rate_hz, frame * rate_hz, frame, container)
-    lengths = [min(length, 0xFFFFFFFF) for length in (36 + size, size)]
-    header = struct.pack("<4sI8sI16s4sI", b"RIFF", lengths[0], b"WAVEfmt ", 16, header, b"data", lengths[1])
+    lengths = [min(length, 0xFFFFFFFF) for length in (20 + len(form) + size, size)]
+    header = struct.pack("<4sI8sI", b"RIFF", lengths[0], b"WAVEfmt ", len(form)) + form
+    header += struct.pack("<4sI", b"data", lengths[1])
     content.start, content.name = body - len(header), str(path)
     content[content.start : body] = header
     content.seek(0)
@@ -365,7 +380,7 @@ def _iterate_wave_chunks(content: _Wave) -> Iterator[tuple[bytes, int, int, bool
             return
         body, name = place + head, content[place : place + 4]
         (size,) = struct.unpack_from("<16xQ" if long else "<4xI", content, place)
-        size = 4 if name == b"RIFF" else size - (24 if long else 0)  # another file at the end
+        size = (16 if long else 4) if name in {b"RIFF", b"riff"} else size - (24 if long else 0)  # another file
         if not all(31 < letter < 127 for letter in name):
             return
         yield name, body, size, unpadded

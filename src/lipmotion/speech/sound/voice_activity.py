@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from lipmotion.hmm.loudness import DECIBEL, MIN_RANGE, average_power, find_loud_frames, find_sound_runs, smooth_level
 from lipmotion.speech.features.mfcc import DYNAMIC_RANGE, HOP, WINDOW
@@ -119,8 +120,6 @@ def find_tones(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) ->
     samples    : [shape=(N,)]
     log_energy : of their frames, natural logarithm [shape=(T,)]
     """
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d
-
     ranges = maximum_filter1d(log_energy, TONE_FRAMES) - minimum_filter1d(log_energy, TONE_FRAMES)
     steady = (ranges < TONE_RANGE) & (log_energy > log_energy.max() - TONE_DROP)
     window, tones = np.hanning(WINDOW), []
@@ -154,8 +153,6 @@ def _find_soft_runs(
     loud: NDArray[np.bool_], sound: NDArray[np.bool_], log_energy: NDArray[np.float32]
 ) -> list[tuple[int, int]]:
     """Return runs of a voice that stays softer than what is loud before it, as of somebody who turns away."""
-    from scipy.ndimage import maximum_filter1d
-
     smooth, runs = smooth_level(log_energy), []
     beyond = sound & ~maximum_filter1d(loud, 2 * PASSAGE_MARGIN + 1)
     for first, end in find_sound_runs(beyond, SEPARATE_FRAMES) if loud.any() else ():
@@ -170,8 +167,6 @@ def _divide_by_level(log_energy: NDArray[np.float32]) -> tuple[list[Stretch], ND
 
     Also which frames sound as a voice would beside what is near.
     """
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d
-
     level = average_power(log_energy)
     local = maximum_filter1d(level, LOCAL_FRAMES, mode="nearest")
     smooth = smooth_level(log_energy)
@@ -221,8 +216,6 @@ def find_passage_gain(log_energy: NDArray[np.float32]) -> NDArray[np.float64]:
     log_energy : of its frames, natural logarithm [shape=(T,)]
     Where its voice becomes softer, it is raised.
     """
-    from scipy.ndimage import maximum_filter1d
-
     level = average_power(log_energy)
     loud = float(level.max())
     gain = np.full(len(level), SAME_LEVEL / np.exp((loud - np.log(WINDOW)) / 2))

@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP, find_centres, log_bands
@@ -82,7 +83,7 @@ BREATH_LEVEL_DB = -12.0  # the level of a breath beside the loud frames of the r
 BREATH_TILT_DB = (-8.0, 6.0)  # level from 3.5 to 7.6 kHz beside that from 1 to 3.5 kHz: s and sh are brighter
 BREATH_LOW_DB = -4.0  # level under 1 kHz beside that from 1 to 3.5 kHz, at most: rumble and plosives have more
 PAUSE_PIECE_S = 600.0  # longer pauses are searched in pieces: silence may last for hours
-QUIET_REACH_S = 2.0  # the quiet around a pause is looked for so far beside it
+QUIET_REACH = round(2 * FRAME_RATE_HZ)  # the quiet around a pause is looked for so many frames beside it
 QUIET_SHARE = 0.08  # share of the frames around one that are at most as loud as the quiet there
 BLOCK_FRAMES = 2000  # frames whose surroundings are in memory at once
 
@@ -97,7 +98,8 @@ def find_voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, 
     for first, sound in analysed(audio).between_silences:
         at_s = first / FRAME_RATE_HZ
         phones = units.between(at_s, at_s + sound.duration_s)
-        level_db, voiced = _smooth(sound.log_energy.astype(np.float64) * DB), np.isfinite(log_f0(sound))
+        level_db = gaussian_filter1d(sound.log_energy.astype(np.float64) * DB, SMOOTHING_FRAMES, mode="nearest")
+        voiced = np.isfinite(log_f0(sound))
         events = *_laughs(sound, level_db, voiced, phones), *_breaths(sound, level_db, voiced, phones)
         detected += [event.shifted(at_s) for event in events]
     return tuple(sorted(detected, key=lambda event: event.start_s))
@@ -164,8 +166,7 @@ def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timel
     ]
     for start_s, end_s in silences:
         pause = range(round(start_s * FRAME_RATE_HZ), round(end_s * FRAME_RATE_HZ))
-        reach = round(QUIET_REACH_S * FRAME_RATE_HZ)
-        around = slice(max(pause.start - reach, 0), min(pause.stop + reach, len(level_db)))
+        around = slice(max(pause.start - QUIET_REACH, 0), min(pause.stop + QUIET_REACH, len(level_db)))
         for begin, end, rise_db in _noises(_bands(audio, around), voiced[around]):
             first, stop = begin + around.start, end + around.start
             if first < pause.start or stop > pause.stop or level_db[first:stop].max() - loud_db > BREATH_LEVEL_DB:
@@ -186,9 +187,8 @@ def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, i
         for lowest_hz, highest_hz in ((0, 1000), (1000, 3500), (3500, 7600), (1000, np.inf))
         for inside in [(centres >= lowest_hz) & (centres < highest_hz)]
     )
-    level = _smooth(DB * np.log(bright))
-    reach = round(QUIET_REACH_S * FRAME_RATE_HZ)
-    windows = sliding_window_view(np.pad(level, reach, "edge"), 2 * reach + 1)
+    level = gaussian_filter1d(DB * np.log(bright), SMOOTHING_FRAMES, mode="nearest")
+    windows = sliding_window_view(np.pad(level, QUIET_REACH, "edge"), 2 * QUIET_REACH + 1)
     rank = int(QUIET_SHARE * windows.shape[1])
     blocks = (windows[first : first + BLOCK_FRAMES] for first in range(0, len(windows), BLOCK_FRAMES))
     quiet = np.concatenate([np.partition(block, rank, axis=1)[:, rank].copy() for block in blocks])
@@ -209,12 +209,6 @@ def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, i
 def _bands(audio: AnalysedAudio, frames: slice) -> NDArray[np.float32]:
     """Return ``log_bands`` of a range of frames, computed of these alone [shape=(N, 40)]."""
     return log_bands(audio.samples[frames.start * HOP : max(frames.stop - 1, frames.start) * HOP])
-
-
-def _smooth(curve: Curve) -> Curve:
-    reach = round(4 * SMOOTHING_FRAMES)
-    window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / SMOOTHING_FRAMES) ** 2)
-    return np.convolve(np.pad(curve, reach, "edge"), window / window.sum(), "valid")
 
 
 def _find_overlap(one: tuple[float, float], other: tuple[float, float]) -> float:
