@@ -93,35 +93,48 @@ def _draw_triangle(
     red_b, green_b, blue_b = colours[b, 0] - red, colours[b, 1] - green, colours[b, 2] - blue
     red_c, green_c, blue_c = colours[c, 0] - red, colours[c, 1] - green, colours[c, 2] - blue
     step_a, step_b, step_c = yc - yb, ya - yc, yb - ya
+    per_a, per_b, per_c = 1.0 / (step_a or 1.0), 1.0 / (step_b or 1.0), 1.0 / (step_c or 1.0)
     for row in range(y0, y1):
         px, py = x0 + 0.5, row + 0.5
         of_a = (xc - xb) * (py - yb) - step_a * (px - xb)
         of_b = (xa - xc) * (py - yc) - step_b * (px - xc)
         of_c = (xb - xa) * (py - ya) - step_c * (px - xa)
-        within = False
-        i = row - top
-        for j in range(x0 - left, x1 - left):
-            if of_a >= bias_a and of_b >= bias_b and of_c >= bias_c:
-                within = True
-                share_b, share_c = np.float32(of_b * inverse), np.float32(of_c * inverse)
-                away = za + (share_b * zb + share_c * zc)
-                if away < depth[i, j]:
-                    depth[i, j] = away
-                    colour[i, j, 0] = red + (share_b * red_b + share_c * red_c)
-                    colour[i, j, 1] = green + (share_b * green_b + share_c * green_c)
-                    colour[i, j, 2] = blue + (share_b * blue_b + share_c * blue_c)
-            elif within:
-                break
-            of_a -= step_a  # exact, as the corners are
+        enter, leave = narrow(0, x1 - x0, of_a - bias_a, step_a, per_a)
+        enter, leave = narrow(enter, leave, of_b - bias_b, step_b, per_b)
+        enter, leave = narrow(enter, leave, of_c - bias_c, step_c, per_c)
+        of_b, of_c, i = of_b - enter * step_b, of_c - enter * step_c, row - top  # exact, as the corners are
+        for j in range(x0 - left + enter, x0 - left + leave):
+            share_b, share_c = np.float32(of_b * inverse), np.float32(of_c * inverse)
+            away = za + (share_b * zb + share_c * zc)
+            if away < depth[i, j]:
+                depth[i, j] = away
+                colour[i, j, 0] = red + (share_b * red_b + share_c * red_c)
+                colour[i, j, 1] = green + (share_b * green_b + share_c * green_c)
+                colour[i, j, 2] = blue + (share_b * blue_b + share_c * blue_c)
             of_b -= step_b
             of_c -= step_c
 
 
 @compiled
 def compute_bias(xa: float, ya: float, xb: float, yb: float) -> float:
-    """Return the least edge function of samples inside: samples on an edge belong to the triangle on one side of it."""
+    """Return the least edge function of samples inside: samples on an edge belong to the triangle on one side of it.
+
+    Edge functions are whole multiples of 1 / GRID², half of which is away from all of them.
+    """
     owned = ya > yb or (ya == yb and xa < xb)
-    return 0.0 if owned else 1e-6
+    return -0.5 / GRID**2 if owned else 0.5 / GRID**2
+
+
+@compiled
+def narrow(enter: int, leave: int, inside: float, step: float, per_step: float) -> tuple[int, int]:
+    """Return the first of a row's samples on the inner side of an edge, and the one behind the last."""
+    if step > 0.0:
+        leave = min(leave, int(np.floor(inside * per_step)) + 1)
+    elif step < 0.0:
+        enter = max(enter, int(np.ceil(inside * per_step)))
+    elif inside < 0.0:
+        leave = 0
+    return enter, leave
 
 
 @compiled

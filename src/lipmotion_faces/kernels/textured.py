@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.kernels.compiler import compiled
-from lipmotion_faces.kernels.raster import BAND, FAR, GRID, compute_bias, sort_by_band
+from lipmotion_faces.kernels.raster import BAND, FAR, GRID, compute_bias, narrow, sort_by_band
 
 Real = NDArray[np.float64]
 Light = NDArray[np.float32]
@@ -20,7 +20,6 @@ HIDING_OPACITY = 0.95  # from this opacity on, a blended surface hides what is b
 SEEN_OPACITY = 1 / 512  # below this opacity, it is not seen
 NO_TRIANGLE = -1
 SCALE = 1 / 65535
-WIDE_SAMPLES = 8  # in triangles wider than this, in samples, the columns of a row are worked out before they are tried
 PLANES = 27
 """Linear numbers of a triangle: three each of light, highlights, depth, and place in the texture times depth."""
 
@@ -147,47 +146,27 @@ def _mark(
     bias_a, bias_b, bias_c = compute_bias(xb, yb, xc, yc), compute_bias(xc, yc, xa, ya), compute_bias(xa, ya, xb, yb)
     to_b, to_c = zb - za, zc - za
     step_a, step_b, step_c = yc - yb, ya - yc, yb - ya
+    per_a, per_b, per_c = 1.0 / (step_a or 1.0), 1.0 / (step_b or 1.0), 1.0 / (step_c or 1.0)
     for row in range(y0, y1):
         px, py = x0 + 0.5, row + 0.5
         of_a = (xc - xb) * (py - yb) - step_a * (px - xb)
         of_b = (xa - xc) * (py - yc) - step_b * (px - xc)
         of_c = (xb - xa) * (py - ya) - step_c * (px - xa)
-        within = False
-        i = row - top
-        start, stop = x0, x1
-        if x1 - x0 > WIDE_SAMPLES:
-            start, stop = _narrow(start, stop, px, of_a - bias_a, step_a)
-            start, stop = _narrow(start, stop, px, of_b - bias_b, step_b)
-            start, stop = _narrow(start, stop, px, of_c - bias_c, step_c)
-            of_a -= step_a * (start - x0)
-            of_b -= step_b * (start - x0)
-            of_c -= step_c * (start - x0)
-        for j in range(start - left, stop - left):
-            if of_a >= bias_a and of_b >= bias_b and of_c >= bias_c:
-                within = True
-                away = np.float32(za + (of_b * inverse * to_b + of_c * inverse * to_c))
-                if (
-                    away < depth[i, j]
-                    and away <= solid[i, j]
-                    and (not holes or _sample_alpha(t, j + left + 0.5, py, planes, level, texels, levels) >= lowest)
-                ):
-                    depth[i, j] = away
-                    marks[i, j] = t
-            elif within:
-                break
-            of_a -= step_a  # exact, as the corners are
+        enter, leave = narrow(0, x1 - x0, of_a - bias_a, step_a, per_a)
+        enter, leave = narrow(enter, leave, of_b - bias_b, step_b, per_b)
+        enter, leave = narrow(enter, leave, of_c - bias_c, step_c, per_c)
+        of_b, of_c, i = of_b - enter * step_b, of_c - enter * step_c, row - top  # exact, as the corners are
+        for j in range(x0 - left + enter, x0 - left + leave):
+            away = np.float32(za + (of_b * inverse * to_b + of_c * inverse * to_c))
+            if (
+                away < depth[i, j]
+                and away <= solid[i, j]
+                and (not holes or _sample_alpha(t, j + left + 0.5, py, planes, level, texels, levels) >= lowest)
+            ):
+                depth[i, j] = away
+                marks[i, j] = t
             of_b -= step_b
             of_c -= step_c
-
-
-@compiled
-def _narrow(start: int, stop: int, px: float, inside: float, step: float) -> tuple[int, int]:
-    """Return the columns that may be on the inner side of an edge, and one more at either end."""
-    if step > 0:
-        stop = min(stop, int(np.floor(px + inside / step - 0.5)) + 2)
-    elif step < 0:
-        start = max(start, int(np.ceil(px + inside / step - 0.5)) - 1)
-    return start, stop
 
 
 @compiled
