@@ -225,7 +225,7 @@ def check_live(folder: Path, good: Good) -> None:
         frames += stream.push(short_speech(good).samples[:8000]) + stream.flush()
         require([frame.number for frame in frames] == list(range(len(frames))), "frames that are missing")
         values = [value for frame in frames for value in (*frame.motion, *frame.weights.values())]
-        require(np.isfinite(values).all(), "a frame that is not finite")
+        require(bool(np.isfinite(values).all()), "a frame that is not finite")
 
 
 def _decoded(decode: Callable[[bytes], Any], content: bytes) -> Any:
