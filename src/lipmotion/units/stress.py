@@ -41,11 +41,6 @@ def find_stress(units: Timeline[Unit], lexicon: Lexicon | None = None) -> tuple[
     Source: our own counts. The patterns come from half of CMUdict, whose entries have stress, the endings and prefixes
     were chosen with all of it. In the other half the rule is right for 83 % of the words of several syllables, 85 %
     when words count as often as they are used; the first syllable always is right for 67 % and 67 %.
-
-    >>> from lipmotion.types import Span
-    >>> phones = [Unit(phone, word="again") for phone in "ax g eh n".split()]
-    >>> find_stress(Timeline(tuple(Span(n / 10, (n + 1) / 10, unit) for n, unit in enumerate(phones))))
-    (0, 1, 1, 1)
     """
     lexicon = lexicon or Lexicon()
     labels = [span.label for span in units]
@@ -73,9 +68,6 @@ def find_stressed_vowel(word: str, vowels: Sequence[str]) -> int | None:
 
     word   : in lower case
     vowels : its vowels and syllabic consonants, in order
-
-    >>> find_stressed_vowel("television", ["eh", "ax", "ih", "ax"]), find_stressed_vowel("the", ["ax"])
-    (2, None)
     """
     full = [number for number, vowel in enumerate(vowels) if vowel not in REDUCED]
     if len(vowels) < 2:

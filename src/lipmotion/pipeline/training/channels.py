@@ -144,7 +144,7 @@ def with_sound_inputs(
             result[number] = replace(result[number], speech=replace(result[number].speech, posteriors=posteriors))
             if (number + 1) % BLOCK == 0:
                 report(Progress("posteriors of phones", number + 1, count, (number + 1) / count))
-    if inputs.encoding:
+    if inputs.encoding and not inputs.conditions:
         result = [
             replace(example, speech=replace(example.speech, encoding=encoding))
             for example, encoding in zip(result, each(_encode, recordings), strict=True)
@@ -157,9 +157,9 @@ def with_sound_inputs(
         for block in each(partial(_vary_block, voices=voices, count=inputs.conditions), blocks):
             spectra += block
             report(Progress("acoustic conditions", len(spectra), count, len(spectra) / count))
-        result = [
-            replace(example, condition_spectra=tuple(varied)) for example, varied in zip(result, spectra, strict=True)
-        ]
+        for number, varied in enumerate(spectra):
+            heard = replace(result[number].speech, encoding=varied[0].encoding)
+            result[number] = replace(result[number], speech=heard, condition_spectra=tuple(varied))
     return result
 
 
