@@ -193,7 +193,7 @@ def test_what_edit_refuses(run, speech, toy_model_file, tmp_path):
         (["edit", file, "phone 3 is p"], "no such file; begin one: lipmotion edit"),
         (["render", file, "-o", tmp_path / "a.csv"], "a.edits.json: cannot be read"),
         (["animate", speech, "--edits", file, "-o", tmp_path / "a.csv"], "a.edits.json: no such edits file"),
-        (["edit", tmp_path / "a.csv", *of], "a file of edits is called .json"),
+        (["edit", tmp_path / "a.csv", *of], "no file of edits, as FILE.json"),
         (["edit", file, *of, "set intensity 1.2"], ""),
         (["edit", file, "--of", speech], "exists; add edits without --of"),
         (["edit", "--und", 2, file], "2 edits to take back, required 0 to 1"),

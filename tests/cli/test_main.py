@@ -175,7 +175,7 @@ def test_the_model_inside_is_named_with_its_rights(run, toy_model_file, here):
     own = [line.split(maxsplit=1)[1] for line in done.out if line.startswith(("licence", "attribution"))]
     assert own == ["none stated", "none stated"]
     prior = {line.split()[1]: line.split(maxsplit=2)[2] for line in done.out if line.startswith("prior ")}
-    assert (prior["engine"], prior["utterances"], prior["licence"]) == ("trajectory", "524", "CC BY 4.0")
+    assert (prior["engine"], prior["utterances"], prior["licence"]) == ("trajectory", "523", "CC BY 4.0")
     assert prior["attribution"].startswith("GRID corpus")
 
 
