@@ -19,8 +19,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from lipmotion.articulation.contact import smooth_step
 from lipmotion.articulation.expression import list_action_units
@@ -199,7 +199,7 @@ def lid_closure(time_s: Curve, blink_s: list[float]) -> Curve:
 
 def _smooth(curve: Curve, deviation_s: float) -> Curve:
     """Return a curve at 100 Hz smoothed by a Gaussian; the ends are repeated."""
-    return gaussian_filter1d(curve, deviation_s * FRAME_RATE_HZ, mode="nearest")
+    return scipy.ndimage.gaussian_filter1d(curve, deviation_s * FRAME_RATE_HZ, mode="nearest")
 
 
 def _find_accents(motion: Motion, prosody: Prosody | None) -> Curve:

@@ -7,9 +7,9 @@ silence, zeros or another noise before and after what is said change nothing.
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 DECIBEL = np.log(10) / 10  # a decibel, as natural logarithm of energy
 LEVEL_FRAMES = 25  # the loud level is that of the loudest quarter of a second: a click is shorter
@@ -37,7 +37,7 @@ def average_power(log_energy: NDArray[np.floating]) -> NDArray[np.float64]:
     """Return the logarithm of the energy averaged over a quarter of a second around every frame [shape=(T,)]."""
     highest = float(log_energy.max())
     power = np.exp(log_energy.astype(np.float64) - highest)
-    return highest + np.log(np.maximum(uniform_filter1d(power, LEVEL_FRAMES, mode="constant"), 1e-12))
+    return highest + np.log(np.maximum(scipy.ndimage.uniform_filter1d(power, LEVEL_FRAMES, mode="constant"), 1e-12))
 
 
 def measure_levels(log_energy: NDArray[np.floating]) -> tuple[float, float]:
@@ -47,7 +47,7 @@ def measure_levels(log_energy: NDArray[np.floating]) -> tuple[float, float]:
     spoken = smooth > loud - NEAR_LOUD
     half = NOISE_FRAMES // 2
     sides = half // 2, -(half // 2)
-    before, after = (minimum_filter1d(smooth, half + 1, mode="nearest", origin=side) for side in sides)
+    before, after = (scipy.ndimage.minimum_filter1d(smooth, half + 1, mode="nearest", origin=side) for side in sides)
     lowest = np.maximum(before, after)  # at the edge of another silence, the noise is that of the other side
     return loud, float(np.median(lowest[spoken])) if spoken.any() else loud
 

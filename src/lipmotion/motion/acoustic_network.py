@@ -108,9 +108,8 @@ class AcousticNetwork(Predictor):
         motion, distortion = speech.cached(self, lambda: self._predict(inputs, len(speech.features.values)))
         network, posteriors, strange = self.posterior_network, speech.posteriors, count_unseen(speech.voice)
         if network is not None and posteriors is not None:
-            known, unknown = POSTERIOR_SHARES
-            sure = _rate_sureness(speech, LESS_SURE * (1 - speech.voice) ** 2)
-            motion = motion + sure * (known + strange * (unknown - known)) * (network.predict(speech)[0] - motion)
+            share = _rate_sureness(speech, LESS_SURE * strange**4) * np.interp(strange, (0, 1), POSTERIOR_SHARES)
+            motion = motion + share * (network.predict(speech)[0] - motion)
         if self.encoding is not None and speech.encoding is not None and strange:
             applies = min(2 * strange, 1.0) * _rate_sureness(speech)
             motion = motion + ENCODING_SHARE * applies * (self.encoding.predict(speech)[0] - motion)

@@ -9,8 +9,8 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING, REACH_S, find_closable_ranges
@@ -137,7 +137,7 @@ def trace_articulators(units: Timeline[Unit], frames: int) -> Array:
 def smooth_steps(steps: Array) -> Array:
     """Return values in frames [shape=(T, C)] smoothed by a Gaussian of ``SMOOTHING_S``; the ends are repeated."""
     deviation = SMOOTHING_S * FRAME_RATE_HZ
-    return gaussian_filter1d(steps, deviation, axis=0, mode="nearest", radius=int(np.ceil(4 * deviation)))
+    return scipy.ndimage.gaussian_filter1d(steps, deviation, axis=0, mode="nearest", radius=int(np.ceil(4 * deviation)))
 
 
 @cache

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import convolve1d
 
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
@@ -99,7 +99,7 @@ def weigh_viseme_classes(units: Timeline[Unit], frames: int) -> Array:
             weights[max(first, 0) : max(stop, 0), VISEME_NAMES.index(VISEME_OF[span.label.phone])] = 1
     if frames:
         window = np.hanning(FADE_FRAMES + 2)[1:-1]
-        weights = convolve1d(weights, window / window.sum(), axis=0, mode="nearest")
+        weights = scipy.ndimage.convolve1d(weights, window / window.sum(), axis=0, mode="nearest")
     return weights * (1 - measure_restfulness(units, frames))[:, None]
 
 

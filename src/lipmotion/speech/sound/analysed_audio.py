@@ -9,8 +9,8 @@ from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from lipmotion.hmm.loudness import average_power, find_sound_runs, find_spoken_frames, smooth_level
 from lipmotion.speech.features.encoding import WindowedEncoding
@@ -395,10 +395,10 @@ def _without_offset(samples: NDArray[np.float32]) -> NDArray[np.float32]:
             spread = powers - means**2
             quiet = np.argsort(spread, kind="stable")[: int(len(frames) * QUIETEST) + 1]
             offset, level = np.median(means[quiet]), np.median(spread[quiet])
-            moved = np.ptp(median_filter(means, MOVED_FRAMES)) if len(means) > MOVED_FRAMES else 0.0
+            moved = np.ptp(scipy.ndimage.median_filter(means, MOVED_FRAMES)) if len(means) > MOVED_FRAMES else 0.0
             if MOVED_SHARE**2 * spread.mean() < moved**2 < np.inf:
                 result = samples.copy() if result is samples else result
-                slow, centres = median_filter(means, SLOW_FRAMES), (np.arange(len(means)) + 0.5) * HOP
+                slow, centres = scipy.ndimage.median_filter(means, SLOW_FRAMES), (np.arange(len(means)) + 0.5) * HOP
                 for at in range(place.start, place.stop, BLOCK):
                     block = result[at : min(at + BLOCK, place.stop)]
                     block -= np.interp(np.arange(len(block)) + (at - place.start), centres, slow)

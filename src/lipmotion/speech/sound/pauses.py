@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
 from lipmotion.hmm.loudness import find_sound_runs
 from lipmotion.types import Audio
@@ -29,7 +29,7 @@ def measure_levels_db(audio: Audio) -> Array:
     """Return the smoothed level of every 10 ms [shape=(floor(duration / 0.01),)], dB of full scale."""
     powers = average_powers(audio.samples, round(STEP_S * audio.rate_hz))
     levels: Array = 10 * np.log10(np.maximum(powers, 10 ** (QUIETEST_DB / 10)))
-    return uniform_filter1d(levels, SMOOTHING_FRAMES, mode="nearest") if len(levels) else levels
+    return scipy.ndimage.uniform_filter1d(levels, SMOOTHING_FRAMES, mode="nearest") if len(levels) else levels
 
 
 def average_powers(samples: NDArray[np.float32], size: int) -> Array:

@@ -10,9 +10,9 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from lipmotion.hmm.loudness import DECIBEL, MIN_RANGE, average_power, find_loud_frames, find_sound_runs, smooth_level
 from lipmotion.speech.features.mfcc import DYNAMIC_RANGE, HOP, WINDOW
@@ -120,10 +120,11 @@ def find_tones(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) ->
     samples    : [shape=(N,)]
     log_energy : of their frames, natural logarithm [shape=(T,)]
     """
-    ranges = maximum_filter1d(log_energy, TONE_FRAMES) - minimum_filter1d(log_energy, TONE_FRAMES)
+    extremes = scipy.ndimage.maximum_filter1d, scipy.ndimage.minimum_filter1d
+    ranges = np.subtract(*(find(log_energy, TONE_FRAMES) for find in extremes))
     steady = (ranges < TONE_RANGE) & (log_energy > log_energy.max() - TONE_DROP)
     window, tones = np.hanning(WINDOW), []
-    for first, end in find_sound_runs(maximum_filter1d(steady, TONE_FRAMES), 1):
+    for first, end in find_sound_runs(scipy.ndimage.maximum_filter1d(steady, TONE_FRAMES), 1):
         pure = np.zeros(end - first, bool)
         for start in range(first, end, TONE_BLOCK):  # hours may be steady
             stop = min(start + TONE_BLOCK, end)
@@ -154,7 +155,7 @@ def _find_soft_runs(
 ) -> list[tuple[int, int]]:
     """Return runs of a voice that stays softer than what is loud before it, as of somebody who turns away."""
     smooth, runs = smooth_level(log_energy), []
-    beyond = sound & ~maximum_filter1d(loud, 2 * PASSAGE_MARGIN + 1)
+    beyond = sound & ~scipy.ndimage.maximum_filter1d(loud, 2 * PASSAGE_MARGIN + 1)
     for first, end in find_sound_runs(beyond, SEPARATE_FRAMES) if loud.any() else ():
         if beyond[first:end].sum() >= SOFT_FRAMES and np.ptp(smooth[first:end]) > SOFT_RANGE:
             loud_end = max(first - PASSAGE_MARGIN, 0)
@@ -168,9 +169,10 @@ def _divide_by_level(log_energy: NDArray[np.float32]) -> tuple[list[Stretch], ND
     Also which frames sound as a voice would beside what is near.
     """
     level = average_power(log_energy)
-    local = maximum_filter1d(level, LOCAL_FRAMES, mode="nearest")
+    local = scipy.ndimage.maximum_filter1d(level, LOCAL_FRAMES, mode="nearest")
     smooth = smooth_level(log_energy)
-    falls = maximum_filter1d(local - minimum_filter1d(smooth, STEADY_FRAMES, mode="nearest"), STEADY_FRAMES) > STEADY
+    lowest = scipy.ndimage.minimum_filter1d(smooth, STEADY_FRAMES, mode="nearest")
+    falls = scipy.ndimage.maximum_filter1d(local - lowest, STEADY_FRAMES) > STEADY
     sound = (smooth > local - LOCAL_DROP) & (level > level.max() - SOFTEST_DROP) & falls
     if not sound.any():
         return [], sound
@@ -219,7 +221,7 @@ def find_passage_gain(log_energy: NDArray[np.float32]) -> NDArray[np.float64]:
     level = average_power(log_energy)
     loud = float(level.max())
     gain = np.full(len(level), SAME_LEVEL / np.exp((loud - np.log(WINDOW)) / 2))
-    lower = loud - maximum_filter1d(level, STEADY_FRAMES + 1, mode="nearest") - STEADY
+    lower = loud - scipy.ndimage.maximum_filter1d(level, STEADY_FRAMES + 1, mode="nearest") - STEADY
     sound = np.flatnonzero(smooth_level(log_energy) > loud - LOCAL_DROP - STEADY)
     if len(sound) and lower[sound].max() > 0:
         raised = np.clip(lower[sound], 0, LOCAL_DROP) / 2

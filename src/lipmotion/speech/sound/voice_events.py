@@ -14,9 +14,9 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP, find_centres, log_bands
@@ -98,7 +98,8 @@ def find_voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, 
     for first, sound in analysed(audio).between_silences:
         at_s = first / FRAME_RATE_HZ
         phones = units.between(at_s, at_s + sound.duration_s)
-        level_db = gaussian_filter1d(sound.log_energy.astype(np.float64) * DB, SMOOTHING_FRAMES, mode="nearest")
+        energy_db = sound.log_energy.astype(np.float64) * DB
+        level_db = scipy.ndimage.gaussian_filter1d(energy_db, SMOOTHING_FRAMES, mode="nearest")
         voiced = np.isfinite(log_f0(sound))
         events = *_laughs(sound, level_db, voiced, phones), *_breaths(sound, level_db, voiced, phones)
         detected += [event.shifted(at_s) for event in events]
@@ -187,7 +188,7 @@ def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, i
         for lowest_hz, highest_hz in ((0, 1000), (1000, 3500), (3500, 7600), (1000, np.inf))
         for inside in [(centres >= lowest_hz) & (centres < highest_hz)]
     )
-    level = gaussian_filter1d(DB * np.log(bright), SMOOTHING_FRAMES, mode="nearest")
+    level = scipy.ndimage.gaussian_filter1d(DB * np.log(bright), SMOOTHING_FRAMES, mode="nearest")
     windows = sliding_window_view(np.pad(level, QUIET_REACH, "edge"), 2 * QUIET_REACH + 1)
     rank = int(QUIET_SHARE * windows.shape[1])
     blocks = (windows[first : first + BLOCK_FRAMES] for first in range(0, len(windows), BLOCK_FRAMES))
