@@ -39,6 +39,7 @@ def test_raw_sound_comes_on_a_pipe(tmp_path: Path) -> None:
         assert process.communicate()[0] == ""
         assert process.returncode == 0
     assert len((tmp_path / "a.csv").read_text("utf-8").splitlines()) == 101
+    (tmp_path / "a.csv").unlink()
     with child([*command, "--to", "-"], stdin=PIPE) as process:
         assert process.stdin
         assert process.stdout
