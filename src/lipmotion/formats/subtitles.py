@@ -153,13 +153,8 @@ def _join_shown(lines: list[str]) -> str:
 
 def _drop_repetitions(cues: list[TimedLabel]) -> list[TimedLabel]:
     """Return cues without the lines that captions that scroll repeat."""
-    plain = [
-        tuple(
-            extract_spoken_text(" ".join(MARKS["WORD_TIME"].sub("", line).split())).strip()
-            for line in cue.text.split("\n")
-        )
-        for cue in cues
-    ]
+    untimed = ([" ".join(MARKS["WORD_TIME"].sub("", line).split()) for line in cue.text.split("\n")] for cue in cues)
+    plain = [tuple(extract_spoken_text(line).strip() for line in lines) for lines in untimed]
     bridges = sum(
         cue.end_s - cue.start_s < BRIDGE_S and shown[-len(lines) :] == lines
         for cue, lines, shown in zip(cues[1:], plain[1:], plain, strict=False)

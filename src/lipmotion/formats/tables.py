@@ -112,11 +112,9 @@ def timecode(time_s: float) -> str:
 def write_take(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write a header and one line a frame; curves that the motion does not have are 0."""
     motion = generation.motion
-    table = np.zeros((len(motion.values), len(CURVES)))
-    names = {name[:1].upper() + name[1:]: column for column, name in enumerate(motion.names)}
-    for column, name in enumerate(CURVES):
-        if name in names:
-            table[:, column] = motion.values[:, names[name]]
+    still = np.zeros(len(motion.values))
+    curves = {name[:1].upper() + name[1:]: motion[name] for name in motion.names}
+    table = np.stack([curves.get(name, still) for name in CURVES], axis=1)
     form = ",".join([f"%.{TAKE_DECIMALS}f"] * len(CURVES))
     with path.open("w", encoding="ascii", newline="\n") as file:
         file.write(",".join([*BEFORE_CURVES, *CURVES]) + "\n")
