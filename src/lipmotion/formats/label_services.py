@@ -211,9 +211,8 @@ def _parse_time(value: Any, where: str, per_s: float = 1) -> float:
 
 def _read_row(item: dict[str, Any], place: str, where: str, name: str, owner: Row | None, who: str) -> Row | None:
     """Return an item with its text and the times that it has; None: it has no text."""
-    text = next(
-        (text for name in NAMES["texts"] if name in item and (text := _find_text(item[name])) is not None), None
-    )
+    texts = (_find_text(item[name]) for name in NAMES["texts"] if name in item)
+    text = next((each for each in texts if each is not None), None)
     is_phone = name in NAMES["phones"] or ({"phone", "phoneme"} & {*item} and "word" not in item)
     role = PHONE_LABELS if is_phone else WORDS if "word" in item or name in NAMES["words"] else ""
     if text is None and any(item.get(name) for name in ("text", "word")):

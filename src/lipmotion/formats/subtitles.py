@@ -120,7 +120,7 @@ def _read_lyrics(text: str, where: str) -> Iterator[TimedLabel]:
 def _read_cues(text: str, where: str) -> Iterator[TimedLabel]:
     cue, lines, count = None, list[str](), 0
     for number, row in enumerate(StringIO(text), 1):
-        line = row.rstrip("\r\n")
+        line = MARKS["LOOSE"].sub(r"\1", row.rstrip("\r\n")) if "-->" in row else row.rstrip("\r\n")
         times = (MARKS["TIMES"].fullmatch(line) or MARKS["SBV"].fullmatch(line)) if ":" in line else None
         if times is None and (MARKS["CUE"].match(line) or MARKS["NO_ARROW"].match(line)):
             wanted = "00:00:01,000 --> 00:00:02,500"
