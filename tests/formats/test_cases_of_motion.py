@@ -34,8 +34,7 @@ def take(rows: list[str], head: str = "Timecode,BlendshapeCount,JawOpen,MouthClo
 
 
 def code(frame: int, rate: int = 60, start_s: int = 36_000, mark: str = ":") -> str:
-    seconds, part = divmod(frame, rate)
-    seconds = (seconds + start_s) % 86_400
+    seconds, part = divmod((frame + start_s * rate) % (86_400 * rate), rate)
     return f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}{mark}{part:02d}.000"
 
 
@@ -154,6 +153,7 @@ def test_timecodes_without_frames_are_counted(tmp_path: Path, caplog: pytest.Log
         ("frame,timestamp_ms,_neutral", lambda n: f"{n},{n * 1000 / 30:.0f},0.01"),
         ("frame,Time (ms)", lambda n: f"{n},{n * 1000 / 30:.2f}"),
         ("timeCode", lambda n: f"{n / 30:.6f}"),
+        ("Timecode", lambda n: f"10:00:{n // 30:02d}:{n % 30 + 1:02d}"),
         (",timestamp", lambda n: f"{n},{1_700_000_000 + n / 30:.6f}"),
         ("timestamp", lambda n: f"{n * 1e6 / 30:.0f}"),
         ("Unnamed: 0,time", lambda n: f"{n},{n / 30:.6f}"),

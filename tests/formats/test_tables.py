@@ -58,7 +58,7 @@ def test_uneven_times_of_other_programs_are_evened_out(write):
 
 def test_rows_that_begin_late_stay_there_and_degrees_are_angles(write, caplog):
     rows = "".join(f"{n},{round(n * 1000 / 60)},{(n == 60) / 2},{20 - n / 60}\n" for n in range(31, 180))
-    motion, _ = read_motion(write("frame,timestamp_ms,jawOpen,HeadYaw\n" + rows, "a.csv"))
+    motion, _ = read_motion(write("frame,timestamp_ms,jawOpen,headyaw\n" + rows, "a.csv"))
     assert (len(motion.values), motion.rate_hz, int(motion["jawOpen"].argmax())) == (180, 60, 60)
     assert motion["headYaw"][60] == pytest.approx(np.deg2rad(19), abs=1e-3)
     assert "31 of 180 rows have no face or lack numbers, at 0.00" in caplog.text

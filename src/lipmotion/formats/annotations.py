@@ -21,11 +21,12 @@ from lipmotion.storage.files import atomic_file
 from lipmotion.types import Timeline, Unit
 from lipmotion.types.values import parse_clock
 from lipmotion.units import RECOGNISED, group_words, list_recognised_phones
-from lipmotion.units.spelling import read_patterns
+from lipmotion.units.spelling import read_patterns, read_table
 
 MARKS = read_patterns(Path(__file__).with_name("annotations.tsv"))
 """Patterns of the forms that are read, by their names in the table."""
 INTERVALS, POINTS = "IntervalTier", "TextTier"
+TRIGRAPHS = read_table("trigraphs")  # letters as Praat spells them after a backslash
 
 
 class _DamagedError(Exception):
@@ -34,7 +35,9 @@ class _DamagedError(Exception):
 
 def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
     """Return the interval tiers of a TextGrid; point tiers are ignored. Raises InputError: not a whole TextGrid."""
-    tokens = _tokens(text)
+    head, *parts = MARKS["SIZE"].split(text)
+    counted = zip(parts[::2], parts[1::2], strict=True)  # some programs count wrongly
+    tokens = _tokens(head + "".join(f"{size}{len(MARKS['LABEL'].findall(rest))}{rest}" for size, rest in counted))
     tiers: list[LabelTier] = []
     total = 0
     place = "the header"
@@ -59,7 +62,9 @@ def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
             for position in (f"{place}, interval {i + 1}" for i in range(count)):
                 start_s = require_time(_take(tokens, "number"), position, where)
                 end_s = require_time(_take(tokens, "number"), position, where) if kind == INTERVALS else start_s
-                labels.append(TimedLabel(start_s, end_s, _take(tokens, "text").replace('""', '"').strip(), position))
+                label = _take(tokens, "text").replace('""', '"').strip()
+                label = re.sub(r"\\(\S\S)", lambda pair: TRIGRAPHS.get(pair[1], pair[0]), label)
+                labels.append(TimedLabel(start_s, end_s, label, position))
             tiers += [find_tier(name, labels)] if kind == INTERVALS else []
         place = "what follows the last tier"
         if next(tokens, None) is not None:
@@ -172,7 +177,7 @@ def _read_elan(root: Element, where: str) -> list[LabelTier]:
         spans_s[each.get("ANNOTATION_ID")] = start_s, end_s
     for each in root.iter("REF_ANNOTATION"):
         owners[each.get("ANNOTATION_ID")] = each.get("ANNOTATION_REF")
-    tiers = []
+    tiers: list[LabelTier] = []
     for tier in root.iter("TIER"):
         name = tier.get("TIER_ID", "")
         texts: dict[str | None, list[str]] = defaultdict(list)
@@ -185,7 +190,8 @@ def _read_elan(root: Element, where: str) -> list[LabelTier]:
         rows = enumerate(sorted(timed, key=lambda row: (math.isnan(row[0][0]), row[0])), 1)
         labels = [TimedLabel(*span_s, text, f"tier {name!r}, annotation {number}") for number, (span_s, text) in rows]
         named = find_tier(name, labels, tier.get("PARTICIPANT") or "")
-        role = named.role or (OTHER if tier.get("PARENT_REF") else LINES if named.speaker else "")
+        is_part = any(each.name == tier.get("PARENT_REF") and each.is_said for each in tiers)
+        role = named.role or (OTHER if is_part else LINES if named.speaker else "")
         tiers.append(LabelTier(name, named.labels, role, named.speaker))
     return tiers
 

@@ -20,7 +20,8 @@ from __future__ import annotations
 import json
 import re
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from string import Template
@@ -70,15 +71,20 @@ def write_unity(path: Path, generation: Generation, source: Mapping[str, str], _
     """Write one clip, named as the recording, with a curve for each weight of the motion."""
     motion, name = generation.motion, Path(source.get("path", "")).stem or "speech"
     end_s = float(motion.time_s[-1])
-    curves = [line for weight in _list_weights(motion) for line in _list_curve(generation, weight)]
-    members = {"name": _quote(name), "curves": "\n".join(curves), "rate_hz": f"{motion.rate_hz:.9g}"}
+    curves = "".join(_format_curve(generation, weight) for weight in _list_weights(motion)).removesuffix("\n")
+    members = {"name": _quote(name), "curves": curves, "rate_hz": f"{motion.rate_hz:.9g}"}
     text = _fill_shipped("unity_clip.yaml", **members, end_s=f"{end_s:.6f}")
     path.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _fill_shipped(file: str, /, **members: str) -> str:
     """Return the text of a file of this package, with the members that it names."""
-    return Template(resources.files(__package__).joinpath(file).read_text(encoding="ascii")).substitute(members)
+    return _read_shipped(file).substitute(members)
+
+
+@cache
+def _read_shipped(file: str) -> Template:
+    return Template(resources.files(__package__).joinpath(file).read_text(encoding="ascii"))
 
 
 def _quote(name: str) -> str:
@@ -86,24 +92,17 @@ def _quote(name: str) -> str:
     return name if _PLAIN.fullmatch(name) else json.dumps(name, ensure_ascii=False)
 
 
-def _list_curve(generation: Generation, name: str) -> Iterator[str]:
+def _format_curve(generation: Generation, name: str) -> str:
     times_s, keys, steps = _choose_keys(generation, name, FULL, UNITY_DECIMALS, UNITY_TOLERANCE)
     slopes = np.diff(keys) / np.diff(times_s)
-    yield from ("  - curve:", "      serializedVersion: 2", "      m_Curve:")
+    rows, mode = "", f"{CONSTANT if steps else LINEAR}"
     for number, (time_s, key) in enumerate(zip(times_s.tolist(), keys.tolist(), strict=True)):
-        before, after = slopes[max(number - 1, 0)], slopes[min(number, len(slopes) - 1)]
-        yield from (
-            *("      - serializedVersion: 3", f"        time: {time_s:.6f}"),
-            f"        value: {key:.{UNITY_DECIMALS}f}",
-            f"        inSlope: {'Infinity' if steps else f'{before:.6g}'}",
-            f"        outSlope: {'Infinity' if steps else f'{after:.6g}'}",
-            *(f"        tangentMode: {CONSTANT if steps else LINEAR}", "        weightedMode: 0"),
-            *("        inWeight: 0.33333334", "        outWeight: 0.33333334"),
-        )
-    yield from ("      m_PreInfinity: 2", "      m_PostInfinity: 2", "      m_RotationOrder: 4")
-    attribute = f"blendShape.{name}"
-    yield f"    attribute: {_quote(attribute)}"
-    yield from ("    path: ", f"    classID: {RENDERER}", "    script: {fileID: 0}")
+        sides = (max(number - 1, 0), min(number, len(slopes) - 1))
+        before, after = ("Infinity" if steps else f"{slopes[side]:.6g}" for side in sides)
+        members = {"time_s": f"{time_s:.6f}", "value": f"{key:.{UNITY_DECIMALS}f}", "before": before, "after": after}
+        rows += _fill_shipped("unity_key.yaml", **members, mode=mode)
+    attribute = _quote(f"blendShape.{name}")
+    return _fill_shipped("unity_curve.yaml", keys=rows, attribute=attribute, path="", kind=f"{RENDERER}")
 
 
 def check_godot(motion: Motion) -> None:
@@ -117,22 +116,15 @@ def check_godot(motion: Motion) -> None:
 def write_godot(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write one resource with a track for each weight of the motion."""
     motion = generation.motion
-    lines = [
-        *('[gd_resource type="Animation" format=3]', "", "[resource]", 'resource_name = "speech"'),
-        *(f"length = {float(motion.time_s[-1]):.9g}", f"step = {1 / motion.rate_hz:.6g}"),
-    ]
+    length, step = f"{float(motion.time_s[-1]):.9g}", f"{1 / motion.rate_hz:.6g}"
+    text = _fill_shipped("godot_animation.txt", length=length, step=step)
     for number, name in enumerate(_list_weights(motion)):
         times_s, values, steps = _choose_keys(generation, name, 1.0, GODOT_DECIMALS, GODOT_TOLERANCE)
         rows = zip(times_s, values, strict=True)
         keys = ", ".join(f"{time_s:.9g}, 1, {value:.{GODOT_DECIMALS}g}" for time_s, value in rows)
-        track = f"tracks/{number}"
-        lines += [
-            *(f'{track}/type = "blend_shape"', f"{track}/imported = false", f"{track}/enabled = true"),
-            f"{track}/path = NodePath({json.dumps(f'{NODE}:{name}', ensure_ascii=False)})",
-            *(f"{track}/interp = {0 if steps else 1}", f"{track}/loop_wrap = false"),
-            f"{track}/keys = PackedFloat32Array({keys})",
-        ]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+        node = json.dumps(f"{NODE}:{name}", ensure_ascii=False)
+        text += _fill_shipped("godot_track.txt", number=f"{number}", node=node, interp=f"{int(not steps)}", keys=keys)
+    path.write_text(text, encoding="utf-8", newline="\n")
 
 
 _WEIGHTS: dict[str, Any] = {"needs": (WEIGHT,), "curves": "face", "other_curves": True, "keyed": True}
@@ -195,11 +187,8 @@ def measure_mouth_form(generation: Generation) -> Array:
 
 def _sum_effects(motion: Motion, effects: Array) -> Array:
     """Return the sum of the effects of blendshapes by their weights [shape=(T,)]."""
-    total = np.zeros(len(motion.values))
-    for name, effect in zip(arkit_mouth().known, effects, strict=True):
-        if name in motion.names:
-            total += effect * motion[name]
-    return total
+    known = zip(arkit_mouth().known, effects, strict=True)
+    return sum((effect * motion[name] for name, effect in known if name in motion.names), np.zeros(len(motion.values)))
 
 
 LIVE2D = MotionFormat(write_live2d, needs=SHOWING, min_frames=2, mouth=True)

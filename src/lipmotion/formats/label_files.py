@@ -295,7 +295,7 @@ def _choose_tiers(tiers: list[LabelTier], where: str, tier: str = "", speaker: s
         same = (WORDS, LINES, "", OTHER) if named.role in (WORDS, LINES) else (PHONE_LABELS,)
         others = [each for each in tiers if each.role not in same and each.speaker == named.speaker]
         return [map_to_inventory(named, where), *(each for each in others if each.role and each.name != named.name)]
-    return [each for each in tiers if each.role != OTHER]
+    return [each for each in tiers if each.role != OTHER and each.is_said]
 
 
 def _refuse(kind: str, name: str, known: list[str], where: str) -> list[LabelTier]:
@@ -364,15 +364,12 @@ def _check_no_labels(text: str, where: str) -> None:
     """Raise InputError for labels, subtitles and documents in forms that are not read."""
     start, match = text[:200].lstrip(), SUBTITLES["NO_ARROW"].search(text)
     line = shorten(match[0].strip()) if match else ""
-    lines = numbered = timed_lines = with_two = 0
     header = re.search(r"^#$", text[:2000], re.MULTILINE)  # of ESPS
     body = (each.strip() for each in StringIO(text[header.end() if header else 0 :]))
-    for each in islice(filter(None, body), JUDGED_LINES):
-        lines += 1
-        numbered += MARKS["NUMBERED"].match(each) is not None
-        timed_lines += MARKS["TIME"].match(each) is not None
-        with_two += sum(1 for _, _ in zip(MARKS["TIME"].finditer(each), "12", strict=False)) > 1
-    seems_timed = lines > 1 and ((2 * numbered > lines and timed_lines > 0) or 2 * with_two >= lines)
+    lines = list(islice(filter(None, body), JUDGED_LINES))
+    numbered, timed_lines = (sum(bool(MARKS[name].match(each)) for each in lines) for name in ("NUMBERED", "TIME"))
+    with_two = sum(len(list(islice(MARKS["TIME"].finditer(each), 2))) > 1 for each in lines)
+    seems_timed = len(lines) > 1 and ((2 * numbered > len(lines) and timed_lines > 0) or 2 * with_two >= len(lines))
     clock = "00:00:01,000 --> 00:00:02,500"
     timed = "its lines hold times, but not as in a TextGrid, HTK's or Audacity's labels"
     forms = {

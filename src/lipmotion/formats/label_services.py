@@ -17,7 +17,7 @@ from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -42,7 +42,7 @@ from lipmotion.types import values
 from lipmotion.types.values import parse_clock, parse_number, require
 from lipmotion.units import SILENCE
 from lipmotion.units.spelling import parse_table, read_patterns, read_table
-from lipmotion.units.spoken_text import check_word_count, extract_spoken_text
+from lipmotion.units.spoken_text import extract_spoken_text
 from lipmotion.units.text_normalisation import find_words
 
 LOG = logging.getLogger("lipmotion")
@@ -211,9 +211,8 @@ def _parse_time(value: Any, where: str, per_s: float = 1) -> float:
 
 def _read_row(item: dict[str, Any], place: str, where: str, name: str, owner: Row | None, who: str) -> Row | None:
     """Return an item with its text and the times that it has; None: it has no text."""
-    text = next(
-        (text for name in NAMES["texts"] if name in item and (text := _find_text(item[name])) is not None), None
-    )
+    texts = (_find_text(item[name]) for name in NAMES["texts"] if name in item)
+    text = next((each for each in texts if each is not None), None)
     is_phone = name in NAMES["phones"] or ({"phone", "phoneme"} & {*item} and "word" not in item)
     role = PHONE_LABELS if is_phone else WORDS if "word" in item or name in NAMES["words"] else ""
     if text is None and any(item.get(name) for name in ("text", "word")):
@@ -281,7 +280,7 @@ def _collect_rows(
     if isinstance(value, list):
         for number, each in enumerate(value[:1] if name in NAMES["alternatives"] else value, 1):
             item = _read_stamp(each) or each
-            if isinstance(item, dict):
+            if isinstance(item, dict | list):
                 at = f"{place}, {name or 'item'} {number}".strip(", ")
                 _collect_rows(item, lists, where, at, path, owner, who)
             elif name in ("segments", "words"):
@@ -315,7 +314,7 @@ def _list_items(item: dict[str, Any], where: str) -> dict[str, Any]:
             raise InputError(f"{where}: required are the lists {', '.join(members)}, all of one length")
         check_count(len(lists[0]), where)
         items = [dict(zip(members.values(), row, strict=True)) for row in zip(*lists, strict=True)]
-        return {**{key: each for key, each in item.items() if key not in members}, name: items}
+        item = {**{key: each for key, each in item.items() if key not in members}, name: items}
     stamps: list[Any] = next((item[name] for name in NAMES["stamps"] if isinstance(item.get(name), list)), [])
     if stamps and all(isinstance(stamp, list) and len(stamp) == 2 for stamp in stamps):
         text, words = str(item.get("text") or item.get("textseg")), item.get("words")
@@ -415,6 +414,8 @@ def _read_stamp(item: Any) -> dict[str, Any]:
 def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     """Return lists of items in time: the phones, and what each speaker says; None: there are none."""
     lists: Lists = defaultdict(list)
+    if all("sentence" in str(item.get("type")).lower() for _, item in objects):  # without words beside them
+        objects = [(place, {**item, "type": "word"}) for place, item in objects]
     for place, item in objects:
         _collect_rows(item, lists, where, place if len(objects) > 1 else "")
     begun = {row.place.partition(",")[0] for rows in lists.values() for row in rows if row.times.kind == "sentence"}
@@ -453,6 +454,12 @@ def _build_spoken_tiers(spoken: list[Row], where: str, *, may_be_phones: bool) -
     by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
     for each, label in zip(spoken, _scale_rows(spoken, role, where), strict=True):
         by_speaker[each.speaker or (each.parts[0].speaker if each.parts else "")].append(label)
+    for labels in by_speaker.values():
+        pairs = pairwise(each for each in labels if not math.isnan(each.start_s))
+        back = next((after for before, after in pairs if after.start_s < before.start_s - ROUNDING_S), None)
+        if back and where:
+            what = "before the one ahead of it; all are put in order of time: correct it if those of pieces begin anew"
+            LOG.warning("%s: %s starts at %.2f s, %s", where, back.position, back.start_s, what)
     if may_be_phones and not has_parts and not any(each.role == WORDS for each in spoken):
         role = PHONE_LABELS if all(holds_phones(LabelTier("", tuple(each))) for each in by_speaker.values()) else role
     return [LabelTier(who or role, tuple(labels), role, who) for who, labels in by_speaker.items()]
@@ -461,7 +468,7 @@ def _build_spoken_tiers(spoken: list[Row], where: str, *, may_be_phones: bool) -
 def _choose_role(spoken: list[Row], where: str) -> str:
     """Return whether rows are words or lines. Raises InputError: they hold more words than a recording has."""
     counts = [len(find_words(extract_spoken_text(each.text[:LONGEST_JUDGED]))) for each in spoken]
-    check_word_count(sum(counts) + sum(len(each.parts) for each in spoken), where)
+    check_count(sum(counts) + sum(len(each.parts) for each in spoken), where, "words")
     single = sum(each.role == WORDS or count < 2 for each, count in zip(spoken, counts, strict=True))
     return LINES if single < SINGLE_SHARE * len(spoken) or any(each.parts for each in spoken) else WORDS
 

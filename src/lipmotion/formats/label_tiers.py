@@ -23,7 +23,6 @@ from lipmotion.units.phones import CLOSURES, REDUCED_VOWELS, SHORT_PAUSE_S
 from lipmotion.units.spelling import read_patterns, read_table
 from lipmotion.units.spoken_text import (
     SpokenAs,
-    check_word_count,
     classify_label,
     extract_spoken_text,
     find_speaker_names,
@@ -42,11 +41,12 @@ SPEAKERS = (r"(?P<speaker>.+?)\s*[-_/:]\s*(?:words?|phones?|phonemes?)", r"[^@]+
 PHONES_SHARE = 0.75  # a tier of which this share of the labels are phones is one of phones; the other labels are errors
 SHARED_TIME = 0.5
 """Tiers of unknown kinds of which so much is at the same time are versions of one text; else they are of speakers."""
+SHORTEST_PAUSE_S = 0.0101  # Azure writes gaps of 10 ms between phones that follow each other
 ROUNDING_S = 1e-3  # times may differ by this much: they are written with three digits or more
 WHOLE_WORD_S = 0.03  # a span of unknown phones whose ends are so near to those of a word is all of it
 GLOTTAL_STOP = "q"  # TIMIT's: a sound of the throat, with any lips
 RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")  # a phone or unit, and its confidence
-MAX_LABELS = 250_000  # most labels of a file: phones of five hours of speech
+MAX_LABELS, MAX_WORDS = 250_000, 500_000  # most of a file: phones of five hours of speech, words of twelve
 TYPICAL_PHONE_S, TYPICAL_WORD_S = 0.08, 0.3  # how long a phone, and a word, alone or of a line, last
 LONGEST_WORD_S = 100.0  # a single word that lasts longer than this is in another unit
 UNIT_LIMITS = ((150, 1), (6000, 1000), (300_000, 0), (3_200_000, 1_000_000))
@@ -90,6 +90,11 @@ class LabelTier:
     role: str = ""
     speaker: str = ""
 
+    @property
+    def is_said(self) -> bool:
+        """Whether labels may be words: not where all are names of lines (``f000001``, ``ABC_NARR_001``)."""
+        return not (self.labels and all(MARKS["identifier"].fullmatch(label.text) for label in self.labels))
+
 
 def find_tier(name: str, labels: Sequence[TimedLabel], speaker: str = "") -> LabelTier:
     """Return a tier in order of time whose name says what it holds and perhaps who speaks."""
@@ -102,10 +107,11 @@ def find_tier(name: str, labels: Sequence[TimedLabel], speaker: str = "") -> Lab
     return LabelTier(name, tuple(in_time), role, speaker or (owner["speaker"].strip() if owner else ""))
 
 
-def check_count(count: int, where: str) -> None:
-    """Raise InputError for more labels than a recording has."""
-    if count > MAX_LABELS:
-        raise InputError(f"{where}: more than {MAX_LABELS} labels; give those of one recording")
+def check_count(count: int, where: str, what: str = "labels") -> None:
+    """Raise InputError for more labels, or ``words``, than a recording has."""
+    most = MAX_WORDS if what == "words" else MAX_LABELS
+    if count > most:
+        raise InputError(f"{where}: more than {most} {what}; give those of one recording")
 
 
 def require_time(text: str, place: str, where: str) -> float:
@@ -203,7 +209,7 @@ def attach_words(units: Timeline[Unit], labels: Sequence[TimedLabel]) -> Timelin
         if inside and span.label.unit == UNKNOWN_PHONES:
             edges = (span.start_s - timed[place].start_s, span.end_s - timed[place].end_s)
             inside = max(map(abs, edges)) <= WHOLE_WORD_S
-        word = timed[place].text if inside else ""
+        word = timed[place].text.strip() if inside else ""
         spoken_word = word if is_line(word) and classify_label(word) is SpokenAs.SPEECH else ""
         again = place > before and bool(spans) and spoken_word == spans[-1].label.word != ""
         spans.append(replace(span, label=replace(span.label, word=spoken_word, again=again)))
@@ -220,19 +226,33 @@ def read_transcript_tier(tiers: Sequence[LabelTier], where: str) -> TimedTranscr
     lines: list[TranscriptLine] = []
     count = 0
     for tier in tiers:
-        for label in tier.labels:
+        for label in join_pieces(tier.labels):
             place = f"{where}: {label.position}"
             start_s, end_s = _find_times(label, where)
             words: list[TimedWord] = []
-            for part in label.parts or (label,):
+            for part in join_pieces(label.parts or (label,)):
                 text = extract_spoken_text(part.text, names) if classify_label(part.text) is SpokenAs.SPEECH else ""
                 single = not tier.role and len(read_line_words(text, place)) == 1
                 timed = bool(label.parts) or tier.role == WORDS or single
                 words += time_words(text, *(_find_times(part, where) if timed else (None, None)), where=place)
             lines.append(TranscriptLine(tuple(words), start_s, end_s))
             count += len(words)
-            check_word_count(count, where)
+            check_count(count, where, "words")
     return sort_lines(lines)
+
+
+def join_pieces(labels: Sequence[TimedLabel]) -> list[TimedLabel]:
+    """Return labels, of which pieces of a word are one: single ones without a blank before them, if others have one."""
+    starts = sum(label.text[:1] == " " for label in labels)
+    single = all(len(label.text.split()) < 2 and not label.parts for label in labels)
+    in_pieces = single and 1 < starts < len(labels) < 3 * starts
+    joined: list[TimedLabel] = []
+    for label in labels:
+        if in_pieces and joined and label.text[:1] != " ":
+            joined[-1] = replace(joined[-1], end_s=label.end_s, text=joined[-1].text + label.text)
+        else:
+            joined.append(label)
+    return joined
 
 
 def _find_times(label: TimedLabel, where: str) -> tuple[float | None, float | None]:
@@ -383,6 +403,8 @@ def split_ipa(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
 
 def map_to_inventory(tier: LabelTier, where: str) -> LabelTier:
     """Return a tier; phones in X-SAMPA or IPA become those of the inventory. Raises InputError: as ``split_ipa``."""
+    if not tier.role and find_spelling([each.text for each in tier.labels if to_phone(each.text) != SILENCE]):
+        tier = replace(tier, role=PHONE_LABELS)
     labels = tier.labels if tier.role == PHONE_LABELS else ()
     names = {label.text.removeprefix("viseme_") for label in tier.labels} - {""}
     if {"X"} < names <= set("ABCDEFGHX"):
@@ -420,8 +442,10 @@ def add_pauses(phones: Sequence[TimedLabel]) -> tuple[TimedLabel, ...]:
     filled: list[TimedLabel] = []
     for label in phones:
         gap_s = label.start_s - filled[-1].end_s if filled else 0.0
-        if gap_s > ROUNDING_S:
+        if gap_s > SHORTEST_PAUSE_S:
             filled.append(replace(label, start_s=filled[-1].end_s, end_s=label.start_s, text=SILENCE))
+        elif gap_s > ROUNDING_S:
+            filled[-1] = replace(filled[-1], end_s=label.start_s)
         filled.append(label)
     is_silence = [classify_label(label.text) is SpokenAs.SILENCE for label in filled]
     for number in range(1, len(filled) - 1):

@@ -212,10 +212,8 @@ DEEPEST, MAX_FRAMES = 6, 1 << 22
 def write_audio2face(path: Path, generation: Generation, source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write one JSON object; blendshapes that the motion does not have are 0."""
     motion = generation.motion
-    table = np.zeros((len(motion.values), len(ARKIT_52)))
-    for column, name in enumerate(ARKIT_52):
-        if name in motion.names:
-            table[:, column] = motion[name]
+    still = np.zeros(len(motion.values))
+    table = np.stack([motion[name] if name in motion.names else still for name in ARKIT_52], axis=1)
     before = {RATE: motion.rate_hz, SOUND: source.get("path", ""), POSES: len(ARKIT_52), FRAMES: len(table)}
     write_json(path, before | {NAMES: list(ARKIT_52)}, WEIGHTS, table, {})
 

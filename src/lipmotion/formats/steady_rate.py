@@ -196,8 +196,9 @@ def _name_spans(spans: Sequence[tuple[float, float]]) -> str:
 
 
 def _channel(name: str, unit: str) -> Channel:
-    if name.endswith(ANGLES):
-        return Channel(name[:1].lower() + name[1:], RADIAN)
+    if angle := re.fullmatch(rf"(.*?)(eye)?({'|'.join(ANGLES)})", name, re.IGNORECASE):
+        part, eye = angle[1][:1].lower() + angle[1][1:], (angle[2] or "").title()
+        return Channel(f"{part}{eye}{angle[3].title()}", RADIAN)
     return Channel(to_arkit(name) or name, WEIGHT if is_known(name) else unit)
 
 

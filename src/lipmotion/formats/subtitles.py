@@ -120,7 +120,7 @@ def _read_lyrics(text: str, where: str) -> Iterator[TimedLabel]:
 def _read_cues(text: str, where: str) -> Iterator[TimedLabel]:
     cue, lines, count = None, list[str](), 0
     for number, row in enumerate(StringIO(text), 1):
-        line = row.rstrip("\r\n")
+        line = MARKS["LOOSE"].sub(r"\1", row.rstrip("\r\n")) if "-->" in row else row.rstrip("\r\n")
         times = (MARKS["TIMES"].fullmatch(line) or MARKS["SBV"].fullmatch(line)) if ":" in line else None
         if times is None and (MARKS["CUE"].match(line) or MARKS["NO_ARROW"].match(line)):
             wanted = "00:00:01,000 --> 00:00:02,500"
@@ -153,13 +153,8 @@ def _join_shown(lines: list[str]) -> str:
 
 def _drop_repetitions(cues: list[TimedLabel]) -> list[TimedLabel]:
     """Return cues without the lines that captions that scroll repeat."""
-    plain = [
-        tuple(
-            extract_spoken_text(" ".join(MARKS["WORD_TIME"].sub("", line).split())).strip()
-            for line in cue.text.split("\n")
-        )
-        for cue in cues
-    ]
+    untimed = ([" ".join(MARKS["WORD_TIME"].sub("", line).split()) for line in cue.text.split("\n")] for cue in cues)
+    plain = [tuple(extract_spoken_text(line).strip() for line in lines) for lines in untimed]
     bridges = sum(
         cue.end_s - cue.start_s < BRIDGE_S and shown[-len(lines) :] == lines
         for cue, lines, shown in zip(cues[1:], plain[1:], plain, strict=False)

@@ -112,11 +112,9 @@ def timecode(time_s: float) -> str:
 def write_take(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write a header and one line a frame; curves that the motion does not have are 0."""
     motion = generation.motion
-    table = np.zeros((len(motion.values), len(CURVES)))
-    names = {name[:1].upper() + name[1:]: column for column, name in enumerate(motion.names)}
-    for column, name in enumerate(CURVES):
-        if name in names:
-            table[:, column] = motion.values[:, names[name]]
+    still = np.zeros(len(motion.values))
+    curves = {name[:1].upper() + name[1:]: motion[name] for name in motion.names}
+    table = np.stack([curves.get(name, still) for name in CURVES], axis=1)
     form = ",".join([f"%.{TAKE_DECIMALS}f"] * len(CURVES))
     with path.open("w", encoding="ascii", newline="\n") as file:
         file.write(",".join([*BEFORE_CURVES, *CURVES]) + "\n")
@@ -187,14 +185,13 @@ def _read_rows(
     times: list[tuple[int, str]] = []
     faces: list[int] = []
     numbers = array("d")
-    columns = len(names)
     for line, fields in rows:
         times.append((line, fields[timed].strip() if timed < len(fields) else ""))
         curves = [fields[column] for column in used if column < len(fields)]
         if not any(map(str.strip, curves)) or any(is_unseen(f, flags[n]) for n, f in enumerate(fields) if n in flags):
             continue
-        if len(fields) != columns:
-            count = len(fields) - columns + len(used)
+        if len(fields) != len(names):
+            count = len(fields) - len(names) + len(used)
             raise ValueError(f"line {line} has {count} curves, required {len(used)}; delete it if it is the last")
         if not faces:
             texts = [column for column in used if _is_text(fields[column], names[column])]
@@ -277,6 +274,8 @@ def _read_timecodes(codes: list[tuple[int, float, str]]) -> Array:
     if mark == ".":
         time_s = seconds + frames
     else:
+        counts = np.unique(frames)  # some programs count from 1
+        frames = frames - (counts[-1] in TIMECODE_RATES and np.array_equal(counts, np.arange(1, counts[-1] + 1)))
         passed = np.flatnonzero(np.diff(seconds) == 1)
         last = int(frames[passed].max() if len(passed) == 1 else frames.max())
         if last >= TIMECODE_RATES[-1]:

@@ -18,9 +18,10 @@ from lipmotion.errors import InputError
 from lipmotion.formats.base import MotionFormat, list_key_frames
 from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, gaze_to_weights, weights_to_gaze
 from lipmotion.meshes.model.mesh import ANGLES, find_head_angles, turn_head
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, CLOSED, VRM_VOWELS, find_vowel, to_arkit
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_VOWELS, find_vowel, to_arkit
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit
 from lipmotion.types.motion import RADIAN
+from lipmotion.units.spelling import read_table
 
 Keys = Sequence[tuple[int, float]]  # frames and values
 Turns = Sequence[tuple[int, tuple[float, float, float, float]]]  # frames and rotations, as quaternions x, y, z, w
@@ -36,13 +37,7 @@ LINEAR = bytes.fromhex(
 )
 """The bytes of a bone's key that say: straight on to the next one."""
 LAST_FRAME = 86_400 * 30  # frames of a day
-MORPHS: Mapping[str, tuple[str, ...]] = {
-    **{morph: (name,) for morph, name in zip("あいうえおん", (*VRM_VOWELS, CLOSED), strict=True)},
-    "まばたき": ("eyeBlinkLeft", "eyeBlinkRight"),
-    "上": ("browInnerUp",),
-    "下": ("browDownLeft", "browDownRight"),
-    "びっくり": ("eyeWideLeft", "eyeWideRight"),
-}
+MORPHS = {morph: tuple(channels.split()) for morph, channels in read_table("vmd_morphs").items()}
 """The standard morphs of models, and the channels whose mean each is: vowels, pressed lips, blinks, raised brows; of
 moods, lowered brows and wide eyes."""
 HEAD, EYES = "頭", "両目"  # the bones of the head, and of both eyes

@@ -67,7 +67,7 @@ def parse_number(
 
 def parse_clock(text: str, frames_per_s: float = 0) -> float:
     """Return the seconds of a time as 1:02:03.5, 2:03,5 or, if frames have a rate, 00:02:03:12; NaN: another text."""
-    match = re.fullmatch(rf"{_CLOCK}(?::(\d+(?:\.\d+)?))?", text.strip())
+    match = re.fullmatch(rf"{_CLOCK}(?:[:;](\d+(?:\.\d+)?))?", text.strip())
     if match is None or (match[4] and not frames_per_s):
         return math.nan
     seconds = float(match[3].replace(",", ".")) + float(match[4] or 0) / (frames_per_s or 1)

@@ -29,7 +29,6 @@ MARKS = read_patterns(Path(__file__).with_name("tables") / "spoken_forms.tsv")
 WORDS = {name: frozenset(words.split()) for name, words in read_table("spoken_words").items()}
 """Words by what they are in texts and labels: of silence, of speech that is not known, no names, ..."""
 LONGEST_LINE = 1 << 18  # maximum characters of a line: a label may hold four hours of speech
-MAX_WORDS = 500_000  # maximum words of a transcript: twelve hours of the fastest speech on record
 
 
 class SpokenAs(Enum):
@@ -157,12 +156,6 @@ def time_words(
         first, done = done, done + len(reading)
         timed.append(TimedWord(word, *(start_s + (end_s - start_s) * share / letters for share in (first, done))))
     return timed
-
-
-def check_word_count(count: int, where: str) -> None:
-    """Raise InputError for more words than a recording has."""
-    if count > MAX_WORDS:
-        raise InputError(f"{where}: more than {MAX_WORDS} words; give those of one recording")
 
 
 LOG = logging.getLogger("lipmotion")

@@ -13,10 +13,7 @@ from lipmotion.units.spelling import read_table
 REDUCED = frozenset(FULL_FORMS)
 """Vowels, and consonants in the place of a vowel, that are not stressed in a word with a full vowel."""
 NUCLEI = list_phone_classes()["vowel"] | REDUCED  # the phones that make a syllable
-UNSTRESSED_WORDS = WEAK_WORDS | frozenset(
-    "am are as at be been by can could did do does had has have he him his i me my or our shall she should so some "
-    "them they to us we will with would you".split()
-)
+UNSTRESSED_WORDS = WEAK_WORDS | {*read_table("spoken_words")["unstressed"].split()}
 """Words of one syllable that are unstressed in running speech."""
 PATTERNS = {pattern: int(place) for pattern, place in read_table("stress_patterns").items()}
 """The full (F) and reduced (x) vowels of a word, and the number of its stressed one."""

@@ -15,11 +15,7 @@ Reading = tuple[str, ...]
 Forms = tuple[tuple[str, str | Callable[[str], Iterator[str]]], ...]
 
 MAX_READINGS = 8  # most readings of a form: alignment tries each
-ONES = (
-    "zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen "
-    "seventeen eighteen nineteen"
-).split()
-TENS = "_ _ twenty thirty forty fifty sixty seventy eighty ninety".split()
+ONES, TENS = (words.split() for words in read_table("number_words").values())
 SCALES = ((10**9, "billion"), (10**6, "million"), (1000, "thousand"), (100, "hundred"))
 MONTHS = "january february march april may june july august september october november december".split()
 _MONTHS = {name[:3]: name for name in MONTHS}
