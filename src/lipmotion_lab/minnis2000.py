@@ -185,7 +185,8 @@ def _measure_list(
     @cache
     def speak(condition: str, by_own_recogniser: bool) -> list[Speech]:
         listening = SelectionConfig(joint_recogniser=by_own_recogniser)
-        return make_speech(recordings, condition, SelectionEngine(listening), _simplify_model(model.learned, listening))
+        engine, learned = SelectionEngine(listening), _simplify_model(model.learned, listening)
+        return [each.with_arrays() for each in make_speech(recordings, condition, engine, learned)]
 
     @cache
     def find_overlaps(condition: str) -> list[NDArray[np.bool_]]:
