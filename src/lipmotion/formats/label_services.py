@@ -449,21 +449,17 @@ def _build_spoken_tiers(spoken: list[Row], where: str, *, may_be_phones: bool) -
         spoken = spoken[half:]
     if any(len({part.speaker for part in row.parts}) > 1 for row in spoken):
         spoken = [part for row in spoken for part in row.parts or (row,)]
-    role, has_parts = _choose_role(spoken, where), any(each.parts for each in spoken)
+    has_parts = any(each.parts for each in spoken)
+    counts = [len(find_words(extract_spoken_text(each.text[:LONGEST_JUDGED]))) for each in spoken]
+    check_word_count(sum(counts) + sum(len(each.parts) for each in spoken), where)
+    single = sum(each.role == WORDS or count < 2 for each, count in zip(spoken, counts, strict=True))
+    role = LINES if has_parts or single < SINGLE_SHARE * len(spoken) else WORDS
     by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
     for each, label in zip(spoken, _scale_rows(spoken, role, where), strict=True):
         by_speaker[each.speaker or (each.parts[0].speaker if each.parts else "")].append(label)
     if may_be_phones and not has_parts and not any(each.role == WORDS for each in spoken):
         role = PHONE_LABELS if all(holds_phones(LabelTier("", tuple(each))) for each in by_speaker.values()) else role
     return [LabelTier(who or role, tuple(labels), role, who) for who, labels in by_speaker.items()]
-
-
-def _choose_role(spoken: list[Row], where: str) -> str:
-    """Return whether rows are words or lines. Raises InputError: they hold more words than a recording has."""
-    counts = [len(find_words(extract_spoken_text(each.text[:LONGEST_JUDGED]))) for each in spoken]
-    check_word_count(sum(counts) + sum(len(each.parts) for each in spoken), where)
-    single = sum(each.role == WORDS or count < 2 for each, count in zip(spoken, counts, strict=True))
-    return LINES if single < SINGLE_SHARE * len(spoken) or any(each.parts for each in spoken) else WORDS
 
 
 def _extend_to_next(rows: list[Row], silences: Iterable[float]) -> list[Row]:

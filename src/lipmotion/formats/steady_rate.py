@@ -145,7 +145,12 @@ def resample_rows(
     Raises InputError: a row goes far back, too many are left out, no rows, or most of the time has none.
     """
     ordered = _find_ordered(time_s)
-    time_s, values = _from_beginning(time_s[ordered], values[ordered])
+    time_s, values = time_s[ordered], values[ordered]
+    steps = np.diff(time_s)
+    step_s = float(steps[steps < 1.5 * np.median(steps)].mean()) if len(steps) else np.inf
+    late = round(time_s[0] / step_s) if step_s < time_s[0] <= LATEST_START_S else 0  # as where pictures have no face
+    time_s = np.concatenate([time_s[0] - step_s * np.arange(late, 0, -1), time_s])
+    values = np.pad(values, ((late, 0), (0, 0)), constant_values=np.nan)
     measured: NDArray[np.bool_] = np.asarray(np.isfinite(values).any(axis=0))
     if not measured.any():
         raise InputError("0 rows with values, required two or more")
@@ -180,15 +185,6 @@ def resample_rows(
         values[np.ix_((np.arange(len(seen)) < first) | (np.arange(len(seen)) > last), weights)] = 0.0
     rows, rate_hz = resample_evenly(time_s, np.concatenate([values, seen[:, None]], axis=1))
     return Motion(rows[:, :-1], rate_hz, tuple(channels)), rows[:, -1] > 0.5
-
-
-def _from_beginning(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """Return times and rows with empty rows before those that begin late, as where pictures have no face."""
-    steps = np.diff(time_s)
-    step_s = float(steps[steps < 1.5 * np.median(steps)].mean()) if len(steps) else np.inf
-    count = round(time_s[0] / step_s) if step_s < time_s[0] <= LATEST_START_S else 0
-    before_s = time_s[0] - step_s * np.arange(count, 0, -1)
-    return np.concatenate([before_s, time_s]), np.pad(values, ((count, 0), (0, 0)), constant_values=np.nan)
 
 
 def _name_spans(spans: Sequence[tuple[float, float]]) -> str:
