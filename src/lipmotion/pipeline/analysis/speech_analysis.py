@@ -417,8 +417,9 @@ def _complete_units(
     requested = cast("Timeline[Unit]", request.units)  # of ``read_request``
     _check_units(requested, audio.duration_s)
     spans, aligned, guessed = list[Span[Unit]](), list[str](), list[tuple[float, float]]()
-    for span in (_name_phone(span) for span in requested if span.start_s < audio.duration_s):
-        end_s = min(span.end_s, audio.duration_s)
+    for given in (span for span in requested if span.start_s < audio.duration_s):
+        phone = given.label.phone and require_phone(given.label.phone, f" in the units at {given.start_s:.2f} s")
+        span, end_s = replace(given, label=replace(given.label, phone=phone)), min(given.end_s, audio.duration_s)
         if span.label.phone or span.label.unit != UNKNOWN_PHONES:
             spans.append(replace(span, end_s=end_s) if span.end_s > audio.duration_s + LATE_S else span)
             continue
@@ -437,14 +438,6 @@ def _complete_units(
     if guessed:
         LOG.warning("the units do not say which phones are said at %s: they are recognised", format_places(guessed))
     return spans, guessed
-
-
-def _name_phone(span: Span[Unit]) -> Span[Unit]:
-    """Return a given unit with the phone by our name. Raises InputError: there is no such phone."""
-    if not span.label.phone:
-        return span
-    phone = require_phone(span.label.phone, f" in the units at {span.start_s:.2f} s")
-    return replace(span, label=replace(span.label, phone=phone))
 
 
 def _fill_open(
