@@ -5,6 +5,8 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ import lipmotion
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import write_labels
 from lipmotion.pipeline.analysis.read_request import read_request
+from lipmotion.pipeline.generation import _join_rows
 from lipmotion.pipeline.request import locate_paths
 from lipmotion.types import Audio, Constraints, Generation, Motion, Pin, Span, Timeline, Unit
 from lipmotion.units import Lexicon
@@ -76,6 +79,8 @@ def test_the_mouth_closes_on_p_b_m_and_rests_in_silence(move, toy_sentence):
     for span in toy_sentence.units:
         if span.label.phone in ("p", "b", "m"):
             assert opening[round(span.start_s * 100) : round(span.end_s * 100) + 1].min() < 0.01
+    for silence in (opening[: round(toy_sentence.units[0].end_s * 100) - 50], opening[-50:]):
+        assert silence.max() < 0.01
     assert move(units=Timeline((Span(0.0, 2.0, Unit("sil")),))).motion["opening"].max() < 0.01  # nothing is said
 
 
@@ -87,6 +92,17 @@ def test_where_nobody_speaks_the_mouth_does_not_twitch(toy_model, toy_sentence, 
         assert (np.abs(np.diff(silence, axis=0)).max(axis=0) < 0.02 * np.ptp(silence, axis=0)).all()  # of two poses
     pause = values[round((3.3 + sound.duration_s) * 100)] - values[round((3.05 + sound.duration_s) * 100)]
     assert np.abs(pause).max() < 1e-4  # one pose from end to end
+
+
+@pytest.mark.parametrize("gap", [-60, -30, 5, 50, 300])
+def test_between_passages_the_mouth_goes_from_pose_to_pose(gap):
+    """Passages have silence of their own at their ends, so that many lie over each other."""
+    parts: Any = [SimpleNamespace(first=150, frames=200), SimpleNamespace(first=350 + gap, frames=200)]
+    rows, rest = (np.full((200, 1), pose) for pose in (1.0, 3.0)), np.full((100, 1), 2.0)
+    joined = _join_rows(parts, rows, rest, np.empty((1000, 0)), resting=True)[:, 0]
+    assert (joined[0], joined[200], joined[450 + gap], joined[-1]) == pytest.approx((2, 1, 3, 2))
+    assert (joined.min(), joined.max()) == pytest.approx((1, 3))
+    assert np.abs(np.diff(joined)).max() < 0.15
 
 
 def test_pins_are_met_exactly(move, toy_sentence):

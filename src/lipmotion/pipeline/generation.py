@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import smooth_step
 from lipmotion.articulation.lip_points import make_symmetrical
 from lipmotion.articulation.rest import REST, rest_in_pauses
 from lipmotion.engines import Animator
@@ -352,15 +353,15 @@ def _join_rows(
         return np.broadcast_to(still.astype(like.dtype), (len(like), len(still)))
     joined = np.empty((len(like), len(still)), like.dtype)
     joined[:] = still
-    slow = SETTLING_FRAMES if resting else RAMP_FRAMES
 
     def fade(gap: int) -> tuple[int, int, NDArray[np.float64]]:
         """Return how long two passages are shown in the gap between them, in frames, and how the second one rises."""
-        outside = slow if gap >= 2 * slow else 0  # where nobody else speaks there
-        joins = resting and not outside  # one goes over into the other
-        frames = max(gap, 2 * RAMP_FRAMES) if joins else slow
-        rising = (1 - np.cos(np.pi * np.arange(1, frames + 1) / (frames + 1))) / 2
-        return ((gap + frames) // 2, (gap + frames + 1) // 2, rising) if joins else (outside, outside, rising)
+        frames = SETTLING_FRAMES if resting else RAMP_FRAMES
+        shown = 2 * frames if gap >= 2 * frames else 0  # where nobody else speaks there
+        if resting and not shown:  # one goes over into the other
+            frames = max(abs(gap), 2 * RAMP_FRAMES)  # below 0: both are silent there
+            shown = gap + frames
+        return shown // 2, (shown + 1) // 2, smooth_step(np.arange(1, frames + 1) / (frames + 1))
 
     edges = [-NOWHERE_S, *(edge for part in parts for edge in (part.first, part.first + part.frames)), NOWHERE_S]
     fades = [fade(int(after - before)) for before, after in zip(edges[::2], edges[1::2], strict=True)]

@@ -161,13 +161,6 @@ class GaussianStatistics:
         self.frames[visited] += sums[:, 0]
         self.moments[visited, 0] += sums[:, 1:]
 
-    def pool(self, groups: NDArray[np.intp], count: int) -> GaussianStatistics:
-        """Return the statistics of ``count`` groups of densities; ``groups`` is the group of each [shape=(G,)]."""
-        pooled = GaussianStatistics.zeros(count, self.moments.shape[1], self.moments.shape[2] // 2)
-        np.add.at(pooled.frames, groups, self.frames)
-        np.add.at(pooled.moments, groups, self.moments)
-        return pooled
-
 
 @dataclass(frozen=True, eq=False)
 class TiedDensities:

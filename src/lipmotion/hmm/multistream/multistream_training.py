@@ -342,8 +342,11 @@ def _tie_states(
         forest = grow_forest(
             name, hmm.inventory, questions, triphones, statistics[name], has_spaces=has_spaces, config=config
         )
-        of_leaves = statistics[name].pool(forest.leaves(triphones), forest.size)
-        untrained = make_standard_normals(forest.size, len(model.scale.mean), has_spaces)
+        groups, dimensions = forest.leaves(triphones), len(model.scale.mean)
+        of_leaves = GaussianStatistics.zeros(forest.size, 1, dimensions)
+        np.add.at(of_leaves.frames, groups, statistics[name].frames)
+        np.add.at(of_leaves.moments, groups, statistics[name].moments)
+        untrained = make_standard_normals(forest.size, dimensions, has_spaces)
         models[name] = StreamModel(model.scale, forest, untrained.reestimate(of_leaves, config.variance_floor))
         monitor(Progress("trees", step, len(hmm.models), step / len(hmm.models), float(forest.size)))
     return replace(hmm, models=models)

@@ -34,7 +34,7 @@ from lipmotion.speech.recognition.adaptation_estimation import estimate_adaptati
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.speaker_similarity import JUDGED_RECORDINGS, average_speaker
+from lipmotion.speech.sound.speaker_similarity import JUDGED_RECORDINGS, embed_speaker
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import (
@@ -195,7 +195,8 @@ def fit_phones(
     learning, labelling = sub_monitor(monitor, 0, 0.78, "learning phones: "), sub_monitor(monitor, 0.78, 1)
     phones = _train_phone_models(utterances, lexicon, recogniser, learning, checkpoint)
     judged = utterances[:: -(-len(utterances) // JUDGED_RECORDINGS)]
-    phones = replace(phones, speaker=average_speaker(analysed(utterance.audio) for utterance in judged))
+    vectors = [embed_speaker(analysed(utterance.audio)) for utterance in judged]
+    phones = replace(phones, speaker=np.mean(vectors, axis=0).astype(np.float32))
     examples: list[Example] = []
     skipped: dict[str, str] = {}
     labelled: list[tuple[Utterance, Timeline[Unit]]] = []

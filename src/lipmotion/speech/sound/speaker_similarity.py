@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -90,11 +89,6 @@ def embed_speaker(audio: AnalysedAudio) -> NDArray[np.float64]:
         return np.zeros(2 * COMPONENTS)
     rows = part.encoding[part.log_energy >= np.quantile(part.log_energy, QUIET_SHARE)].astype(float)
     return np.asarray((np.concatenate([rows.mean(axis=0), rows.std(axis=0)]) - centre) @ whitening, np.float64)
-
-
-def average_speaker(recordings: Iterable[AnalysedAudio]) -> NDArray[np.float32]:
-    """Return the mean speaker vector of recordings, for ``UnitHmm.speaker`` [shape=(2 · 64,)]."""
-    return np.mean([embed_speaker(audio) for audio in recordings], axis=0).astype(np.float32)
 
 
 def _find_passage(audio: AnalysedAudio) -> AnalysedAudio:
