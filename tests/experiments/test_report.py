@@ -206,7 +206,7 @@ def stored(name: str) -> Any:
 
 
 def figures_of(name: str) -> Any:
-    return stored({"engines": "engines-test", "minnis2000": "minnis2000-guide"}.get(name, name))
+    return stored({"engines": "engines-test"}.get(name, name))
 
 
 def section_of(name: str) -> Section:
