@@ -117,6 +117,8 @@ FORMS = {
     "24 in 32, a length of 0": riff(chunk(b"fmt ", long_form(24, 32)), chunk(b"data", S24_IN_32, 0), length=0),
     "a frame of no bytes": riff(chunk(b"fmt ", form(16, block=0, per_second=32_000)), SOUND),
     "a frame of too many bytes": riff(chunk(b"fmt ", form(16, block=4, per_second=32_000)), SOUND),
+    "frames of two samples": riff(chunk(b"fmt ", form(16, block=4)), SOUND),
+    "frames of too many bytes of 24": riff(chunk(b"fmt ", form(24, block=4)), chunk(b"data", samples(24, 24))),
     "a padded chunk of odd length": riff(chunk(b"fmt ", form()), chunk(b"_PMX", b"12345"), SOUND),
     "an odd chunk without its pad": riff(chunk(b"fmt ", form()), chunk(b"junk", b"12345", pad=False), SOUND),
     "RF64": riff(wide(len(S16)), chunk(b"fmt ", form()), chunk(b"data", S16, TO_THE_END), kind=b"RF64"),

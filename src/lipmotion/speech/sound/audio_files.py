@@ -36,10 +36,7 @@ PIECE_BYTES = 1 << 20  # sound is collected in pieces of this size, and without 
 
 
 def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
-    """Raise InputError for a sampling rate or a number of channels that no recorder has.
-
-    A wrong header could fill the memory: at a rate of 1 Hz, 16,000 samples are made out of one.
-    """
+    """Raise InputError for a sampling rate or channels that no recorder has: a wrong header could fill the memory."""
     if not LOWEST_HZ <= rate_hz <= HIGHEST_HZ:
         raise InputError(f"{name}: sampled at {rate_hz} Hz, required {LOWEST_HZ} to {HIGHEST_HZ}; {AGAIN}")
     if not 1 <= channels <= MAX_CHANNELS:
@@ -300,11 +297,10 @@ class _Wave(mmap.mmap):
 
 
 def _correct_wave(path: Path) -> tuple[_Wave | None, float, str]:
-    """Return a WAVE file under a header that FFmpeg understands, the seconds that its own states beyond its end, and
-    what else is wrong; None: its own header will do. Raises ValueError: the high byte comes first.
+    """Return a WAVE file under a header for FFmpeg (None: its own will do), the seconds that it lacks, and a note.
 
     FFmpeg reads samples of as many bits as are valid, without the zeros that fill their container; it loses its way at
-    a chunk of odd length that no byte follows, and reads one of several pieces of sound.
+    a chunk of odd length that no byte follows, and reads one of several pieces of sound. Raises ValueError: RIFX.
     """
     with path.open("rb") as file:
         kind = file.read(4)
@@ -318,19 +314,23 @@ def _correct_wave(path: Path) -> tuple[_Wave | None, float, str]:
         return None, 0.0, ""
     coding, channels, rate_hz, per_second, block, bits = struct.unpack_from("<HHIIHH", form)
     valid, missing = bits, 0 if size in UNKNOWN_SIZES else max(body + size - len(content), 0)
+    size = min(size or len(content), len(content) - body)
     missing_s = missing / max(per_second, 1)
     if coding == EXTENSIBLE:
         valid, coding = struct.unpack_from("<H4xH", form, 18) if len(form) >= 40 else (-1, PCM)
     min_frame = -(-bits // 8) * channels
     frame = block if block * rate_hz == per_second and block >= min_frame else min_frame
-    if not channels or frame % channels:
+    if not (channels and frame) or frame % channels:
         return None, missing_s, note
     if is_plain := coding in {PCM, FLOAT}:
+        spans = np.frombuffer(content, np.uint8, size // frame * frame, body).reshape(-1, frame // channels)
+        if bits and spans[:, : (frame - min_frame) // channels].any():  # no zeros fill a container
+            note = f"its header states {frame} bytes a frame, and its samples fill {min_frame}: so many are read"
+            frame, rewritten = min_frame, True
         container = 8 * frame // channels
         form = struct.pack("<HHIIHH", coding, channels, rate_hz, frame * rate_hz, frame, container)
     if not rewritten and (not is_plain or (bits == container and valid in {0, container})):
         return None, missing_s, note
-    size = min(size or len(content), len(content) - body)
     lengths = [min(length, 0xFFFFFFFF) for length in (20 + len(form) + size, size)]
     header = struct.pack("<4sI8sI", b"RIFF", lengths[0], b"WAVEfmt ", len(form)) + form
     header += struct.pack("<4sI", b"data", lengths[1])
