@@ -91,7 +91,7 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
     for name in ("RECORDING", "DATED", "STAMP"):
         text = leave_out_marks(name, text)
     speakers = find_speaker_names([text]) if names is None else names
-    for name in ("NUMBER", "BARE_NUMBER", "ASKED"):
+    for name in ("NUMBER", "BARE_NUMBER", "ASKED", "DASHED"):
         text = leave_out_marks(name, text)
     cues = list(MARKS["CUE"].finditer(text))
     if len(cues) > 1 or any("(" in cue[1] for cue in cues):
@@ -106,8 +106,9 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
 
 def _mark_lines(name: str, matches: list[re.Match[str]], text: str) -> bool:
     """Return whether what was found of a pattern at the starts of lines are names, times or numbers of the lines."""
+    rows = text.split("\n")
     if name == "RECORDING":
-        return len(matches) == sum(map(bool, text.split("\n")))
+        return len(matches) == sum(map(bool, rows))
     if name == "DATED":
         return len(matches) > 1 or any(each[1] or "T" in each[0] for each in matches)
     if name == "STAMP":
@@ -115,14 +116,13 @@ def _mark_lines(name: str, matches: list[re.Match[str]], text: str) -> bool:
         is_full = all(stamp[1].count(":") == 2 or "[" in stamp[0] for stamp in matches)  # no time of day that is said
         rise = len(times_s) > 1 and times_s == sorted({*times_s})
         return times_s[0] == 0 or (rise and (is_full or times_s[0] < 60))
-    if name == "ASKED":
-        return len({asked[1] for asked in matches}) > 1
+    if name in ("ASKED", "DASHED"):
+        names = {line[1] for line in matches}
+        return len(names) > 1 and (name == "ASKED" or len(names) < len(matches) == sum(map(bool, rows)))
     numbers = [int(line[1] or ord(line[2])) for line in matches]
     counted = len(numbers) > 1 and all(b in (a + 1, 1, ord("a")) for a, b in pairwise(numbers))
-    if name == "NUMBER":
-        return counted
-    padded = all(re.match(r"0\d\d", line[1]) and line[1] != "007" for line in matches)
-    return padded or (counted and numbers[0] < 2 and len(numbers) == len(text.split("\n")))
+    padded = all(re.match(r"0\d\d", line[1] or "") and line[1] != "007" for line in matches)
+    return counted if name == "NUMBER" else padded or (counted and numbers[0] < 2 and len(numbers) == len(rows))
 
 
 def find_speaker_names(texts: Iterable[str]) -> frozenset[str]:
@@ -130,8 +130,7 @@ def find_speaker_names(texts: Iterable[str]) -> frozenset[str]:
     lines = [line for text in texts for line in text.splitlines() if line.strip()]
     matched = [match[2] for match in map(MARKS["SPEAKER"].match, lines) if match and match[2] and match[2].istitle()]
     names = {name: count for name, count in Counter(matched).items() if name.lower() not in WORDS["no_names"]}
-    in_all = len(matched) == len(lines) > 1
-    speak = in_all or (max(names.values(), default=0) > 1 and sum(names.values()) > 2)
+    speak = len(matched) == len(lines) > 1 or (max(names.values(), default=0) > 1 and sum(names.values()) > 2)
     return frozenset(names if speak else ())
 
 
