@@ -115,8 +115,7 @@ def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
     words = [(float(span.start_s), float(span.end_s), span.label) for span in group_words(units)]
     tiers = [("phones", phones), ("words", words)]
     recognised = [(p.start_s, p.end_s, f"{p.name} {p.confidence}") for p in list_recognised_phones(units)]
-    if recognised:
-        tiers.append((RECOGNISED, recognised))
+    tiers += [(RECOGNISED, recognised)] if recognised else []
     end_s = max((float(span.end_s) for span in units), default=0.0)
     lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", "xmin = 0", f"xmax = {end_s}"]
     lines += ["tiers? <exists>", f"size = {len(tiers)}", "item []:"]
@@ -171,12 +170,10 @@ def _read_elan(root: Element, where: str) -> list[LabelTier]:
         name: origin_s + _parse_seconds(f"{ms}ms", {}, where) if ms else math.nan for name, ms in slots_s.items()
     }
     spans_s: dict[str | None, tuple[float, float]] = {}
-    owners: dict[str | None, str | None] = {}
     for each in root.iter("ALIGNABLE_ANNOTATION"):
         start_s, end_s = (times_s.get(each.get(f"TIME_SLOT_REF{edge}"), math.nan) for edge in (1, 2))
         spans_s[each.get("ANNOTATION_ID")] = start_s, end_s
-    for each in root.iter("REF_ANNOTATION"):
-        owners[each.get("ANNOTATION_ID")] = each.get("ANNOTATION_REF")
+    owners = {each.get("ANNOTATION_ID"): each.get("ANNOTATION_REF") for each in root.iter("REF_ANNOTATION")}
     tiers: list[LabelTier] = []
     for tier in root.iter("TIER"):
         name = tier.get("TIER_ID", "")

@@ -42,7 +42,6 @@ TIMIT_HZ, TIMIT_SUFFIXES, TIMIT_SILENCE = 16_000, (".phn", ".wrd"), "h#"
 LONGEST_SAMPLES, LAST_SAMPLE = 50_000, 1e7
 """Most samples that the middle label, and those that a whole file, lasts: more are ticks."""
 
-
 Lines = list[tuple[int, str]]  # lines that are not blank, with their numbers
 
 
