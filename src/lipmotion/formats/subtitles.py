@@ -62,12 +62,16 @@ def parse_subtitles(text: str, where: str) -> LabelTier:
     Left out are notes and styles, the repetitions of captions that scroll, and what stands before the first cue.
     Numbers of cues may be missing, and blank lines too.
     Raises InputError: times that are damaged or end before they start, with their line; too many cues or words; frames
-    of an unknown rate.
+    of an unknown rate; pictures.
     """
     text = _convert_counts(text, where) if MARKS["COUNTED"].match(text) else text
     is_dialogue = MARKS["SUBSTATION"].search(text) is not None
     read = _read_lyrics if MARKS["LYRICS"].search(text) else _read_dialogue if is_dialogue else _read_cues
-    labels = (replace(cue, parts=_split_words(cue)) for cue in _drop_repetitions(list(read(text, where))))
+    cues = list(read(text, where))
+    if cues and (picture := MARKS["PICTURE"].fullmatch(cues[0].text.strip())):
+        what = f"is a track of thumbnails ({cues[0].position} shows {shorten(picture[0])}), which are no words"
+        raise InputError(f"{where}: {what}; give the subtitles")
+    labels = (replace(cue, parts=_split_words(cue)) for cue in _drop_repetitions(cues))
     return LabelTier("subtitles", tuple(labels), LINES)
 
 

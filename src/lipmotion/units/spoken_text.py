@@ -29,6 +29,14 @@ MARKS = read_patterns(Path(__file__).with_name("tables") / "spoken_forms.tsv")
 WORDS = {name: frozenset(words.split()) for name, words in read_table("spoken_words").items()}
 """Words by what they are in texts and labels: of silence, of speech that is not known, no names, ..."""
 LONGEST_LINE = 1 << 18  # maximum characters of a line: a label may hold four hours of speech
+LOG = logging.getLogger("lipmotion")
+SYNONYMS: dict[str, tuple[str, float]] = {
+    word: (mood, float(strength))
+    for meaning, words in read_table("moods").items()
+    for mood, strength in [meaning.split()]
+    for word in words.split()
+} | {name: (name, 1.0) for name in (NEUTRAL, *MOODS, PLAIN, *MANNERS)}
+"""The known words of tags, and what they mean."""
 
 
 class SpokenAs(Enum):
@@ -155,16 +163,6 @@ def time_words(
         first, done = done, done + len(reading)
         timed.append(TimedWord(word, *(start_s + (end_s - start_s) * share / letters for share in (first, done))))
     return timed
-
-
-LOG = logging.getLogger("lipmotion")
-SYNONYMS: dict[str, tuple[str, float]] = {
-    word: (mood, float(strength))
-    for meaning, words in read_table("moods").items()
-    for mood, strength in [meaning.split()]
-    for word in words.split()
-} | {name: (name, 1.0) for name in (NEUTRAL, *MOODS, PLAIN, *MANNERS)}
-"""The known words of tags, and what they mean."""
 
 
 class TaggedText(NamedTuple):

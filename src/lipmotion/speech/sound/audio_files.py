@@ -33,6 +33,22 @@ UNTIMED = ("aac", "ac3", "avi", "eac3", "loas", "mp3", "wav")
 DELAYS = {"aac": 1024, "ac3": 256, "eac3": 256, "mp2": 481, "mp3": 1105}
 """Samples by which encoder and decoder delay sound (AAC at least; MP3 by LAME and FFmpeg), which such formats keep."""
 PIECE_BYTES = 1 << 20  # sound is collected in pieces of this size, and without digital silence
+LOG = logging.getLogger("lipmotion")
+SHORTEST_S = 0.1  # shorter recordings hold no sentence; the features need 25 ms around every frame
+CANCELLED_SHARE = 0.2
+"""The mean of channels must have this share of the energy of unlike ones; else they cancel one another."""
+USABLE_SHARE = 0.5  # a damaged recording is refused when less than this share of its sound can be decoded
+MIN_HOLES_S = 0.005  # holes that last less together are not mentioned: they would be rounded to 0
+CUT_SHORT_SHARE, ROUNDED_S, STATED = 0.9, 0.5, ("flac", "aiff", "mov,mp4,m4a,3gp,3g2,mj2")
+"""A recording is called cut short when it holds less than this share of the duration that it states, or so many seconds
+less in a format that states it exactly."""
+HEADS = {"aiff": 8, "asf": 0, "caf": 0, "flv": 0, "mov,mp4,m4a,3gp,3g2,mj2": 4, "tta": 0}
+"""Formats of which FFmpeg reads the first of several joined files, and where eight bytes begin that all heads share."""
+GUESSED = ("aac", "ac3", "amr", "dts", "eac3")  # formats without a length, at which FFmpeg guesses by the first packets
+PCM, FLOAT, EXTENSIBLE = 1, 3, 0xFFFE
+"""Forms of samples in a WAVE file; the last one says its form, and how many bits are valid, in a longer header."""
+UNKNOWN_SIZES = range(0x7FFF0000, 0x1_0000_0000)
+"""Sizes in bytes with which programs begin a WAVE file whose end they do not know, besides 0."""
 
 
 def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
@@ -187,25 +203,6 @@ class _TrackDecoder:
                     self._pieces.append((self._count, piece))
                 piece += np.ascontiguousarray(chosen).data
             self._count += len(chosen)
-
-
-LOG = logging.getLogger("lipmotion")
-
-SHORTEST_S = 0.1  # shorter recordings hold no sentence; the features need 25 ms around every frame
-CANCELLED_SHARE = 0.2
-"""The mean of channels must have this share of the energy of unlike ones; else they cancel one another."""
-USABLE_SHARE = 0.5  # a damaged recording is refused when less than this share of its sound can be decoded
-MIN_HOLES_S = 0.005  # holes that last less together are not mentioned: they would be rounded to 0
-CUT_SHORT_SHARE, ROUNDED_S, STATED = 0.9, 0.5, ("flac", "aiff", "mov,mp4,m4a,3gp,3g2,mj2")
-"""A recording is called cut short when it holds less than this share of the duration that it states, or so many seconds
-less in a format that states it exactly."""
-HEADS = {"aiff": 8, "asf": 0, "caf": 0, "flv": 0, "mov,mp4,m4a,3gp,3g2,mj2": 4, "tta": 0}
-"""Formats of which FFmpeg reads the first of several joined files, and where eight bytes begin that all heads share."""
-GUESSED = ("aac", "ac3", "amr", "dts", "eac3")  # formats without a length, at which FFmpeg guesses by the first packets
-PCM, FLOAT, EXTENSIBLE = 1, 3, 0xFFFE
-"""Forms of samples in a WAVE file; the last one says its form, and how many bits are valid, in a longer header."""
-UNKNOWN_SIZES = range(0x7FFF0000, 0x1_0000_0000)
-"""Sizes in bytes with which programs begin a WAVE file whose end they do not know, besides 0."""
 
 
 def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) -> Audio:
