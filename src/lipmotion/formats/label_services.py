@@ -149,9 +149,9 @@ def describe_json(text: str, where: str) -> str:
     value = next(_decode_documents(text, where), (1, None))[1]
     first = value[0] if isinstance(value, list) and value else value
     names = list(first) if isinstance(first, dict) else []
-    for name, what in (("blendshapes", "weights of blendshapes (as Azure's 55)"), ("mouthcues", "mouth cues")):
-        if name in names:
-            return f"holds {what}, which is motion and no labels; render it"
+    if "blendshapes" in names or {"mouthcues", "viseme", "visemes"} & {*names}:
+        what = "weights of blendshapes (as Azure's 55)" if "blendshapes" in names else "mouth cues"
+        return f"holds {what}, which is motion and no labels; render it"
     named = ", ".join(map(shorten, names[:8])) or "no names"
     return f"is JSON in which no words in time are found (it has {named}; known are {KNOWN_SHAPES})"
 

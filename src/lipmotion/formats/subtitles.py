@@ -44,12 +44,13 @@ def convert_timecodes(text: str, where: str) -> str:
 
     Their rate is the lowest usual one that has all these frames, which a warning says (``where`` empty: nothing does).
     """
+    text, count = MARKS["THOUSANDTHS"].subn(r"\1.\2", text)
     codes = MARKS["TIMECODE"].finditer(text)
     frames = [max(int(code[4]), 29 * (";" in code[0])) for code in codes]  # 29.97 drops frames
     rate = next((rate for rate in FRAME_RATES if rate > max(frames, default=0)), 0)
-    if len(frames) < 2 or not rate:
+    if max(len(frames), count) < 2 or not rate:
         return text
-    if where:
+    if where and frames:
         LOG.warning("%s: its times count frames, taken for %d a second; give seconds if that is wrong", where, rate)
     text = MARKS["TIMECODE"].sub(lambda code: f"{code[1]}:{code[2]}:{int(code[3]) + int(code[4]) / rate:06.3f}", text)
     named = MARKS["PREMIERE"].sub(r"\1 --> \2\n\3: ", text)
