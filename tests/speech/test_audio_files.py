@@ -181,11 +181,11 @@ def test_what_is_missing_of_other_files_is_said(tmp_path: Path, caplog: pytest.L
 
 def test_what_is_missing_of_a_wave_file_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """Not of a stream, whose size is the largest that its program takes; not a few samples, which nobody misses."""
-    for bits, container, content in ((16, 16, S16), (24, 32, S24_IN_32)):
+    for header, content in ((long_form(16, 16), S16), (long_form(24, 32), S24_IN_32), (form(per_second=1), S16)):
         for size in (len(content) + 1000, 0x7FFF0024, 3 * len(content)):
-            read(riff(chunk(b"fmt ", long_form(bits, container)), chunk(b"data", content, size)), tmp_path)
+            read(riff(chunk(b"fmt ", header), chunk(b"data", content, size)), tmp_path)
     said = "cut short: it states 0.8 s of sound and holds 0.2 s; the last 0.5 s are missing"
-    assert [message.partition(": ")[2] for message in caplog.messages] == [said] * 2
+    assert [message.partition(": ")[2] for message in caplog.messages] == [said] * 3
 
 
 def test_sound_that_the_header_does_not_name_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

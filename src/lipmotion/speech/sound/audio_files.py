@@ -312,21 +312,21 @@ def _correct_wave(path: Path) -> tuple[_Wave | None, float, str]:
     coding, channels, rate_hz, per_second, block, bits = struct.unpack_from("<HHIIHH", form)
     valid, missing = bits, 0 if size in UNKNOWN_SIZES else max(body + size - len(content), 0)
     size = min(size or len(content), len(content) - body)
-    missing_s = missing / max(per_second, 1)
     if coding == EXTENSIBLE:
         valid, coding = struct.unpack_from("<H4xH", form, 18) if len(form) >= 40 else (-1, PCM)
     min_frame = -(-bits // 8) * channels
     frame = block if block * rate_hz == per_second and block >= min_frame else min_frame
+    missing_s = missing / max(frame * rate_hz if coding in {PCM, FLOAT} else per_second, 1)
     if not (channels and frame) or frame % channels:
         return None, missing_s, note
     if is_plain := coding in {PCM, FLOAT}:
         spans = np.frombuffer(content, np.uint8, size // frame * frame, body).reshape(-1, frame // channels)
         if bits and spans[:, : (frame - min_frame) // channels].any():  # no zeros fill a container
             note = f"its header states {frame} bytes a frame, and its samples fill {min_frame}: so many are read"
-            frame, rewritten = min_frame, True
+            frame = min_frame
         container = 8 * frame // channels
         form = struct.pack("<HHIIHH", coding, channels, rate_hz, frame * rate_hz, frame, container)
-    if not rewritten and (not is_plain or (bits == container and valid in {0, container})):
+    if not rewritten and (not is_plain or ((bits, per_second) == (container, frame * rate_hz) and valid in {0, bits})):
         return None, missing_s, note
     lengths = [min(length, 0xFFFFFFFF) for length in (20 + len(form) + size, size)]
     header = struct.pack("<4sI8sI", b"RIFF", lengths[0], b"WAVEfmt ", len(form)) + form
