@@ -117,6 +117,8 @@ FORMS = {
     "24 in 32, a length of 0": riff(chunk(b"fmt ", long_form(24, 32)), chunk(b"data", S24_IN_32, 0), length=0),
     "a frame of no bytes": riff(chunk(b"fmt ", form(16, block=0, per_second=32_000)), SOUND),
     "a frame of too many bytes": riff(chunk(b"fmt ", form(16, block=4, per_second=32_000)), SOUND),
+    "frames of two samples": riff(chunk(b"fmt ", form(16, block=4)), SOUND),
+    "frames of too many bytes of 24": riff(chunk(b"fmt ", form(24, block=4)), chunk(b"data", samples(24, 24))),
     "a padded chunk of odd length": riff(chunk(b"fmt ", form()), chunk(b"_PMX", b"12345"), SOUND),
     "an odd chunk without its pad": riff(chunk(b"fmt ", form()), chunk(b"junk", b"12345", pad=False), SOUND),
     "RF64": riff(wide(len(S16)), chunk(b"fmt ", form()), chunk(b"data", S16, TO_THE_END), kind=b"RF64"),
@@ -179,11 +181,11 @@ def test_what_is_missing_of_other_files_is_said(tmp_path: Path, caplog: pytest.L
 
 def test_what_is_missing_of_a_wave_file_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """Not of a stream, whose size is the largest that its program takes; not a few samples, which nobody misses."""
-    for bits, container, content in ((16, 16, S16), (24, 32, S24_IN_32)):
+    for header, content in ((long_form(16, 16), S16), (long_form(24, 32), S24_IN_32), (form(per_second=1), S16)):
         for size in (len(content) + 1000, 0x7FFF0024, 3 * len(content)):
-            read(riff(chunk(b"fmt ", long_form(bits, container)), chunk(b"data", content, size)), tmp_path)
+            read(riff(chunk(b"fmt ", header), chunk(b"data", content, size)), tmp_path)
     said = "cut short: it states 0.8 s of sound and holds 0.2 s; the last 0.5 s are missing"
-    assert [message.partition(": ")[2] for message in caplog.messages] == [said] * 2
+    assert [message.partition(": ")[2] for message in caplog.messages] == [said] * 3
 
 
 def test_sound_that_the_header_does_not_name_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -36,11 +36,6 @@ def test_manners_and_what_somebody_does_between_asterisks_are_tags_too():
         assert [tag.mood for tag in parse_tagged_text(text).tags] == moods
 
 
-def test_links_and_times_are_not_spoken():
-    text = parse_tagged_text("see [our site](https://a.org/b) [0:12] and ![a cat](c.png) [2s]").text
-    assert text.split() == ["see", "our", "site", "and", "a", "cat"]
-
-
 def test_known_tags_alone_can_be_taken_out():
     assert remove_known_tags("<html> [happy] hello").split() == ["<html>", "hello"]
 

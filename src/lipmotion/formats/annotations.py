@@ -23,10 +23,12 @@ from lipmotion.types.values import parse_clock
 from lipmotion.units import RECOGNISED, group_words, list_recognised_phones
 from lipmotion.units.spelling import read_patterns, read_table
 
+LOG = logging.getLogger("lipmotion")
 MARKS = read_patterns(Path(__file__).with_name("annotations.tsv"))
 """Patterns of the forms that are read, by their names in the table."""
 INTERVALS, POINTS = "IntervalTier", "TextTier"
 TRIGRAPHS = read_table("trigraphs")  # letters as Praat spells them after a backslash
+NEAR_S, DEEPEST = 0.01, 20
 
 
 class _DamagedError(Exception):
@@ -115,8 +117,7 @@ def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
     words = [(float(span.start_s), float(span.end_s), span.label) for span in group_words(units)]
     tiers = [("phones", phones), ("words", words)]
     recognised = [(p.start_s, p.end_s, f"{p.name} {p.confidence}") for p in list_recognised_phones(units)]
-    if recognised:
-        tiers.append((RECOGNISED, recognised))
+    tiers += [(RECOGNISED, recognised)] if recognised else []
     end_s = max((float(span.end_s) for span in units), default=0.0)
     lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", "xmin = 0", f"xmax = {end_s}"]
     lines += ["tiers? <exists>", f"size = {len(tiers)}", "item []:"]
@@ -136,10 +137,6 @@ def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
             lines.append(f'            text = "{quoted}"')
     with atomic_file(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-LOG = logging.getLogger("lipmotion")
-NEAR_S, DEEPEST = 0.01, 20
 
 
 def read_xml_tiers(text: str, where: str) -> list[LabelTier]:
@@ -166,22 +163,24 @@ def _read_elan(root: Element, where: str) -> list[LabelTier]:
     if origin_s:
         what = "its times begin %.2f s after the start of %s: they are moved by that"
         LOG.warning(f"%s: {what}; cut the recording there if it is another one", where, origin_s, shorten(url))
-    slots_s = {each.get("TIME_SLOT_ID"): each.get("TIME_VALUE") for each in root.iter("TIME_SLOT")}
-    times_s = {
-        name: origin_s + _parse_seconds(f"{ms}ms", {}, where) if ms else math.nan for name, ms in slots_s.items()
-    }
+    slots = {each.get("TIME_SLOT_ID"): each.get("TIME_VALUE") for each in root.iter("TIME_SLOT")}
+    times_s = {name: origin_s + _parse_seconds(f"{ms}ms", {}, where) if ms else math.nan for name, ms in slots.items()}
     spans_s: dict[str | None, tuple[float, float]] = {}
-    owners: dict[str | None, str | None] = {}
     for each in root.iter("ALIGNABLE_ANNOTATION"):
         start_s, end_s = (times_s.get(each.get(f"TIME_SLOT_REF{edge}"), math.nan) for edge in (1, 2))
         spans_s[each.get("ANNOTATION_ID")] = start_s, end_s
-    for each in root.iter("REF_ANNOTATION"):
-        owners[each.get("ANNOTATION_ID")] = each.get("ANNOTATION_REF")
+    owners = {each.get("ANNOTATION_ID"): each.get("ANNOTATION_REF") for each in root.iter("REF_ANNOTATION")}
     tiers: list[LabelTier] = []
     for tier in root.iter("TIER"):
         name = tier.get("TIER_ID", "")
         texts: dict[str | None, list[str]] = defaultdict(list)
+        after: dict[str | None, list[Element]] = defaultdict(list)
         for each in (*tier.iter("ALIGNABLE_ANNOTATION"), *tier.iter("REF_ANNOTATION")):
+            after[each.get("PREVIOUS_ANNOTATION")].append(each)
+        in_order = after.pop(None, [])
+        for each in in_order:  # which grows by what follows each
+            in_order += after.pop(each.get("ANNOTATION_ID"), [])
+        for each in (*in_order, *(each for rest in after.values() for each in rest)):
             aligned = each.get("ANNOTATION_ID")
             for _ in range(DEEPEST):
                 aligned = owners.get(aligned, aligned) if aligned not in spans_s else aligned
@@ -201,20 +200,24 @@ def _read_captions(root: Element, where: str) -> LabelTier:
     attributes = {name.rpartition("}")[2]: value for name, value in root.attrib.items()}
     multiplier = attributes.get("frameRateMultiplier", "1 1").replace(":", " ").split()
     try:
-        frames = float(attributes.get("frameRate", "30")) * float(multiplier[0]) / float(multiplier[-1])
+        counted = float(attributes.get("frameRate", "30"))
+        frames = counted * float(multiplier[0]) / float(multiplier[-1])
         per_s = {"f": frames, "t": float(attributes.get("tickRate") or (frames if "frameRate" in attributes else 1))}
+        if (attributes.get("timeBase"), attributes.get("dropMode", "nonDrop")) == ("smpte", "nonDrop"):
+            per_s["clock"] = frames / counted  # whose seconds are so many frames, at 29.97 a second too
     except (ValueError, ZeroDivisionError, IndexError):
         per_s = {"f": 0.0, "t": 0.0}
     if not min(per_s.values()) > 0:
         raise InputError(f"{where}: its rate of frames or ticks is no number above 0")
     labels: list[TimedLabel] = []
 
-    def visit(element: Element, start_s: float, end_s: float) -> None:
+    def visit(element: Element, start_s: float, end_s: float) -> float:
         start_s, end_s = _read_times(element, start_s, end_s, per_s, where)
         if element.tag not in ("p", "text"):
+            reached_s, in_turn = [start_s], element.get("timeContainer") == "seq"
             for child in element:
-                visit(child, start_s, end_s)
-            return
+                reached_s.append(visit(child, reached_s[-1] if in_turn else start_s, end_s))
+            return max(reached_s)
         place = f"line {len(labels) + 1}"
         parts: list[TimedLabel] = []
         spans = [child for child in element.iter() if child is not element and {"begin", "t"} & child.attrib.keys()]
@@ -233,6 +236,7 @@ def _read_captions(root: Element, where: str) -> LabelTier:
         content = "".join(element.itertext())
         same_words = "".join(content.split()) == "".join("".join(part.text for part in parts).split())
         labels.append(TimedLabel(start_s, end_s, content, place, tuple(parts) if same_words else ()))
+        return end_s
 
     visit(root, 0.0, math.inf)
     return LabelTier("captions", tuple(labels), LINES)
@@ -256,7 +260,8 @@ def _read_times(
 
 def _parse_seconds(value: str, per_s: dict[str, float], where: str) -> float:
     """Return a time of TTML: a clock, also with frames, or a number with its unit. Raises InputError: another text."""
-    clock_s, offset = parse_clock(value, per_s.get("f", 0)), MARKS["OFFSET_TIME"].fullmatch(value.strip())
+    share, offset = per_s.get("clock", 1), MARKS["OFFSET_TIME"].fullmatch(value.strip())
+    clock_s = parse_clock(value, per_s.get("f", 0) / share) / share
     if not math.isnan(clock_s):
         return clock_s
     if offset is None:

@@ -37,6 +37,9 @@ LARGEST_UNITS_BYTES = 1 << 28  # most bytes of a file of units alone: phones of 
 LARGEST_WEIGHT = 4.0  # largest weight of a blendshape that is read; captures and sculpted faces go a little over 1
 WIDEST_LIPS, NARROWEST_LIPS = 2.5, 0.1  # eye distances of lips at their widest: more, or less, is in another unit
 TOLERATED_WEIGHT = 0.1  # by how much weights may go beyond 0 to 1 without a warning
+DECIMALS = 5  # a hundred-thousandth of the distance between the eyes is about a micrometre
+BLOCK_ROWS = 2000  # rows that are formatted at a time: the text of an hour of all channels would not fit in memory
+LARGEST_VALUE = 1e9  # blocks with larger values are formatted number by number: their digits do not fit in 64 bits
 
 
 @dataclass(frozen=True)
@@ -280,11 +283,6 @@ def _format_of(path: Path) -> MotionFormat:
 
 def _suffix(path: Path) -> str:
     return repr(find_suffix(path) or path.suffix) if path.suffix else "a file without a suffix"
-
-
-DECIMALS = 5  # a hundred-thousandth of the distance between the eyes is about a micrometre
-BLOCK_ROWS = 2000  # rows that are formatted at a time: the text of an hour of all channels would not fit in memory
-LARGEST_VALUE = 1e9  # blocks with larger values are formatted number by number: their digits do not fit in 64 bits
 
 
 def format_rows(values: NDArray[np.floating[Any]]) -> Iterator[str]:

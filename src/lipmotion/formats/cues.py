@@ -64,6 +64,13 @@ HEADER = re.compile(r"\W*(?:time|start|begin|seconds)\b[^\n]*", re.IGNORECASE)
 LONGEST_LINE = 200
 MIN_GAP_S, MIN_GAP = 0.02, 0.05
 """Between cues that are further apart, in seconds and as a share of the first one, the mouth is at rest."""
+MARK = "lipsync version 1"
+FASTEST_FPS = 1000
+WHOLE_RATE_TOLERANCE = 0.01  # a rate that is so little over a whole one counts as that
+UNKNOWN = "speech"  # the text of speech without known words
+Part = tuple[int, int, str]  # first frame, last frame (included), and text
+VERSION, SLOT, ANIMATION = "4.2.0", "mouth", "speech"
+PIXELS = 256  # width and height of a mouth until Spine has its picture
 
 
 def format_tsv(sheet: CueSheet, _sound_file: str) -> str:
@@ -177,13 +184,6 @@ def parse_dat(text: str, fps: float = CUES_FPS) -> CueSheet:
     return build_cue_sheet(rows, 0.0, fps)
 
 
-MARK = "lipsync version 1"
-FASTEST_FPS = 1000
-WHOLE_RATE_TOLERANCE = 0.01  # a rate that is so little over a whole one counts as that
-UNKNOWN = "speech"  # the text of speech without known words
-Part = tuple[int, int, str]  # first frame, last frame (included), and text
-
-
 def format_project(sheet: CueSheet, sound_file: str) -> str:
     """Return the content of a ``.pgo``: one voice; a phrase lasts from rest to rest."""
     # Papagayo knows whole rates alone: 29.97 becomes 30 at the same times, so that frames do not drift from the sound
@@ -270,10 +270,6 @@ def parse_papagayo(text: str) -> CueSheet:
     rows = [(start_s, parse_shape(name, chart, place) if name else REST) for start_s, name, place in shapes]
     lasting = [row for row, after in zip(rows, [*rows[1:], (math.inf, "")], strict=False) if row[0] < after[0]]
     return build_cue_sheet(lasting, frames / fps, float(fps), Timeline(tuple(words)))
-
-
-VERSION, SLOT, ANIMATION = "4.2.0", "mouth", "speech"
-PIXELS = 256  # width and height of a mouth until Spine has its picture
 
 
 def format_skeleton(sheet: CueSheet, sound_file: str) -> str:

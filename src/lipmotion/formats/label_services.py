@@ -149,9 +149,9 @@ def describe_json(text: str, where: str) -> str:
     value = next(_decode_documents(text, where), (1, None))[1]
     first = value[0] if isinstance(value, list) and value else value
     names = list(first) if isinstance(first, dict) else []
-    for name, what in (("blendshapes", "weights of blendshapes (as Azure's 55)"), ("mouthcues", "mouth cues")):
-        if name in names:
-            return f"holds {what}, which is motion and no labels; render it"
+    if "blendshapes" in names or {"mouthcues", "viseme", "visemes"} & {*names}:
+        what = "weights of blendshapes (as Azure's 55)" if "blendshapes" in names else "mouth cues"
+        return f"holds {what}, which is motion and no labels; render it"
     named = ", ".join(map(shorten, names[:8])) or "no names"
     return f"is JSON in which no words in time are found (it has {named}; known are {KNOWN_SHAPES})"
 
@@ -331,9 +331,8 @@ def _list_voice_phones(item: dict[str, Any], where: str) -> dict[str, Any]:
     if isinstance(item.get("phonemealignments"), list):
         rate = require(values.number(1000, 1e6), item.get("samplerate"), f"{where}: the sample rate in hertz")
         phonemes = [each if isinstance(each, dict) else {} for each in item["phonemealignments"]]
-        return {
-            "phones": [{"symbol": p.get("phoneme"), "samples": p.get("numsamples"), "rate": rate} for p in phonemes]
-        }
+        phones = [{"symbol": p.get("phoneme"), "samples": p.get("numsamples"), "rate": rate} for p in phonemes]
+        return {"phones": phones}
     if isinstance(item.get("preddur"), list) and "phonemes" in item:
         letters = f"^{require(_TEXT, item['phonemes'], f'{where}: phonemes')}$"
         if len(item["preddur"]) != len(letters):
@@ -347,7 +346,9 @@ def _list_voice_phones(item: dict[str, Any], where: str) -> dict[str, Any]:
 
 
 def _join_characters(rows: list[Row]) -> list[Row]:
-    """Return the words of characters or pieces of words; one without an end lasts to the next one."""
+    """Return the words of characters, of pieces of words, or whole; one without an end lasts to the next one."""
+    if any(row.text[1:].isalpha() for row in rows) and not any(MARKS["BLANK"].search(row.text) for row in rows):
+        rows = [replace(row, text=f"{row.text} ".replace("@@ ", "")) for row in rows]
     starts = [*(row.start for row in rows[1:]), math.inf]
     lasting = [replace(row, end=after) if math.isnan(row.end) else row for row, after in zip(rows, starts, strict=True)]
     owner_of = [row for row in lasting for _ in row.text]
@@ -493,6 +494,7 @@ def _scale_rows(rows: list[Row], role: str, where: str) -> list[TimedLabel]:
         raise InputError(f"{where}: {frames}; required start and end in seconds")
     spans = [(row.start, row.end, row.text) for row in judged]
     per_s = find_time_unit(spans, role, where, judged[0].times.usual) if judged else 1
+    starts_s = [part.start / (part.times.per_s or per_s) for part in parts]
 
     def label(row: Row) -> TimedLabel:
         start_s, end_s = (time / (row.times.per_s or per_s) for time in (row.start, row.end))
@@ -501,7 +503,11 @@ def _scale_rows(rows: list[Row], role: str, where: str) -> list[TimedLabel]:
                 raise InputError(f"{where}: {row.place}: a time is {time:g}, required seconds, up to {LATEST_S:g}")
         start_s = math.nan if start_s <= EARLIEST_S else start_s
         if end_s < start_s - ROUNDING_S:
-            raise InputError(f"{where}: {row.place} ends at {end_s:g} s, before its start at {start_s:g} s; correct it")
+            what = f"{where}: {row.place} ends at {end_s:g} s, before its start at {start_s:g} s"
+            if len(parts) <= 2 * sum(part.end < part.start for part in parts):
+                raise InputError(f"{what}; correct it")
+            LOG.log(logging.WARNING if where else logging.DEBUG, "%s; it is taken to last to the next start", what)
+            end_s = min((each for each in starts_s if each > start_s), default=math.inf)
         end_s = start_s if end_s < start_s else end_s
         return TimedLabel(start_s, end_s, row.text, row.place, tuple(map(label, row.parts)))
 
@@ -510,12 +516,11 @@ def _scale_rows(rows: list[Row], role: str, where: str) -> list[TimedLabel]:
 
 def _read_named_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
     """Return the tiers of the JSON of the Montreal Forced Aligner and of praatIO, by their names."""
-    named = objects[0][1].get("tiers") if len(objects) == 1 else None
+    named: Any = objects[0][1].get("tiers") if len(objects) == 1 else None
     if isinstance(named, list) and all(isinstance(tier, dict) and "name" in tier for tier in named):
         named = {str(tier["name"]): tier for tier in named}
-    if not isinstance(named, dict) or not all(
-        isinstance(tier, dict) and isinstance(tier.get("entries"), list) for tier in named.values()
-    ):
+    listed = [*named.values()] if isinstance(named, dict) else [None]
+    if not all(isinstance(tier, dict) and isinstance(tier.get("entries"), list) for tier in listed):
         return None
     tiers = []
     for name, tier in named.items():

@@ -118,9 +118,8 @@ def require_time(text: str, place: str, where: str) -> float:
     """Return a time from its text, also with a decimal comma or as 0:01.5. Raises InputError: it is none."""
     if ":" in text and not math.isnan(clock_s := parse_clock(text)):
         return clock_s
-    return parse_number(
-        text.replace(",", "."), f"{where}: {place} has the time", "finite seconds from the start of the recording"
-    )
+    wanted = "finite seconds from the start of the recording"
+    return parse_number(text.replace(",", "."), f"{where}: {place} has the time", wanted)
 
 
 def find_time_unit(spans: Sequence[tuple[float, float, str]], role: str, where: str, usual: int = 1) -> int:
@@ -242,13 +241,14 @@ def read_transcript_tier(tiers: Sequence[LabelTier], where: str) -> TimedTranscr
 
 
 def join_pieces(labels: Sequence[TimedLabel]) -> list[TimedLabel]:
-    """Return labels, of which pieces of a word are one: single ones without a blank before them, if others have one."""
+    """Return labels, of which pieces of a word are one: without a blank, if others have one, or of a contraction."""
     starts = sum(label.text[:1] == " " for label in labels)
     single = all(len(label.text.split()) < 2 and not label.parts for label in labels)
     in_pieces = single and 1 < starts < len(labels) < 3 * starts
     joined: list[TimedLabel] = []
     for label in labels:
-        if in_pieces and joined and label.text[:1] != " ":
+        end = f"{joined[-1].text[-1:] if joined and single else ''}{label.text}"  # of a word in two labels
+        if joined and ((in_pieces and label.text[:1] != " ") or MARKS["contraction"].fullmatch(end)):
             joined[-1] = replace(joined[-1], end_s=label.end_s, text=joined[-1].text + label.text)
         else:
             joined.append(label)
@@ -385,14 +385,11 @@ def split_ipa(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
         phones_of[number].append(phone)
     result: list[TimedLabel] = []
     for number, label in enumerate(labels):
-        phones = phones_of.get(number, [])
-        if phones:
+        if phones := phones_of.get(number, []):
             each_s = (label.end_s - label.start_s) / len(phones)
             edges_s = [label.start_s + place * each_s for place in range(len(phones))] + [label.end_s]
-            result += [
-                replace(label, start_s=start_s, end_s=end_s, text=phone)
-                for phone, start_s, end_s in zip(phones, edges_s[:-1], edges_s[1:], strict=True)
-            ]
+            spans = zip(phones, edges_s[:-1], edges_s[1:], strict=True)
+            result += [replace(label, start_s=a, end_s=b, text=phone) for phone, a, b in spans]
         elif not unspoken[number] and result and result[-1].end_s >= label.start_s:
             result[-1] = replace(result[-1], end_s=label.end_s)
         else:

@@ -44,12 +44,13 @@ def convert_timecodes(text: str, where: str) -> str:
 
     Their rate is the lowest usual one that has all these frames, which a warning says (``where`` empty: nothing does).
     """
+    text, count = MARKS["THOUSANDTHS"].subn(r"\1.\2", text)
     codes = MARKS["TIMECODE"].finditer(text)
     frames = [max(int(code[4]), 29 * (";" in code[0])) for code in codes]  # 29.97 drops frames
     rate = next((rate for rate in FRAME_RATES if rate > max(frames, default=0)), 0)
-    if len(frames) < 2 or not rate:
+    if max(len(frames), count) < 2 or not rate:
         return text
-    if where:
+    if where and frames:
         LOG.warning("%s: its times count frames, taken for %d a second; give seconds if that is wrong", where, rate)
     text = MARKS["TIMECODE"].sub(lambda code: f"{code[1]}:{code[2]}:{int(code[3]) + int(code[4]) / rate:06.3f}", text)
     named = MARKS["PREMIERE"].sub(r"\1 --> \2\n\3: ", text)
@@ -62,12 +63,16 @@ def parse_subtitles(text: str, where: str) -> LabelTier:
     Left out are notes and styles, the repetitions of captions that scroll, and what stands before the first cue.
     Numbers of cues may be missing, and blank lines too.
     Raises InputError: times that are damaged or end before they start, with their line; too many cues or words; frames
-    of an unknown rate.
+    of an unknown rate; pictures.
     """
     text = _convert_counts(text, where) if MARKS["COUNTED"].match(text) else text
     is_dialogue = MARKS["SUBSTATION"].search(text) is not None
     read = _read_lyrics if MARKS["LYRICS"].search(text) else _read_dialogue if is_dialogue else _read_cues
-    labels = (replace(cue, parts=_split_words(cue)) for cue in _drop_repetitions(list(read(text, where))))
+    cues = list(read(text, where))
+    if cues and (picture := MARKS["PICTURE"].fullmatch(cues[0].text.strip())):
+        what = f"is a track of thumbnails ({cues[0].position} shows {shorten(picture[0])}), which are no words"
+        raise InputError(f"{where}: {what}; give the subtitles")
+    labels = (replace(cue, parts=_split_words(cue)) for cue in _drop_repetitions(cues))
     return LabelTier("subtitles", tuple(labels), LINES)
 
 

@@ -42,7 +42,6 @@ TIMIT_HZ, TIMIT_SUFFIXES, TIMIT_SILENCE = 16_000, (".phn", ".wrd"), "h#"
 LONGEST_SAMPLES, LAST_SAMPLE = 50_000, 1e7
 """Most samples that the middle label, and those that a whole file, lasts: more are ticks."""
 
-
 Lines = list[tuple[int, str]]  # lines that are not blank, with their numbers
 
 
@@ -55,6 +54,7 @@ def parse_line_tiers(text: str, where: str) -> list[LabelTier] | None:
     Raises InputError: a later line is of another form, or has a time that is none; or starts that may be ends.
     """
     text = re.sub(r"\A\t(?=\S)", "#\t", re.sub(r"\A\ufeff?sep=.[ \t\r]*\n", "\n", text))  # Excel's, pandas'
+    text = MARKS["MARKERS"].sub(r"\1text", text)
     if esps := MARKS["ESPS"].match(text):
         return _read_points(_lines("\n" * esps[0].count("\n") + text[esps.end() :]), where, ends=True)
     lines = _lines(text)

@@ -70,6 +70,17 @@ SOUNDED = re.compile(r"(?=.*(.)\1\1|.*rr\Z|p[sf]{2})(?!([^fhmrsvz])\2*\Z)[b-df-h
 LONGEST_LENGTHENED, MAX_LENGTHENED = 100, 5  # a word of more letters, or with more that are doubled, is none of these
 MAX_VARIANTS = 32
 """Most pronunciations of a word: alignment tries each after each of the word before. The dictionary has up to six."""
+COMMON_WORDS = read_table("common_words")
+"""The commonest words of languages in Latin letters, as any frequency list has them."""
+MIN_COMMON, AHEAD = 3, 1.5
+"""A text is in a language with so many of its common words in it, and so many times as many as of any other one."""
+MIN_KNOWN = 0.85  # a text of which the dictionary knows so large a share is English
+MIN_PHONES, MIN_WORDS = 4, 12
+"""Shorter words than the first are in the dictionary by chance, and of fewer words than the second nothing is said."""
+NOT_ENGLISH, IS_ENGLISH = 0.2, 0.5
+"""Shares of recognised words with a pronunciation of English, up to and from which speech is not English, or is. In
+14 s of English it is 0.17 to 0.93, of other languages 0.00 to 0.43."""
+_ALIKE = {"ax": "ah", "axr": "er", "ix": "ih", "ao": "aa", "uh": "uw"}
 
 
 @lru_cache(maxsize=4096)
@@ -265,19 +276,6 @@ def reduce_vowels(word: str, phones: Pronunciation) -> Pronunciation:
         if len(vowels) > 1 and phones[stressed] not in FULL_VOWELS and stressed == 0:
             stressed = next((i for i in vowels if phones[i] in FULL_VOWELS), vowels[1])
     return tuple(REDUCED_VOWELS.get(p, p) if i != stressed else p for i, p in enumerate(phones))
-
-
-COMMON_WORDS = read_table("common_words")
-"""The commonest words of languages in Latin letters, as any frequency list has them."""
-MIN_COMMON, AHEAD = 3, 1.5
-"""A text is in a language with so many of its common words in it, and so many times as many as of any other one."""
-MIN_KNOWN = 0.85  # a text of which the dictionary knows so large a share is English
-MIN_PHONES, MIN_WORDS = 4, 12
-"""Shorter words than the first are in the dictionary by chance, and of fewer words than the second nothing is said."""
-NOT_ENGLISH, IS_ENGLISH = 0.2, 0.5
-"""Shares of recognised words with a pronunciation of English, up to and from which speech is not English, or is. In
-14 s of English it is 0.17 to 0.93, of other languages 0.00 to 0.43."""
-_ALIKE = {"ax": "ah", "axr": "er", "ix": "ih", "ao": "aa", "uh": "uw"}
 
 
 def detect_language(words: Sequence[str]) -> str:

@@ -29,6 +29,14 @@ MARKS = read_patterns(Path(__file__).with_name("tables") / "spoken_forms.tsv")
 WORDS = {name: frozenset(words.split()) for name, words in read_table("spoken_words").items()}
 """Words by what they are in texts and labels: of silence, of speech that is not known, no names, ..."""
 LONGEST_LINE = 1 << 18  # maximum characters of a line: a label may hold four hours of speech
+LOG = logging.getLogger("lipmotion")
+SYNONYMS: dict[str, tuple[str, float]] = {
+    word: (mood, float(strength))
+    for meaning, words in read_table("moods").items()
+    for mood, strength in [meaning.split()]
+    for word in words.split()
+} | {name: (name, 1.0) for name in (NEUTRAL, *MOODS, PLAIN, *MANNERS)}
+"""The known words of tags, and what they mean."""
 
 
 class SpokenAs(Enum):
@@ -91,7 +99,7 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
     for name in ("RECORDING", "DATED", "STAMP"):
         text = leave_out_marks(name, text)
     speakers = find_speaker_names([text]) if names is None else names
-    for name in ("NUMBER", "BARE_NUMBER", "ASKED"):
+    for name in ("NUMBER", "BARE_NUMBER", "ASKED", "DASHED"):
         text = leave_out_marks(name, text)
     cues = list(MARKS["CUE"].finditer(text))
     if len(cues) > 1 or any("(" in cue[1] for cue in cues):
@@ -106,8 +114,9 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
 
 def _mark_lines(name: str, matches: list[re.Match[str]], text: str) -> bool:
     """Return whether what was found of a pattern at the starts of lines are names, times or numbers of the lines."""
+    rows = text.split("\n")
     if name == "RECORDING":
-        return len(matches) == sum(map(bool, text.split("\n")))
+        return len(matches) == sum(map(bool, rows))
     if name == "DATED":
         return len(matches) > 1 or any(each[1] or "T" in each[0] for each in matches)
     if name == "STAMP":
@@ -115,14 +124,13 @@ def _mark_lines(name: str, matches: list[re.Match[str]], text: str) -> bool:
         is_full = all(stamp[1].count(":") == 2 or "[" in stamp[0] for stamp in matches)  # no time of day that is said
         rise = len(times_s) > 1 and times_s == sorted({*times_s})
         return times_s[0] == 0 or (rise and (is_full or times_s[0] < 60))
-    if name == "ASKED":
-        return len({asked[1] for asked in matches}) > 1
+    if name in ("ASKED", "DASHED"):
+        names = {line[1] for line in matches}
+        return len(names) > 1 and (name == "ASKED" or len(names) < len(matches) == sum(map(bool, rows)))
     numbers = [int(line[1] or ord(line[2])) for line in matches]
     counted = len(numbers) > 1 and all(b in (a + 1, 1, ord("a")) for a, b in pairwise(numbers))
-    if name == "NUMBER":
-        return counted
-    padded = all(re.match(r"0\d\d", line[1]) and line[1] != "007" for line in matches)
-    return padded or (counted and numbers[0] < 2 and len(numbers) == len(text.split("\n")))
+    padded = all(re.match(r"0\d\d", line[1] or "") and line[1] != "007" for line in matches)
+    return counted if name == "NUMBER" else padded or (counted and numbers[0] < 2 and len(numbers) == len(rows))
 
 
 def find_speaker_names(texts: Iterable[str]) -> frozenset[str]:
@@ -130,8 +138,7 @@ def find_speaker_names(texts: Iterable[str]) -> frozenset[str]:
     lines = [line for text in texts for line in text.splitlines() if line.strip()]
     matched = [match[2] for match in map(MARKS["SPEAKER"].match, lines) if match and match[2] and match[2].istitle()]
     names = {name: count for name, count in Counter(matched).items() if name.lower() not in WORDS["no_names"]}
-    in_all = len(matched) == len(lines) > 1
-    speak = in_all or (max(names.values(), default=0) > 1 and sum(names.values()) > 2)
+    speak = len(matched) == len(lines) > 1 or (max(names.values(), default=0) > 1 and sum(names.values()) > 2)
     return frozenset(names if speak else ())
 
 
@@ -156,16 +163,6 @@ def time_words(
         first, done = done, done + len(reading)
         timed.append(TimedWord(word, *(start_s + (end_s - start_s) * share / letters for share in (first, done))))
     return timed
-
-
-LOG = logging.getLogger("lipmotion")
-SYNONYMS: dict[str, tuple[str, float]] = {
-    word: (mood, float(strength))
-    for meaning, words in read_table("moods").items()
-    for mood, strength in [meaning.split()]
-    for word in words.split()
-} | {name: (name, 1.0) for name in (NEUTRAL, *MOODS, PLAIN, *MANNERS)}
-"""The known words of tags, and what they mean."""
 
 
 class TaggedText(NamedTuple):

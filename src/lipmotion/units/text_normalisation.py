@@ -25,6 +25,14 @@ LARGEST_TRANSCRIPT_BYTES = 1 << 22  # most bytes of a transcript file: three day
 PHONES_PER_S = 100  # most phones a second: with more, a phone has less than one frame of 10 ms on average
 ALWAYS_ALLOWED_PHONES = 1000
 """Phones that a list may always have; if they are those of another recording, a warning is enough."""
+MAX_CHARACTERS = 50_000  # most characters of a text: about an hour of speech
+LONGEST_SENTENCE = 400  # a longer sentence is divided at a comma, else between words; in characters
+LONGEST_WORD = 200
+"""Most characters without a blank in scripts that have blanks; a longer one is no word, but would take minutes."""
+_ABBREVIATED = frozenset(
+    "mr mrs ms dr prof st jr sr vs etc no vol fig inc ltd co gen col capt lt sgt rev hon e.g i.e a.m p.m approx".split()
+)
+"""What ends in a full stop that does not end a sentence, without its last stop."""
 
 
 def split_words(text: str) -> tuple[str, ...]:
@@ -127,16 +135,6 @@ def check_phones(count: int, duration_s: float) -> None:
     if count > allowed:
         what = f"{count} units in time, required at most {allowed} for {duration_s:.2f} s of sound;"
         raise InputError(f"{what} give those of this recording")
-
-
-MAX_CHARACTERS = 50_000  # most characters of a text: about an hour of speech
-LONGEST_SENTENCE = 400  # a longer sentence is divided at a comma, else between words; in characters
-LONGEST_WORD = 200
-"""Most characters without a blank in scripts that have blanks; a longer one is no word, but would take minutes."""
-_ABBREVIATED = frozenset(
-    "mr mrs ms dr prof st jr sr vs etc no vol fig inc ltd co gen col capt lt sgt rev hon e.g i.e a.m p.m approx".split()
-)
-"""What ends in a full stop that does not end a sentence, without its last stop."""
 
 
 def clean_text(text: str) -> str:

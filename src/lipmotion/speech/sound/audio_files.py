@@ -33,13 +33,26 @@ UNTIMED = ("aac", "ac3", "avi", "eac3", "loas", "mp3", "wav")
 DELAYS = {"aac": 1024, "ac3": 256, "eac3": 256, "mp2": 481, "mp3": 1105}
 """Samples by which encoder and decoder delay sound (AAC at least; MP3 by LAME and FFmpeg), which such formats keep."""
 PIECE_BYTES = 1 << 20  # sound is collected in pieces of this size, and without digital silence
+LOG = logging.getLogger("lipmotion")
+SHORTEST_S = 0.1  # shorter recordings hold no sentence; the features need 25 ms around every frame
+CANCELLED_SHARE = 0.2
+"""The mean of channels must have this share of the energy of unlike ones; else they cancel one another."""
+USABLE_SHARE = 0.5  # a damaged recording is refused when less than this share of its sound can be decoded
+MIN_HOLES_S = 0.005  # holes that last less together are not mentioned: they would be rounded to 0
+CUT_SHORT_SHARE, ROUNDED_S, STATED = 0.9, 0.5, ("flac", "aiff", "mov,mp4,m4a,3gp,3g2,mj2")
+"""A recording is called cut short when it holds less than this share of the duration that it states, or so many seconds
+less in a format that states it exactly."""
+HEADS = {"aiff": 8, "asf": 0, "caf": 0, "flv": 0, "mov,mp4,m4a,3gp,3g2,mj2": 4, "tta": 0}
+"""Formats of which FFmpeg reads the first of several joined files, and where eight bytes begin that all heads share."""
+GUESSED = ("aac", "ac3", "amr", "dts", "eac3")  # formats without a length, at which FFmpeg guesses by the first packets
+PCM, FLOAT, EXTENSIBLE = 1, 3, 0xFFFE
+"""Forms of samples in a WAVE file; the last one says its form, and how many bits are valid, in a longer header."""
+UNKNOWN_SIZES = range(0x7FFF0000, 0x1_0000_0000)
+"""Sizes in bytes with which programs begin a WAVE file whose end they do not know, besides 0."""
 
 
 def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
-    """Raise InputError for a sampling rate or a number of channels that no recorder has.
-
-    A wrong header could fill the memory: at a rate of 1 Hz, 16,000 samples are made out of one.
-    """
+    """Raise InputError for a sampling rate or channels that no recorder has: a wrong header could fill the memory."""
     if not LOWEST_HZ <= rate_hz <= HIGHEST_HZ:
         raise InputError(f"{name}: sampled at {rate_hz} Hz, required {LOWEST_HZ} to {HIGHEST_HZ}; {AGAIN}")
     if not 1 <= channels <= MAX_CHANNELS:
@@ -192,25 +205,6 @@ class _TrackDecoder:
             self._count += len(chosen)
 
 
-LOG = logging.getLogger("lipmotion")
-
-SHORTEST_S = 0.1  # shorter recordings hold no sentence; the features need 25 ms around every frame
-CANCELLED_SHARE = 0.2
-"""The mean of channels must have this share of the energy of unlike ones; else they cancel one another."""
-USABLE_SHARE = 0.5  # a damaged recording is refused when less than this share of its sound can be decoded
-MIN_HOLES_S = 0.005  # holes that last less together are not mentioned: they would be rounded to 0
-CUT_SHORT_SHARE, ROUNDED_S, STATED = 0.9, 0.5, ("flac", "aiff", "mov,mp4,m4a,3gp,3g2,mj2")
-"""A recording is called cut short when it holds less than this share of the duration that it states, or so many seconds
-less in a format that states it exactly."""
-HEADS = {"aiff": 8, "asf": 0, "caf": 0, "flv": 0, "mov,mp4,m4a,3gp,3g2,mj2": 4, "tta": 0}
-"""Formats of which FFmpeg reads the first of several joined files, and where eight bytes begin that all heads share."""
-GUESSED = ("aac", "ac3", "amr", "dts", "eac3")  # formats without a length, at which FFmpeg guesses by the first packets
-PCM, FLOAT, EXTENSIBLE = 1, 3, 0xFFFE
-"""Forms of samples in a WAVE file; the last one says its form, and how many bits are valid, in a longer header."""
-UNKNOWN_SIZES = range(0x7FFF0000, 0x1_0000_0000)
-"""Sizes in bytes with which programs begin a WAVE file whose end they do not know, besides 0."""
-
-
 def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) -> Audio:
     """Return the first sound track of a file, the mean of its channels.
 
@@ -300,11 +294,10 @@ class _Wave(mmap.mmap):
 
 
 def _correct_wave(path: Path) -> tuple[_Wave | None, float, str]:
-    """Return a WAVE file under a header that FFmpeg understands, the seconds that its own states beyond its end, and
-    what else is wrong; None: its own header will do. Raises ValueError: the high byte comes first.
+    """Return a WAVE file under a header for FFmpeg (None: its own will do), the seconds that it lacks, and a note.
 
     FFmpeg reads samples of as many bits as are valid, without the zeros that fill their container; it loses its way at
-    a chunk of odd length that no byte follows, and reads one of several pieces of sound.
+    a chunk of odd length that no byte follows, and reads one of several pieces of sound. Raises ValueError: RIFX.
     """
     with path.open("rb") as file:
         kind = file.read(4)
@@ -318,19 +311,23 @@ def _correct_wave(path: Path) -> tuple[_Wave | None, float, str]:
         return None, 0.0, ""
     coding, channels, rate_hz, per_second, block, bits = struct.unpack_from("<HHIIHH", form)
     valid, missing = bits, 0 if size in UNKNOWN_SIZES else max(body + size - len(content), 0)
-    missing_s = missing / max(per_second, 1)
+    size = min(size or len(content), len(content) - body)
     if coding == EXTENSIBLE:
         valid, coding = struct.unpack_from("<H4xH", form, 18) if len(form) >= 40 else (-1, PCM)
     min_frame = -(-bits // 8) * channels
     frame = block if block * rate_hz == per_second and block >= min_frame else min_frame
-    if not channels or frame % channels:
+    missing_s = missing / max(frame * rate_hz if coding in {PCM, FLOAT} else per_second, 1)
+    if not (channels and frame) or frame % channels:
         return None, missing_s, note
     if is_plain := coding in {PCM, FLOAT}:
+        spans = np.frombuffer(content, np.uint8, size // frame * frame, body).reshape(-1, frame // channels)
+        if bits and spans[:, : (frame - min_frame) // channels].any():  # no zeros fill a container
+            note = f"its header states {frame} bytes a frame, and its samples fill {min_frame}: so many are read"
+            frame = min_frame
         container = 8 * frame // channels
         form = struct.pack("<HHIIHH", coding, channels, rate_hz, frame * rate_hz, frame, container)
-    if not rewritten and (not is_plain or (bits == container and valid in {0, container})):
+    if not rewritten and (not is_plain or ((bits, per_second) == (container, frame * rate_hz) and valid in {0, bits})):
         return None, missing_s, note
-    size = min(size or len(content), len(content) - body)
     lengths = [min(length, 0xFFFFFFFF) for length in (20 + len(form) + size, size)]
     header = struct.pack("<4sI8sI", b"RIFF", lengths[0], b"WAVEfmt ", len(form)) + form
     header += struct.pack("<4sI", b"data", lengths[1])
