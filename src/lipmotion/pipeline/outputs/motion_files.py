@@ -199,9 +199,7 @@ def fit_to_format(
     hertz = rate_hz or (form.rate_hz if of_format else None)
     if hertz is None or abs(hertz - held.motion.rate_hz) < SAME_HZ:
         return held
-    if held is chosen or held is generation:
-        return held.resampled(hertz)
-    return resample_curves(held, generation, hertz)
+    return held.resampled(hertz) if held in (chosen, generation) else resample_curves(held, generation, hertz)
 
 
 def resample_curves(held: Generation, generation: Generation, rate_hz: float) -> Generation:
@@ -213,7 +211,8 @@ def resample_curves(held: Generation, generation: Generation, rate_hz: float) ->
     if OPENING not in mouth.names or len(held.motion.values) != len(mouth.values):
         return resampled
     contact = find_mouth(mouth, generation.units).contact
-    rows = sample_pictures(held.motion.values.astype(np.float64), contact, held.motion.rate_hz, resampled.motion.time_s)
+    time_s = held.sample_times(rate_hz)
+    rows = sample_pictures(held.motion.values.astype(np.float64), contact, held.motion.rate_hz, time_s)
     return replace(resampled, motion=replace(resampled.motion, values=rows))
 
 
