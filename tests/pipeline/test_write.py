@@ -43,8 +43,7 @@ def test_several_files_at_once_and_at_another_rate(result, toy_model, toy_speech
         assert motion.values == pytest.approx(result.motion.values, abs=1e-5)
         assert len(units) == (0 if path.suffix == ".csv" else len(result.units))
         write(result, path, model=toy_model, rate_hz=30)
-        motion, _ = read_motion(path)
-        assert motion.rate_hz == 30
+        assert (motion := read_motion(path)[0]).rate_hz == 30
         assert motion.values == pytest.approx(close_on_frame_grid(result, 30).motion.resampled(30).values, abs=1e-5)
 
 
@@ -55,8 +54,8 @@ def test_pins_are_met_at_any_rate(toy_model, toy_speech, tmp_path):
         write(generation, tmp_path / "a.csv", rate_hz=rate_hz, curves=curves, delivery=Delivery(offset_ms=later_ms))
         motion, _ = read_motion(tmp_path / "a.csv")
         for pin in pins[2:] if curves else pins[:2]:
-            shown = motion[pin.channel][round((pin.time_s + later_ms / 1000) * rate_hz)]
-            assert shown == pytest.approx(pin.value, abs=1e-5), (pin, rate_hz, later_ms)
+            nearest = round((pin.time_s + later_ms / 1000) * rate_hz)
+            assert motion[pin.channel][nearest] == pytest.approx(pin.value, abs=1e-5), (pin, rate_hz, later_ms)
 
 
 def test_files_say_where_they_come_from_and_a_recording_may_have_any_name(result, toy_model, toy_speech, tmp_path):
@@ -66,8 +65,7 @@ def test_files_say_where_they_come_from_and_a_recording_may_have_any_name(result
     assert document["source"] == {"file": toy_speech.name}
     assert document["model"] == {"corpus": "a; b", "licence": "CC BY 4.0", "attribution": "Anna; Ünal"}
     write(result, [tmp_path / "a.json", tmp_path / "a.npz"], speech="Ünal 音 caf\udce9.wav", model=toy_model)
-    document = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
-    assert document["source"] == {"file": "Ünal 音 caf\\udce9.wav"}
+    assert json.loads((tmp_path / "a.json").read_text("utf-8"))["source"] == {"file": "Ünal 音 caf\\udce9.wav"}
     assert len(read_motion(tmp_path / "a.npz")[1]) == len(result.units)
 
 
@@ -257,8 +255,7 @@ def test_loudness_and_pitch_move_together(offset_ms):
 
 @pytest.mark.parametrize("rate_hz", [12.0, 23.976])
 def test_closures_between_two_frames_of_a_slow_file_are_kept(generation, rate_hz, tmp_path):
-    narrow = generation.motion.values.copy()
-    column = generation.motion.column("opening")
+    narrow, column = generation.motion.values.copy(), generation.motion.column("opening")
     closed = [each.frame for each in find_closures(generation.motion, generation.units)]
     narrow[50:100, column] = 0.1
     narrow[closed, column] = 0.0
@@ -290,19 +287,15 @@ def test_moods_are_channels_that_the_intensity_leaves_and_the_offset_moves(gener
     found = deliver(generation, Delivery(mood="happy:0.5, neutral at 1.0", intensity=2.0, offset_ms=500)).motion
     assert found.names == (*generation.motion.names, "mood_happy")
     assert found["mood_happy"][[0, 100, -1]] == pytest.approx([0.5, 0.5, 0.0])
-    again = deliver(replace(generation, motion=found), Delivery())
-    assert np.array_equal(again.motion.values, found.values)
+    assert np.array_equal(deliver(replace(generation, motion=found), Delivery()).motion.values, found.values)
 
 
-def test_words_say_the_mood_after_the_one_that_is_asked_for(generation):
+def test_words_say_the_mood_after_the_one_that_is_asked_for_and_neutral_is_none(generation):
     tagged = replace(generation, moods=(MoodKey(1.0, "sad"),))
     assert deliver(tagged, Delivery()).motion["mood_sad"][[0, -1]] == pytest.approx([0, 1])
     both = deliver(tagged, Delivery(mood="happy")).motion
     assert (both["mood_happy"][0], both["mood_sad"][-1]) == (1, 1)
     assert both["mood_happy"][-1] == pytest.approx(0)
-
-
-def test_neutral_is_what_no_mood_is(generation):
     plain, neutral = (deliver(generation, Delivery(mood=mood)).motion for mood in ("", "neutral"))
     assert neutral.names == plain.names
     assert np.array_equal(neutral.values, plain.values)
