@@ -153,8 +153,7 @@ def intensify(
     """
     motion = generation.motion
     factor = intensity = np.broadcast_to(np.asarray(intensity, np.float64), len(motion.values))
-    changed = np.flatnonzero(intensity != 1)
-    if not len(changed):
+    if not len(changed := np.flatnonzero(intensity != 1)):
         return generation
     if opening is None and "opening" in motion.names:
         opening = motion["opening"].astype(np.float64)

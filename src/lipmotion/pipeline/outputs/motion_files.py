@@ -221,10 +221,8 @@ def _make_curves(generation: Generation, name: str, staging: Staging | None, pro
     motion, units, is_arkit = generation.motion, generation.units, name in (ARKIT, WHOLE_FACE)
     faps = [channel.name for channel in motion.channels if channel.unit == name == FAP]
     shapes = _blendshapes(motion) if is_arkit else None
-    if shapes is None and not faps:
-        return make_curves(motion, units, name, staging=staging, prosody=prosody)
     if shapes is None:
-        return motion.selected(faps)
+        return motion.selected(faps) if faps else make_curves(motion, units, name, staging=staging, prosody=prosody)
     moods = [channel.name for channel in motion.channels if is_mood(channel.name)]
     shown = join_channels(shapes, generation.selected(moods).motion) if moods else shapes
     mouth = make_curves(shown, units, ARKIT)  # the same weights, but where lips close that would not, and more of them
