@@ -20,6 +20,7 @@ from lipmotion.pipeline.edit_files import EditFile, create_edit_file
 from lipmotion.pipeline.edits import Edits, Step, WordIs, WordSaid, WordStep, parse_step
 from lipmotion.pipeline.generate.explain import explain_session, write_explanation
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.outputs.curve_sets import UNEDITABLE
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.session import Session
@@ -224,7 +225,7 @@ class OpenRecording:
             "frames": len(motion.values),
             "words": rows,
             "phones": describe_phones(generation.units, self.session.units()),
-            "channels": [{"name": channel.name, "unit": channel.unit} for channel in motion.channels],
+            "channels": [{"name": n.name, "unit": n.unit} for n in motion.channels if n.name not in UNEDITABLE],
             "steps": list(self.file.edits.sentences),
             "edits_digest": digest_edits(self.file.edits.sentences),
             "undo": len(self.file.edits.steps),

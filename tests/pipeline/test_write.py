@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
 from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth_poses
 from lipmotion.pipeline.outputs.motion_files import with_articulation
 from lipmotion.pipeline.outputs.output import OutputSettings, create_outputs, plan, shift_prosody
-from lipmotion.types import Audio, Prosody, Timeline
+from lipmotion.types import Audio, Constraints, Pin, Prosody, Timeline
 from lipmotion.types.delivery import MoodKey
 from lipmotion_faces import Staging
 from lipmotion_faces.outputs import drawn_video
@@ -32,7 +33,7 @@ from speech.made_voices import laugh, pulses, recording, said, vowels
 from testing.toy import toy_sentences
 
 
-def test_several_files_at_once(result, toy_model, toy_speech, tmp_path):
+def test_several_files_at_once_and_at_another_rate(result, toy_model, toy_speech, tmp_path):
     paths = [tmp_path / name for name in ("a.json", "a.csv", "a.NPZ")]
     write(result, [paths[0], str(paths[1]), paths[2]], speech=toy_speech, model=toy_model)
     assert sorted(tmp_path.iterdir()) == sorted(paths)
@@ -41,14 +42,20 @@ def test_several_files_at_once(result, toy_model, toy_speech, tmp_path):
         assert (motion.names, motion.rate_hz) == (result.motion.names, 100)
         assert motion.values == pytest.approx(result.motion.values, abs=1e-5)
         assert len(units) == (0 if path.suffix == ".csv" else len(result.units))
-
-
-def test_another_rate(result, toy_model, tmp_path):
-    for path in (tmp_path / name for name in ("a.json", "a.csv", "a.NPZ")):
         write(result, path, model=toy_model, rate_hz=30)
-        motion, _ = read_motion(path)
-        assert motion.rate_hz == 30
+        assert (motion := read_motion(path)[0]).rate_hz == 30
         assert motion.values == pytest.approx(close_on_frame_grid(result, 30).motion.resampled(30).values, abs=1e-5)
+
+
+def test_pins_are_met_at_any_rate(toy_model, toy_speech, tmp_path):
+    pins = Pin(1.23, "opening", 0.05), Pin(0.767, "width", 0.7), Pin(1.43, "jawOpen", 0.37), Pin(2, "browInnerUp", 0.9)
+    generation = animate(toy_speech, model=toy_model, constraints=Constraints(pins))
+    for rate_hz, curves, later_ms in product((24, 30, 60, 90, 120), (None, "face"), (0, 15)):
+        write(generation, tmp_path / "a.csv", rate_hz=rate_hz, curves=curves, delivery=Delivery(offset_ms=later_ms))
+        motion, _ = read_motion(tmp_path / "a.csv")
+        for pin in pins[2:] if curves else pins[:2]:
+            nearest = round((pin.time_s + later_ms / 1000) * rate_hz)
+            assert motion[pin.channel][nearest] == pytest.approx(pin.value, abs=1e-5), (pin, rate_hz, later_ms)
 
 
 def test_files_say_where_they_come_from_and_a_recording_may_have_any_name(result, toy_model, toy_speech, tmp_path):
@@ -58,8 +65,7 @@ def test_files_say_where_they_come_from_and_a_recording_may_have_any_name(result
     assert document["source"] == {"file": toy_speech.name}
     assert document["model"] == {"corpus": "a; b", "licence": "CC BY 4.0", "attribution": "Anna; Ünal"}
     write(result, [tmp_path / "a.json", tmp_path / "a.npz"], speech="Ünal 音 caf\udce9.wav", model=toy_model)
-    document = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
-    assert document["source"] == {"file": "Ünal 音 caf\\udce9.wav"}
+    assert json.loads((tmp_path / "a.json").read_text("utf-8"))["source"] == {"file": "Ünal 音 caf\\udce9.wav"}
     assert len(read_motion(tmp_path / "a.npz")[1]) == len(result.units)
 
 
@@ -249,8 +255,7 @@ def test_loudness_and_pitch_move_together(offset_ms):
 
 @pytest.mark.parametrize("rate_hz", [12.0, 23.976])
 def test_closures_between_two_frames_of_a_slow_file_are_kept(generation, rate_hz, tmp_path):
-    narrow = generation.motion.values.copy()
-    column = generation.motion.column("opening")
+    narrow, column = generation.motion.values.copy(), generation.motion.column("opening")
     closed = [each.frame for each in find_closures(generation.motion, generation.units)]
     narrow[50:100, column] = 0.1
     narrow[closed, column] = 0.0
@@ -260,7 +265,7 @@ def test_closures_between_two_frames_of_a_slow_file_are_kept(generation, rate_hz
     assert opening[[round(frame / 100 * rate_hz) for frame in closed]] == pytest.approx(0.0, abs=1e-6)
 
 
-def test_eyes_and_head_move_on_while_the_mouth_is_held(generation, tmp_path):
+def test_eyes_head_and_moods_move_on_while_the_mouth_is_held(generation, tmp_path):
     smooth, delivery = with_curves(generation, "face")[0], Delivery(min_hold_ms=400)
     assert max(np.abs(smooth.motion[name]).max() for name in ("eyeBlinkLeft", "headYaw")) > 1e-3
     steps = hold_mouth_poses(smooth, delivery.hold_frames(100), [])
@@ -273,31 +278,24 @@ def test_eyes_and_head_move_on_while_the_mouth_is_held(generation, tmp_path):
     write(smooth, tmp_path / "a.livelink.csv", delivery=delivery, rate_hz=100)
     assert read_motion(tmp_path / "a.livelink.csv")[0]["headYaw"] == pytest.approx(smooth.motion["headYaw"], abs=1e-5)
     assert {"jawOpen", "opening"} <= set(steps.stepped)
+    stepped = deliver_to_face(generation, Delivery(mood="happy, sad at 1.0", stepped=True), 25.0)
+    assert "mood_sad" not in stepped.stepped
+    assert len(np.unique(stepped.motion["mood_sad"])) > 6
 
 
 def test_moods_are_channels_that_the_intensity_leaves_and_the_offset_moves(generation):
     found = deliver(generation, Delivery(mood="happy:0.5, neutral at 1.0", intensity=2.0, offset_ms=500)).motion
     assert found.names == (*generation.motion.names, "mood_happy")
     assert found["mood_happy"][[0, 100, -1]] == pytest.approx([0.5, 0.5, 0.0])
-    again = deliver(replace(generation, motion=found), Delivery())
-    assert np.array_equal(again.motion.values, found.values)
+    assert np.array_equal(deliver(replace(generation, motion=found), Delivery()).motion.values, found.values)
 
 
-def test_moods_move_on_while_the_mouth_is_held(generation):
-    stepped = deliver_to_face(generation, Delivery(mood="happy, sad at 1.0", stepped=True), 25.0)
-    assert "mood_sad" not in stepped.stepped
-    assert len(np.unique(stepped.motion["mood_sad"])) > 6
-
-
-def test_words_say_the_mood_after_the_one_that_is_asked_for(generation):
+def test_words_say_the_mood_after_the_one_that_is_asked_for_and_neutral_is_none(generation):
     tagged = replace(generation, moods=(MoodKey(1.0, "sad"),))
     assert deliver(tagged, Delivery()).motion["mood_sad"][[0, -1]] == pytest.approx([0, 1])
     both = deliver(tagged, Delivery(mood="happy")).motion
     assert (both["mood_happy"][0], both["mood_sad"][-1]) == (1, 1)
     assert both["mood_happy"][-1] == pytest.approx(0)
-
-
-def test_neutral_is_what_no_mood_is(generation):
     plain, neutral = (deliver(generation, Delivery(mood=mood)).motion for mood in ("", "neutral"))
     assert neutral.names == plain.names
     assert np.array_equal(neutral.values, plain.values)

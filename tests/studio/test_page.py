@@ -242,6 +242,13 @@ def test_what_was_refused_is_told_until_something_succeeds(page):
     assert page.window.text("#message") == ""
     page.window.press("a")
     wait_until(lambda: page.of("studio.store.recordings[0].mark") == "none", LIMIT_S)
+    page.window.run(  # what the page reads while a recording is analysed comes later, and is not told
+        """const { fetch } = window;
+        window.fetch = async () => { window.fetch = fetch; return new Response("{}", { status: 503 }); };
+        studio.store.set({ weights: null }); studio.weights.change(null);"""
+    )
+    page.ready()
+    assert page.window.text("#message") == ""
 
 
 def test_an_edit_waits_for_a_border_that_is_on_its_way(page):

@@ -130,7 +130,7 @@ def show_contact(contact: Mask, rate_hz: float, time_s: Curve) -> Mask:
     frames = np.clip(np.rint(time_s * rate_hz).astype(int), 0, max(len(contact) - 1, 0))
     shown = contact[frames].copy()
     if len(time_s) > 1:
-        step_s = float(time_s[1] - time_s[0])
+        step_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
         for first, stop in find_runs(contact).tolist():
             middle = ((first + stop - 1) / 2 / rate_hz - float(time_s[0])) / step_s
             count = 2 if stop - first >= max(0.95 * step_s * rate_hz, 2) else 1
@@ -154,9 +154,8 @@ def sample_pictures(rows: Curve, contact: Mask, rate_hz: float, time_s: Curve) -
     touching = show_contact(contact, rate_hz, time_s)
     position = time_s * rate_hz
     low = np.clip(np.floor(position + 1e-6).astype(int), 0, len(rows) - 1)
-    at_frame = position - low <= 1e-6
-    values[at_frame] = table[low[at_frame]]
-    high = np.where(at_frame, low, np.minimum(low + 1, len(rows) - 1))
+    high = np.clip(np.ceil(position - 1e-6).astype(int), 0, len(rows) - 1)
+    values[low == high] = table[low[low == high]]
     mixed = np.flatnonzero((contact[low] != touching) | (contact[high] != touching))
     for kind in (True, False):
         frames, chosen = np.flatnonzero(contact == kind), mixed[touching[mixed] == kind]

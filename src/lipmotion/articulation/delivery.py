@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import CLOSED_OPENING, EDITED, find_closures, smooth_step
+from lipmotion.articulation.contact import CLOSED_OPENING, EDITED, find_closures, read_edited, smooth_step
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.errors import InputError
@@ -95,9 +95,9 @@ def shift_in_time(generation: Generation, delivery: Delivery) -> Generation:
         values = motion.values[nearest]
     else:
         values = motion.at(position / rate_hz)
-        for frame, *_ in find_closures(motion, generation.units):
-            at = round(frame + by_s * rate_hz)
-            if 0 <= at < len(values):
+        for time_s in (*find_closed_times(generation), *generation.pinned_s):
+            frame = int(time_s * rate_hz + 0.5)
+            if 0 <= (at := round(frame + by_s * rate_hz)) < len(values):
                 values[at] = motion.values[frame]
     end_s = max(duration_s, later_s, *(span.end_s + later_s for span in generation.units))
     return replace(
@@ -107,6 +107,7 @@ def shift_in_time(generation: Generation, delivery: Delivery) -> Generation:
         units=shift_units(generation.units, by_s, end_s),
         trace=StateTrace(generation.trace.states, generation.trace.frames[nearest]),
         curve_edits=_shift_edits(generation.curve_edits, by_s, duration_s),
+        pinned_s=tuple(each + by_s for each in generation.pinned_s if 0 <= each + by_s <= duration_s),
     )
 
 
@@ -152,8 +153,7 @@ def intensify(
     """
     motion = generation.motion
     factor = intensity = np.broadcast_to(np.asarray(intensity, np.float64), len(motion.values))
-    changed = np.flatnonzero(intensity != 1)
-    if not len(changed):
+    if not len(changed := np.flatnonzero(intensity != 1)):
         return generation
     if opening is None and "opening" in motion.names:
         opening = motion["opening"].astype(np.float64)
@@ -197,11 +197,10 @@ def hold_poses(generation: Generation, frames: int, closed_s: Sequence[float] = 
     if frames < 2 or not count:
         return generation
     closed = np.unique([min(round(time_s * motion.rate_hz), count - 1) for time_s in closed_s]).astype(int)
-    deciding = [name for name in POSE_CHANNELS if name in motion.names]
-    others = [channel.name for channel in motion.channels if channel.unit != EYE_DISTANCE or not deciding]
-    names = [*deciding, *(name for name in others if name not in deciding)]
-    rows = np.stack([motion[name].astype(np.float64) for name in names], axis=1)
-    kinds = np.array([motion.channels[motion.column(name)].unit for name in names])
+    is_measured = not {*POSE_CHANNELS}.isdisjoint(motion.names)  # then no other distance counts
+    chosen = [each.name in POSE_CHANNELS or each.unit != EYE_DISTANCE or not is_measured for each in motion.channels]
+    rows = motion.values[:, chosen].astype(np.float64)
+    kinds = np.array([each.unit for each in motion.channels])[chosen]
     for kind in set(kinds.tolist()):  # each unit scaled to a standard deviation of 1
         rows[:, kinds == kind] /= max(float(rows[:, kinds == kind].std(axis=0).max()), 1e-12)
     borders = choose_holds(rows, frames, closed.tolist())
@@ -221,12 +220,15 @@ def hold_poses(generation: Generation, frames: int, closed_s: Sequence[float] = 
 
 def close_on_frame_grid(generation: Generation, rate_hz: float) -> Generation:
     """Return a generation whose closures of p, b and m lie at times n / ``rate_hz`` s, where that rate shows them."""
-    motion = generation.motion
+    motion, time_s = generation.motion, generation.sample_times(rate_hz)
     values = motion.values.copy()
     for frame, *_ in find_closures(motion, generation.units):
-        position = round(frame / motion.rate_hz * rate_hz) / rate_hz * motion.rate_hz
+        position = time_s[min(round(frame / motion.rate_hz * rate_hz), len(time_s) - 1)] * motion.rate_hz
         first, last = int(np.floor(position + 1e-6)), int(np.ceil(position - 1e-6))
         values[min(first, len(values) - 1) : last + 1] = motion.values[frame]
+    for channel in EDITED.keys() & {*motion.names}:
+        edited = read_edited(motion, channel) > 1 - 1e-6  # where it is pinned, drawn or held
+        values[edited, motion.column(channel)] = motion[channel][edited]
     return replace(generation, motion=replace(motion, values=values))
 
 

@@ -363,7 +363,9 @@ class Session:
         for edit in edits:
             check_edit(edit, motion, self._curves)
         others = tuple(e for e in edits if isinstance(e, Hold) or (e in curves and e.channel not in motion.names))
-        return replace(generation.with_motion(motion), curve_edits=others)
+        stated = (step.stated for step in remove_pins(steps) if isinstance(step, CurveStep))
+        pinned_s = tuple(edit.time_s for edit in stated if isinstance(edit, Pin))
+        return replace(generation.with_motion(motion), curve_edits=others, pinned_s=pinned_s)
 
     def _with_pins(self, phone_steps: tuple[Step, ...], pins: tuple[Pin, ...]) -> Generation:
         """Return the engine's motion after some edits of phones, through pins; while sketching, a sketch of it."""

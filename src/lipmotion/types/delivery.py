@@ -6,10 +6,9 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any
 
-from lipmotion.errors import InputError, shorten
+from lipmotion.errors import InputError, shorten, suggest
 from lipmotion.types.configuration import Configuration, Rule, option
 
 NEUTRAL = "neutral"
@@ -38,9 +37,8 @@ class MoodKey:
 
     def __post_init__(self) -> None:
         if self.mood not in _NAMES:
-            near = get_close_matches(self.mood, _NAMES, 1)
-            hint = f" (is it {near[0]}?)" if near else ""
-            raise InputError(f"the mood is {shorten(repr(self.mood))}{hint}, required one of: {', '.join(_NAMES)}")
+            near, known = suggest(self.mood, _NAMES), ", ".join(_NAMES)
+            raise InputError(f"the mood is {shorten(repr(self.mood))}{near}, required one of: {known}")
         if not 0 <= self.strength <= 1:
             raise InputError(f"the strength of the mood {self.mood} is {self.strength:g}, required 0 to 1")
         if not 0 <= self.time_s < float("inf"):

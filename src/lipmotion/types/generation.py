@@ -99,6 +99,7 @@ class Generation:
     outlook : how well the model knew words and voice (None: not from ``animate``)
     stepped : channels of held poses, which change at once: formats that can say so do
     curve_edits : edits of curves that follow from the motion, as ``jawOpen``, wherever these are made; and what is held
+    pinned_s : times of pins in seconds; at other rates, the frame nearest to one shows it
     moods  : what the words say of the mood, over time, in the order of their times
     events : what is detected in the voice beside words; manners and moods of them are shown where none is asked for
     about  : corpus, licence and attribution of the model, by name, as ``Model.about``; empty: not from ``animate``
@@ -119,6 +120,7 @@ class Generation:
     outlook: Outlook | None = None
     stepped: tuple[str, ...] = ()
     curve_edits: tuple[CurveEdit, ...] = ()
+    pinned_s: tuple[float, ...] = ()
     moods: tuple[MoodKey, ...] = ()
     events: tuple[VoiceEvent, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)
@@ -174,11 +176,20 @@ class Generation:
 
     def resampled(self, rate_hz: float) -> Generation:
         """Return the generation at another rate, with the nearest states. Raises InputError: a rate not more than 0."""
-        motion = self.motion.resampled(rate_hz)
-        spread = self.change_frames(lambda rows: interpolate_rows(rows, self.motion.rate_hz, motion.time_s))
-        nearest = np.minimum(np.round(motion.time_s * self.motion.rate_hz).astype(int), len(self.trace.frames) - 1)
+        time_s = self.sample_times(rate_hz)
+        spread = self.change_frames(lambda rows: interpolate_rows(rows, self.motion.rate_hz, time_s))
+        nearest = np.minimum(np.round(time_s * self.motion.rate_hz).astype(int), len(self.trace.frames) - 1)
         trace = StateTrace(self.trace.states, self.trace.frames[nearest])
+        motion = Motion(self.motion.at(time_s), rate_hz, self.motion.channels)
         return replace(self, motion=motion, spread=spread, trace=trace)
+
+    def sample_times(self, rate_hz: float) -> NDArray[np.float64]:
+        """Return when frames at another rate are taken, in seconds [shape=(N,)]: at pins, those nearest to them."""
+        time_s = self.motion.selected(self.motion.names[:1]).resampled(rate_hz).time_s
+        own_hz = self.motion.rate_hz
+        for pinned_s in self.pinned_s:
+            time_s[min(round(pinned_s * rate_hz), len(time_s) - 1)] = np.floor(pinned_s * own_hz + 0.5) / own_hz
+        return time_s
 
     def change_frames(self, change: RowChange) -> NDArray[np.floating[Any]] | ReducedVariance:
         """Return the variances with other rows, which a function makes of those of all frames."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shorten, shorten_list
+from lipmotion.errors import InputError, shorten, shorten_list, suggest
 from lipmotion.printable import is_formula
 
 EYE_DISTANCE = "eye_distance"  # the unit of all tracked lengths: the distance between the outer eye corners
@@ -83,7 +83,8 @@ class Motion:
     def column(self, name: str) -> int:
         """Return the column of a channel in ``values``. Raises InputError: no such channel."""
         if name not in self.names:
-            raise InputError(f"no motion channel {name!r} among {len(self.names)}: {shorten_list(self.names, 6)}")
+            known = f"{len(self.names)}: {shorten_list(self.names, 6)}"
+            raise InputError(f"no motion channel {shorten(repr(name))}{suggest(name, self.names)} among {known}")
         return self.names.index(name)
 
     def selected(self, names: Sequence[str]) -> Motion:

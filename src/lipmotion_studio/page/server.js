@@ -3,12 +3,18 @@
 import { TEXT } from "./strings.js";
 import { Curves } from "./curves.js";
 
-/** A refusal: `status` of HTTP, 0 where nothing answered; `state` of the recording, where the refusal has it. */
+const UNAVAILABLE = 503; // the recording is being analysed
+
+/**
+ * A refusal: `status` of HTTP, 0 where nothing answered; `state` of the recording, where the refusal has it; `isEarly`:
+ * what was to be read is there once the recording has been analysed.
+ */
 export class Refused extends Error {
-  constructor(status, message, state = null) {
+  constructor(status, message, state = null, isEarly = false) {
     super(message);
     this.status = status;
     this.state = state;
+    this.isEarly = isEarly;
   }
 }
 
@@ -29,7 +35,8 @@ export class Server {
     }
     if (reply.ok) return reply;
     const content = await reply.json().catch(() => ({}));
-    throw new Refused(reply.status, content.error ?? `${reply.status} ${reply.statusText}`, content.state ?? null);
+    throw new Refused(reply.status, content.error ?? `${reply.status} ${reply.statusText}`, content.state ?? null,
+      reply.status === UNAVAILABLE && !request.method);
   }
 
   async read(path) { return (await this.reply(path)).json(); }

@@ -33,6 +33,7 @@ export class Studio {
     this.settling = new WhenCalm(this.store, () => this.settle());
     /** @type {Promise<any>} */ this.edits = Promise.resolve();
     /** @type {string | null} */ this.typed = null; // words that were typed, until they are said
+    this.isEarly = false; // whether something could not be read because the recording is being analysed
     this.left = false; // whether tabulators go on past the timeline
     this.askedAt = this.editedAt = 0; // when the edit was asked for whose motion is on its way, or is shown next
     this.build();
@@ -103,6 +104,11 @@ export class Studio {
 
   refuse(error) {
     if (error.name === "AbortError") return;
+    if (error.isEarly) { // nobody asked for it: all is read again once the recording is ready
+      this.isEarly = true;
+      this.wake();
+      return;
+    }
     this.say(error.status === 401 ? TEXT.noToken : error.message, "bad");
     if (!(error instanceof Refused)) throw error;
   }
@@ -150,7 +156,8 @@ export class Studio {
       }
       if (training.state === "working") pause_ms = Math.min(pause_ms, OWN_MS);
       const open = this.store.recordings.find(({ id }) => id === this.store.recordingId);
-      if (open && this.store.recording && open.status !== this.store.recording.status && before) await this.open(open.id, true);
+      const isDue = open && this.store.recording && (open.status !== this.store.recording.status || (this.isEarly && open.status === "ready"));
+      if (isDue && before) await this.open(open.id, true);
     } catch (error) {
       if (error instanceof Refused) this.refuse(error);
       else throw error;
@@ -172,6 +179,7 @@ export class Studio {
       this.typed = null;
       this.say("");
     }
+    this.isEarly = false;
     this.player.stop();
     this.weights.forget();
     this.store.set({ recordingId: id, recording: null, sound: null, motion: null, deviation: null, confidence: null, weights: null, other: null, comparing: false, heads: "one", doubts: [], selected: null, span: null, time_s: 0, progress: null });

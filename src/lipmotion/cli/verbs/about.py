@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Iterable, Mapping
-from functools import cache
+from functools import cache, partial
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -64,21 +64,11 @@ OF_PRIOR = ("engine", "corpus", "split", "utterances", "minutes", "licence", "at
 """What ``info`` prints of the model on which a model stands and which is part of its file."""
 
 
-def add_addon(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the verb that writes the add-on for another program, as a file that it installs."""
-    add_verb(verbs, __package__, "addon", _run_addon)
-
-
 def _run_addon(options: argparse.Namespace) -> None:
     from lipmotion.formats.game_engines import write_addon
 
     write_addon(options.program, options.output)
     print_line(options.output)
-
-
-def add_cite(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the verb that prints what to cite, as BibTeX."""
-    add_verb(verbs, __package__, "cite", _run_cite)
 
 
 def _run_cite(options: argparse.Namespace) -> None:
@@ -96,11 +86,6 @@ def _run_cite(options: argparse.Namespace) -> None:
     else:
         known = ", ".join((*ENGINES.names, *bibliography()))
         raise InputError(f"nothing to cite is called {name!r}; give a model file, or one of: {known}")
-
-
-def add_completion(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the verb that prints the script by which a shell completes the command line."""
-    add_verb(verbs, __package__, "completion", _run_completion)
 
 
 def _run_completion(options: argparse.Namespace) -> None:
@@ -171,3 +156,8 @@ def _plain(value: object) -> str:
     if isinstance(value, dict):
         return ", ".join(f"{key}={item}" for key, item in value.items())
     return "; ".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+add_addon = partial(add_verb, package=__package__, verb="addon", run=_run_addon)
+add_cite = partial(add_verb, package=__package__, verb="cite", run=_run_cite)
+add_completion = partial(add_verb, package=__package__, verb="completion", run=_run_completion)

@@ -57,8 +57,7 @@ def cues(
     if not np.isfinite(generation.motion.values).all():
         raise ExportError("the motion has values that are not finite; interpolate them first")
     chosen = delivery or Delivery()
-    if chosen.hold_ms:
-        hold_frames = max(hold_frames or 1, chosen.hold_frames(fps))
+    hold_frames = max(hold_frames or 0, chosen.hold_frames(fps)) or None
     generation = show_edited_curves(replace(generation, motion=with_mouth(generation.motion)))
     return choose_cues(shift_in_time(generation, chosen), fps, hold_frames, shapes.upper(), intensity=chosen.intensity)
 
@@ -95,8 +94,8 @@ def check_cue_options(fps: float, hold_frames: int | None, shapes: str) -> None:
     """Raise InputError if an argument of ``cues`` is out of its range."""
     if not 1 <= fps <= FASTEST_FPS:
         raise InputError(f"the frame rate is {fps}, required 1 to {FASTEST_FPS:.0f} a second")
-    if hold_frames is not None and hold_frames < 1:
-        raise InputError(f"the hold is {hold_frames} frames, required 1 or more")
+    if hold_frames is not None and not 1 <= hold_frames <= fps:
+        raise InputError(f"the hold is {hold_frames} frames, required 1 to {int(fps)}: at most a second")
     if set(shapes.upper()) - set(SHAPES):
         raise InputError(f"the optional shapes are {shapes!r}, required letters out of {OPTIONAL!r}, or none")
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +14,8 @@ from lipmotion.articulation.contact import EDITED, GAP, gap_to_opening, read_edi
 from lipmotion.articulation.curve_edits import apply_curve_edits, check_drawn, weigh_edits
 from lipmotion.articulation.expression import is_mood, read_moods
 from lipmotion.articulation.mouth import find_mouth
-from lipmotion.articulation.phone_targets import GESTURES, with_gestures
-from lipmotion.errors import InputError, shorten
+from lipmotion.articulation.phone_targets import GESTURES, OVAL, with_gestures
+from lipmotion.errors import InputError, shorten, suggest
 from lipmotion.formats.fap import NAMES, PARAMETERS, move_faps
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, vowel_mouth, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
@@ -55,6 +54,7 @@ WEIGHTS = (*ARKIT_MOUTH, *ARKIT_OTHERS, *VISEME_CHANNELS, *VRM_VOWELS)
 FAPS = {name: NAMES[number] for number, name, *_ in PARAMETERS}
 KNOWN_CURVES = (*WEIGHTS, *FAPS)
 """Curves that outputs may have, whatever the motion has: ARKit's blendshapes, visemes, MPEG-4's parameters."""
+UNEDITABLE = (*EDITED.values(), OVAL)  # channels that edits add, and that nobody edits
 LIP_POINT = re.compile(r"[xyz]_\d+")
 SETS_OF = {WHOLE_FACE: (*ARKIT_MOUTH, *ARKIT_OTHERS), VISEMES: VISEME_CHANNELS, VOWELS: VRM_VOWELS}
 """The curves that are edited in each set (``show_edited_curves``)."""
@@ -143,8 +143,7 @@ def apply_weight_edits(
     character : whose weights of the mouth these are, which stay where it is held; None: of the 3D head
     """
     known = list_known_names(character.mesh) if character else {}
-    named = {other: name for other, name in known.items() if name in weights.names}
-    named |= {name: name for name in weights.names}
+    named = {other: name for other, name in known.items() if name in weights.names and other not in weights.names}
     return apply_curve_edits(weights, units, rename_edits(edits, named), held=weights.names if character else ())
 
 
@@ -164,13 +163,11 @@ def check_edit(edit: CurveEdit, motion: Motion, others: Collection[str] = ()) ->
 
     others : names of curves that outputs will have besides
     """
-    names = dict.fromkeys(name for name in (*motion.names, *GESTURES) if name not in EDITED.values())
+    names = dict.fromkeys(name for name in (*motion.names, *GESTURES) if name not in UNEDITABLE)
     known = (*names, *KNOWN_CURVES, *others)
     if edit.channel and edit.channel not in known:
         verb = {Pin: "pin", DrawnCurve: "draw"}.get(type(edit), "change")
-        lower = {name.lower(): name for name in known}
-        near = get_close_matches(edit.channel.lower(), lower, 1)
-        name = shorten(repr(edit.channel)) + (f" (is it {lower[near[0]]}?)" if near else "")
+        name = shorten(repr(edit.channel)) + suggest(edit.channel, known)
         of_mouth = ", ".join(each for each in names if not LIP_POINT.match(each))
         known_curves = "lip points, as y_14; curves, as jawOpen, viseme_PP, open_jaw"
         raise InputError(f"cannot {verb} {name}; channels that can be pinned: {of_mouth}; {known_curves}")
@@ -290,6 +287,5 @@ def with_curves(
     edits = generation.curve_edits
     added = make_curves(generation.motion, generation.units, curves, staging=staging, prosody=prosody, edits=edits)
     others = [name for name in generation.motion.names if name not in added.names]
-    if len(others) < len(generation.motion.names):
-        generation = generation.selected(others)
+    generation = generation.selected(others)
     return generation.with_motion(join_channels(generation.motion, added)), added.names

@@ -99,8 +99,7 @@ def deliver_to_face(
     shown = show_edited_curves(shown, staging, prosody, mouth=solved is None)
     if shown.curve_edits and solved is not None:
         shown = with_curves(shown, solved)[0]
-    frames = delivery.hold_frames(fps)
-    if not frames:
+    if not (frames := delivery.hold_frames(fps)):
         return shown
     shown = shown.with_motion(with_gestures(shown.motion, shown.units))
     closed_s, shown = find_closed_times(shown), close_on_frame_grid(shown, fps)
@@ -128,8 +127,6 @@ def hold_mouth_poses(generation: Generation, frames: int, closed_s: Sequence[flo
     if not frames or not names:
         return generation
     mouth = replace(hold_poses(generation.selected(names), frames, closed_s), stepped=names)
-    if names == motion.names:
-        return mouth
     columns = [motion.column(name) for name in names]
     values, variance = motion.values.astype(np.float64), np.array(generation.variance)
     values[:, columns], variance[:, columns] = mouth.motion.values, mouth.variance

@@ -199,9 +199,7 @@ def fit_to_format(
     hertz = rate_hz or (form.rate_hz if of_format else None)
     if hertz is None or abs(hertz - held.motion.rate_hz) < SAME_HZ:
         return held
-    if held is chosen or held is generation:
-        return held.resampled(hertz)
-    return resample_curves(held, generation, hertz)
+    return held.resampled(hertz) if held in (chosen, generation) else resample_curves(held, generation, hertz)
 
 
 def resample_curves(held: Generation, generation: Generation, rate_hz: float) -> Generation:
@@ -213,7 +211,8 @@ def resample_curves(held: Generation, generation: Generation, rate_hz: float) ->
     if OPENING not in mouth.names or len(held.motion.values) != len(mouth.values):
         return resampled
     contact = find_mouth(mouth, generation.units).contact
-    rows = sample_pictures(held.motion.values.astype(np.float64), contact, held.motion.rate_hz, resampled.motion.time_s)
+    time_s = held.sample_times(rate_hz)
+    rows = sample_pictures(held.motion.values.astype(np.float64), contact, held.motion.rate_hz, time_s)
     return replace(resampled, motion=replace(resampled.motion, values=rows))
 
 
@@ -222,10 +221,8 @@ def _make_curves(generation: Generation, name: str, staging: Staging | None, pro
     motion, units, is_arkit = generation.motion, generation.units, name in (ARKIT, WHOLE_FACE)
     faps = [channel.name for channel in motion.channels if channel.unit == name == FAP]
     shapes = _blendshapes(motion) if is_arkit else None
-    if shapes is None and not faps:
-        return make_curves(motion, units, name, staging=staging, prosody=prosody)
     if shapes is None:
-        return motion.selected(faps)
+        return motion.selected(faps) if faps else make_curves(motion, units, name, staging=staging, prosody=prosody)
     moods = [channel.name for channel in motion.channels if is_mood(channel.name)]
     shown = join_channels(shapes, generation.selected(moods).motion) if moods else shapes
     mouth = make_curves(shown, units, ARKIT)  # the same weights, but where lips close that would not, and more of them
