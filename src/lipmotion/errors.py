@@ -6,9 +6,6 @@ for each class; exit code 2 means a wrong command line, exit code 1 a bug.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from difflib import get_close_matches
-
 SHOWN_CHARACTERS = 80  # largest number of characters of a text from a user that a message repeats
 
 
@@ -21,12 +18,6 @@ def shorten_list(names: list[str] | tuple[str, ...], count: int = 5) -> str:
     """Return the first names of a list, each shortened, and how many more there are, for a message."""
     more = f" and {len(names) - count} more" if len(names) > count else ""
     return ", ".join(map(shorten, names[:count])) + more
-
-
-def suggest(name: str, names: Iterable[str]) -> str:
-    """Return which of some names is like one that is none of them, for a message; empty: none is."""
-    lower = {each.lower(): each for each in names}
-    return "".join(f" (is it {lower[near]}?)" for near in get_close_matches(name.lower(), lower, 1))
 
 
 class LipMotionError(Exception):

@@ -8,8 +8,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from lipmotion.errors import InputError, shorten, suggest
+from lipmotion.errors import InputError, shorten
 from lipmotion.types.configuration import Configuration, Rule, option
+from lipmotion.types.values import suggest
 
 NEUTRAL = "neutral"
 MOODS = ("happy", "sad", "angry", "afraid", "disgusted", "surprised", "tense", "tired")

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shorten, shorten_list, suggest
+from lipmotion.errors import InputError, shorten, shorten_list
 from lipmotion.printable import is_formula
+from lipmotion.types.values import suggest
 
 EYE_DISTANCE = "eye_distance"  # the unit of all tracked lengths: the distance between the outer eye corners
 WEIGHT = "weight"  # the unit of blendshapes: 0 is no effect, 1 the full effect; never negative

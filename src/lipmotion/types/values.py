@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
+from difflib import get_close_matches
 from typing import Any
 
 from lipmotion.errors import InputError, shorten
@@ -22,6 +23,12 @@ _HALVES = re.compile("[\ud800-\udc7f\udd00-\udfff]")
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|(?i:nan|[-+]?inf)")
 _CLOCK = r"(?:([0-9]{1,6}):)?([0-9]{1,2}):([0-9]{1,2}(?:[.,][0-9]{1,9})?)"
 _WHOLE = re.compile("[-+]?[0-9]{1,18}")
+
+
+def suggest(name: str, names: Iterable[str]) -> str:
+    """Return which of some names is like one that is none of them, for a message; empty: none is."""
+    lower = {each.lower(): each for each in names}
+    return "".join(f" (is it {lower[near]}?)" for near in get_close_matches(name.lower(), lower, 1))
 
 
 class SchemaError(InputError):

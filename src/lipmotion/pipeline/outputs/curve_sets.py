@@ -15,7 +15,7 @@ from lipmotion.articulation.curve_edits import apply_curve_edits, check_drawn, w
 from lipmotion.articulation.expression import is_mood, read_moods
 from lipmotion.articulation.mouth import find_mouth
 from lipmotion.articulation.phone_targets import GESTURES, OVAL, with_gestures
-from lipmotion.errors import InputError, shorten, suggest
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.fap import NAMES, PARAMETERS, move_faps
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, vowel_mouth, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
@@ -46,6 +46,7 @@ from lipmotion.types import (
 )
 from lipmotion.types.delivery import Staging
 from lipmotion.types.edits import Locked
+from lipmotion.types.values import suggest
 
 ARKIT, WHOLE_FACE, VOWELS = "arkit", "face", "vowels"
 VISEMES, HELD_VISEMES = "visemes", "held-visemes"
