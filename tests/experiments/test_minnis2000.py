@@ -13,11 +13,10 @@ from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import create_engine
 from lipmotion.engines.selection.concatenation import to_pieces
 from lipmotion.engines.selection.costs import SelectionConfig
-from lipmotion.engines.selection.engine import SelectionEngine
-from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.types import Speech
+from lipmotion.types.audio import JoinedRows
 from lipmotion_lab import minnis2000
-from lipmotion_lab.evaluation.held_out import ComparedClip, HeldOutRecordings
+from lipmotion_lab.evaluation.held_out import ComparedClip, HeldOutRecordings, make_speech
 from lipmotion_lab.hofer2008 import PhoneticTableOptions, run_hofer2008
 from testing.toy import SMALL
 
@@ -66,12 +65,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus, folder: Path) -> Iterator[dict[str, Any]]:
     measure = minnis2000.measure_joins
+    rows: Any = JoinedRows([np.zeros((2, 64), np.float16)])
 
-    def measure_arrays(engine: SelectionEngine, model: SelectionModel, speech: Sequence[Speech], *rest: Any) -> Any:
-        assert all(isinstance(each.features.values, np.ndarray) for each in speech)  # a guide takes it as one passage
+    def measure_arrays(engine: Any, model: Any, speech: Sequence[Speech], *rest: Any) -> Any:
+        assert all(isinstance(each.encoding, np.ndarray) for each in speech)  # a guide takes it as one passage
         return measure(engine, model, speech, *rest)
 
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            minnis2000, "make_speech", lambda *given: [replace(s, encoding=rows) for s in make_speech(*given)]
+        )
         patch.setattr(minnis2000, "measure_joins", measure_arrays)
         yield minnis2000.run_minnis2000(toy_corpus, models=folder, settings=SETTINGS)
 
