@@ -215,7 +215,7 @@ def test_each_line_of_a_stem_has_the_motion_and_the_cues_of_the_line_alone(toy_m
         assert together.motion.values[frames] == pytest.approx(values, abs=0.005)
         assert any(shape != "X" for shape in cues)
         assert shown[24 * at_s :][: len(cues)] == cues
-        opening[frames.start - 60 : frames.stop + 60] = outside = opening[100]
+        opening[frames.start - 160 : frames.stop + 160] = outside = opening[0]
     assert opening == pytest.approx(outside)
 
 
