@@ -275,9 +275,8 @@ def generate_passages(
     Raises InputError: as ``generate``, with the time of the passage.
     """
     frames, parts = len(speech.features.values), speech.parts or ()
-    silence = Features(
-        np.zeros((REST_FRAMES, speech.features.values.shape[1]), np.float32), REST_FRAMES / FRAME_RATE_HZ
-    )
+    still = np.zeros((REST_FRAMES, speech.features.values.shape[1]), np.float32)
+    silence = Features(still, REST_FRAMES / FRAME_RATE_HZ)
     heard = speech.posteriors
     silent_speech = Speech(
         silence,
@@ -307,8 +306,7 @@ def generate_passages(
             made.append(replace(finished, motion=none, units=generation.units))
             yield finished.motion.values
 
-    dtype = np.dtype(np.float32) if frames > DOUBLE_FRAMES else rest.motion.values.dtype
-    like = np.empty((frames, 0), dtype)
+    like = np.empty((frames, 0), np.float32 if frames > DOUBLE_FRAMES else rest.motion.values.dtype)
     values = np.require(_join_rows(parts, generate_each(), rest.motion.values, like, resting), None, "W")
     spread: Any
     if isinstance(rest.spread, ReducedVariance):

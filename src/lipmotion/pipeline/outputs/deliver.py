@@ -127,6 +127,8 @@ def hold_mouth_poses(generation: Generation, frames: int, closed_s: Sequence[flo
     if not frames or not names:
         return generation
     mouth = replace(hold_poses(generation.selected(names), frames, closed_s), stepped=names)
+    if names == motion.names:  # the variance of an hour of all channels would not fit in memory
+        return mouth
     columns = [motion.column(name) for name in names]
     values, variance = motion.values.astype(np.float64), np.array(generation.variance)
     values[:, columns], variance[:, columns] = mouth.motion.values, mouth.variance

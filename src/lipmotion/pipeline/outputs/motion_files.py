@@ -199,7 +199,7 @@ def fit_to_format(
     hertz = rate_hz or (form.rate_hz if of_format else None)
     if hertz is None or abs(hertz - held.motion.rate_hz) < SAME_HZ:
         return held
-    return held.resampled(hertz) if held in (chosen, generation) else resample_curves(held, generation, hertz)
+    return held.resampled(hertz) if held is chosen or held is generation else resample_curves(held, generation, hertz)
 
 
 def resample_curves(held: Generation, generation: Generation, rate_hz: float) -> Generation:
