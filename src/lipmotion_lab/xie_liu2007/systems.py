@@ -34,9 +34,9 @@ TIED = {"unseen_loss": UNSEEN_LOSS, "start_asynchrony": 1}
 """Factorial chains that are tied together: rare joint states lose 10 nats, and the chains begin a state apart."""
 TOGETHER = {"moves_together": True}
 NETWORK_SETTINGS: tuple[Sequence[Options], ...] = (
-    [{"rate": rate} for rate in (4e-3, 2e-3, 8e-3)],
+    [{"rate": rate} for rate in (4e-3, 2e-3, 1e-3, 8e-3)],
     [{"cells": 192}],
-    [{"steps": 100.0}],
+    [{"steps": steps} for steps in (100.0, 200.0)],
 )
 """Settings of the BLSTM that are tried, one kind after another."""
 
