@@ -230,12 +230,10 @@ def test_in_blocks_each_clip_is_compared_once_by_systems_that_did_not_see_it(toy
     rows = figures["conditions"]["audio only"]
     assert rows["true"]["acc"] == pytest.approx(1)
     assert rows["true"]["score"] == rows["true"]["opening"]["score"] == 100
-    assert rows["noisy"]["acc"] < 1
     assert rows["noisy"]["acc_gain_95"]["true"][1] < 0 < rows["noisy"]["amse_gain_95"]["true"][0]
     assert cross_validate_blocks(experiment, toy_corpus, ["true"], count=4, work=tmp_path) == figures
     assert len(cut) == 4
-    text = build_blocks_section(figures).as_text()
-    assert "Highest ACC: true, 1.000." in text
-    assert f"{rows['noisy']['acc']:.3f}*" in text
+    said = f"{rows['noisy']['acc']:.3f}*", "Highest ACC: true, 1.000."
+    assert all(part in build_blocks_section(figures).as_text() for part in said)
     with pytest.raises(errors.InputError, match="2 blocks; required: from 3 to 12"):
         cross_validate_blocks(experiment, toy_corpus, [], count=2)

@@ -13,7 +13,7 @@ from lipmotion_lab.evaluation.table import format_figure
 from lipmotion_lab.hofer2008 import PAPER_SCORES, PINS, REFERENCE_SET
 from lipmotion_lab.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS
 from lipmotion_lab.report.section import Column, PaperOrder, PaperPair, Row, Section, Table, read_columns, warn_of_few
-from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM, SPLIT
+from lipmotion_lab.xie_liu2007.systems import BLSTM, PAPER_FIGURES, REFERENCE_SYSTEM, SPLIT
 
 AS_PRINTED, SETS = next(iter(PINS)), "Unit sets, "
 
@@ -279,19 +279,24 @@ def build_learning_section(figures: Mapping[str, Any]) -> Section:
     }
     columns = read_columns("learning-curve")
     main, *more = _make_tables("learning-curve", "Learning curve", columns, conditions, head="recordings")
-    first, last = next(iter(main.rows)), list(main.rows)[-1]
-    low, high = (format_figure(main.rows[size]["acc"], ".3f") for size in (first, last))
-    steps = [
-        size
-        for before, size in pairwise(main.rows)
-        if (subtract(main.rows[size]["acc"], main.rows[before]["acc"]) or 0) < 0
-    ]
+    accs = {size: row["acc"] for size, row in main.rows.items()}
+    first, last = next(iter(accs)), list(accs)[-1]
+    low, high = (format_figure(accs[size], ".3f") for size in (first, last))
+    steps = [size for before, size in pairwise(accs) if (subtract(accs[size], accs[before]) or 0) < 0]
     words = warn_of_few(figures["clips"]) | {
         "More recordings": [
             f"From {first} to {last} recordings the correlation of the opening goes from {low} to {high}.",
             f"It falls at: {', '.join(steps)}." if steps else "It falls at no step.",
         ]
     }
+    compared = {size: row[BLSTM]["channels"] for size, row in sizes.items() if BLSTM in row}
+    if compared:
+        words["Without pins, beside a BLSTM"] = [
+            f"{size} recordings, {channel}: {row['ours']:.3f}, BLSTM {row['acc']:.3f}, 95 % interval of the difference "
+            "{:+.3f} to {:+.3f}.".format(*row["gain_95"])
+            for size, channels in compared.items()
+            for channel, row in channels.items()
+        ]
     about = (
         f"The default engine trained on the first recordings of "
         f"{'the list given' if figures['order'] == 'given' else 'the training list, in a random order,'} alone, "
