@@ -106,11 +106,17 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
     if len(cues) > 1 or any("(" in cue[1] for cue in cues):
         text = MARKS["DIRECTION"].sub(leave_out, MARKS["CUE"].sub(leave_out, text))
     text = MARKS["SPEAKER"].sub(leave_out_name, text)
-    lines = [MARKS["SCRIPT"].fullmatch(line) for line in text.splitlines() if line.strip()]
-    tags = [line[1] for line in lines if line and line[1]]
-    if tags and all(lines) and not WORDS["no_tags"] & {*tags} and (len(lines) > 1 or not (lines[0] and lines[0][2])):
+    if _is_game_script(text):
         text = re.sub(r'^[^"\n]+(?=")', leave_out, text, flags=re.MULTILINE)
     return text, [name for name in left_out if name]
+
+
+def _is_game_script(text: str) -> bool:
+    """Return whether all lines are those of a game's script, quotes behind who speaks, and one says who."""
+    lines = [MARKS["SCRIPT"].fullmatch(line) for line in text.splitlines() if line.strip()]
+    tags = [line[1] for line in lines if line and line[1]]
+    is_stated = len(lines) > 1 or any(line and not line[2] for line in lines)  # one line says no look
+    return bool(tags) and all(lines) and is_stated and not WORDS["no_tags"] & {*tags}
 
 
 def _rise_from_start(stamps: Matches) -> bool:
@@ -228,12 +234,9 @@ def time_moods(tags: Sequence[MoodTag], units: Timeline[Unit]) -> tuple[MoodKey,
     spans = words or [(span.start_s, span.end_s) for span in units]
     if not tags or not spans:
         return ()
-    keys = []
-    for tag in tags:
-        place = round(tag.share * len(spans))
-        time_s = 0.0 if place == 0 else spans[place][0] if place < len(spans) else spans[-1][1]
-        keys.append(MoodKey(max(time_s, 0.0), tag.mood, tag.strength))
-    return sort_moods(keys)
+    edges_s = [0.0, *(start_s for start_s, _ in spans[1:]), spans[-1][1]]
+    times_s = (edges_s[min(round(tag.share * len(spans)), len(spans))] for tag in tags)
+    return sort_moods([MoodKey(max(at_s, 0.0), t.mood, t.strength) for at_s, t in zip(times_s, tags, strict=True)])
 
 
 def _meaning(tag: re.Match[str]) -> tuple[str, float] | None:

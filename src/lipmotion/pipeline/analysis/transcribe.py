@@ -18,7 +18,6 @@ from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit
 from lipmotion.speech.recognition.anchors import REACH_S, bound_words, find_anchors, leave_out_late_lines
 from lipmotion.speech.recognition.network.posteriors import (
     POSTERIOR_STEP,
-    WORD_BOUNDARY,
     find_stretches,
     mean_posterior,
     read_posteriors,
@@ -138,8 +137,7 @@ def _compare_with_sound(
 def compute_phone_posteriors(audio: AnalysedAudio) -> tuple[NDArray[np.float64], float]:
     """Return the log posteriors of a phone recogniser, and how sure it is of what is said, or of nothing, 0 to 1."""
     posteriors = read_posteriors(audio)
-    hears = any(stretch.token != WORD_BOUNDARY for stretch in posteriors.best_tokens)
-    sure = mean_posterior(find_stretches(audio)) if hears else 1.0
+    sure = mean_posterior(find_stretches(audio)) if posteriors.has_phones else 1.0
     return posteriors.of_phones.astype(float), sure
 
 
