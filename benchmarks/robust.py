@@ -37,7 +37,6 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, open_recogniser
 from lipmotion.speech.sound.acoustic_conditions import mix_noise
-from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent, split_words
@@ -119,11 +118,11 @@ def phones(corpora: Path, model: Model, _: Path | None) -> None:
         text = (folder / name).with_suffix(".txt")
         words = split_words((text if text.exists() else text.with_suffix(".lab")).read_text())
         audio = read_audio(folder / name)
-        aligned = open_recogniser(model.phones, "general").align(audio, analysed(audio).mfcc(), words, Lexicon())
+        aligned = open_recogniser(model.phones, "general").align(audio, words, Lexicon())
         recordings.append((audio, spoken(span.label.phone for span in aligned)))
     for kind in RECOGNISER_KINDS:
         phone_recogniser = open_recogniser(model.phones, kind)
-        found = [phone_recogniser.recognition(audio, analysed(audio).mfcc()) for audio, _ in recordings]
+        found = [phone_recogniser.recognition(audio) for audio, _ in recordings]
         errors = [
             count_phone_edits(wanted, spoken(s.label.phone for s in each.units))
             for each, (_, wanted) in zip(found, recordings, strict=True)
@@ -131,7 +130,7 @@ def phones(corpora: Path, model: Model, _: Path | None) -> None:
         count = sum(len(wanted) for _, wanted in recordings)
         total_s = sum(audio.duration_s for audio, _ in recordings)
         times = [
-            seconds(lambda: [phone_recogniser.recognition(a, analysed(a).mfcc()) for a, _ in recordings])  # noqa: B023
+            seconds(lambda: [phone_recogniser.recognition(a) for a, _ in recordings])  # noqa: B023
             for _ in range(5)
         ]
         show(
@@ -237,7 +236,7 @@ def foreign(corpora: Path, model: Model, _: Path | None) -> None:
     ):
         audio = read_audio(corpora / name)
         audio = Audio(audio.samples[: 40 * RATE_HZ], RATE_HZ)
-        found = recogniser.recognition(audio, analysed(audio).mfcc())
+        found = recogniser.recognition(audio)
         share = found.word_s / max(found.word_s + found.phone_s, 1e-9)
         show(f"foreign: {name}", by_words=round(share, 2), confidence=round(found.confidence or 0.0, 2))
 

@@ -206,7 +206,7 @@ def _measured(folder: Path, name: str, recogniser: str) -> dict[str, object]:
     transcript = read_transcript(path)
     words = transcript if isinstance(transcript, TimedTranscript) else split_words(transcript)
     analysed_audio = analysed(audio)
-    units = transcribe(phones, analysed_audio, analysed_audio.mfcc(), words, Lexicon()).units or Timeline(())
+    units = transcribe(phones, analysed_audio, words, Lexicon()).units or Timeline(())
     wall_s, cpu_s = time.perf_counter() - start, time.process_time() - start_cpu
     peak_mb = _peak_mb()
     errors_s = _errors(_word_times(units), [row for rows in kept for row in rows])
@@ -298,7 +298,7 @@ def _visemes(units: Timeline[Unit]) -> NDArray[np.str_]:
 def _doubts(phones: Recogniser, audio: AnalysedAudio, words: tuple[str, ...], hear: Hearing | None) -> dict[str, bool]:
     """Return which doubts of a transcript there are; one that is refused is doubted in every way."""
     try:
-        units = phones.align(audio, audio.mfcc(), words, Lexicon())
+        units = phones.align(audio, words, Lexicon())
     except AlignmentError:
         return dict.fromkeys(("refused", "either", "heard_either"), True)
     fit = measure_fit(audio, units)

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import smooth_step
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER
-from lipmotion.articulation.mouth import frame_times
-from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
 from lipmotion.meshes.model.mesh import HEAD, LEFT_EYE, NECK, RIGHT_EYE
 from lipmotion.storage.files import atomic_file
 from lipmotion.types import Motion, Prosody, Timeline, Unit
+from lipmotion.types.motion import compute_frame_times
 from lipmotion_faces import base
 from lipmotion_faces.characters.binding import DrivenPose, PosedCharacter
 from lipmotion_faces.characters.surface import build_surface, compute_normals, drop_back_sides
@@ -81,9 +80,7 @@ class MeshFace(base.Face):
         return iter(self.draw(motion, units, fps=fps))
 
     def draw(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> base.DrawnMotion[MeshPose]:  # noqa: D102
-        if not 0 < fps < np.inf:
-            raise InputError(f"the frame rate is {fps}, required more than 0")
-        time_s = frame_times(len(motion.values), motion.rate_hz, fps)
+        time_s = compute_frame_times(len(motion.values), motion.rate_hz, fps)
         motions = base.stage_liveliness(time_s, with_mouth(motion), units, self.staging, self._prosody)
         rows = self.character.poses(motion, units, time_s, eye_and_brow_weights(motions))
         gaze = motions.gaze if not self.character.has_shape("eyeLookOutLeft") else np.zeros_like(motions.gaze)

@@ -7,7 +7,7 @@ from cli.conftest import run
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.types import Audio, Features, ParallelMap
+from lipmotion.types import Audio, ParallelMap
 
 __all__ = ["recognised_once", "run", "small_phone_models"]
 
@@ -23,14 +23,12 @@ def recognised_once() -> Iterator[None]:
     known: dict[tuple[int, str, bytes], Recognition] = {}
     plain = Recogniser.recognition
 
-    def recognition(
-        self: Recogniser, audio: Audio, features: Features, each: ParallelMap = map, *, english: bool = True
-    ) -> Recognition:
+    def recognition(self: Recogniser, audio: Audio, each: ParallelMap = map, *, english: bool = True) -> Recognition:
         key = id(self.own), self.kind, audio.samples.tobytes()
         if self.adaptation is not None:
-            return plain(self, audio, features, each, english=english)
+            return plain(self, audio, each, english=english)
         if key not in known:
-            known[key] = plain(self, audio, features, each, english=english)
+            known[key] = plain(self, audio, each, english=english)
         return known[key]
 
     with pytest.MonkeyPatch.context() as patch:

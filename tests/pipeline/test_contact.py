@@ -13,18 +13,19 @@ from formats.examples import of_motion
 from lipmotion import Delivery, Edits, Model, Request, Session, Staging, cues, read_motion
 from lipmotion.articulation.contact import MIN_GAP, opening_to_gap
 from lipmotion.articulation.lip_points import FACING
-from lipmotion.articulation.mouth import LIP_SPEED, find_mouth, frame_times
+from lipmotion.articulation.mouth import LIP_SPEED, find_mouth
 from lipmotion.formats import write_motion
 from lipmotion.formats.fap import FAP
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, vowel_mouth, with_mouth
 from lipmotion.pipeline.outputs.curve_sets import ARKIT, VOWELS, WHOLE_FACE, make_curves
-from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face
+from lipmotion.pipeline.outputs.deliver import deliver
 from lipmotion.pipeline.outputs.motion_files import fit_to_format, resample_curves
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.delivery import MOODS
 from lipmotion.units import mark_closing_phones
 from lipmotion_faces.head import list_head_poses
 from lipmotion_faces.head.stage import build_head_mesh, make_figure, measure_lip_gap
+from lipmotion_faces.outputs.drawn_video import deliver_to_face
 from lipmotion_faces.outputs.scenes import build_character_scene, build_head_scene
 from lipmotion_faces.portrait.layered import MOUTHS, choose_mouths
 from lipmotion_faces.portrait.portrait_rasteriser import list_face_poses
@@ -106,8 +107,8 @@ def _mesh_gap(character: Any, vertices: NDArray[np.float64]) -> float:
 def _of_character(character: Any) -> Reader:
     def read(generation: Generation, fps: float) -> Mask:
         moved = generation.motion
-        time_s = frame_times(len(moved.values), moved.rate_hz, fps)
-        gaps = [_mesh_gap(character, each) for each in character.vertices(moved, generation.units, time_s)]
+        vertices = character.vertices(moved, generation.units, moved.resampled(fps).time_s)
+        gaps = [_mesh_gap(character, each) for each in vertices]
         return np.array(gaps) < TOUCHING_GAP
 
     return read

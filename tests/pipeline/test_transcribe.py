@@ -12,17 +12,12 @@ from lipmotion.speech.recognition.recognised_speech import select_reliable
 from lipmotion.speech.sound.acoustic_conditions import mix_noise
 from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.types import Audio, Features, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
+from lipmotion.types import Audio, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import Lexicon, is_silent, split_words
 from lipmotion.units.phone_timelines import group_words
 from lipmotion.units.phones import count_phone_edits
-from pipeline.made import WELCOME, features_of, read_welcome, recogniser_of
+from pipeline.made import WELCOME, read_welcome, recogniser_of
 from testing.toy import ToySentence
-
-
-@pytest.fixture
-def features(toy_sentence: ToySentence) -> Features:
-    return features_of(toy_sentence.audio)
 
 
 @pytest.fixture
@@ -35,14 +30,14 @@ def phones(toy_model: Model) -> Any:
     return recogniser_of(toy_model)
 
 
-def test_unknown_words_are_recognised(phones, audio, toy_sentence, features):
-    units, _ = transcribe.transcribe(phones, audio, features, None, Lexicon())
+def test_unknown_words_are_recognised(phones, audio, toy_sentence):
+    units, _ = transcribe.transcribe(phones, audio, None, Lexicon())
     assert [span.label.phone for span in units] == [span.label.phone for span in toy_sentence.units]
     assert not any(span.label.word for span in units)
 
 
-def test_what_is_not_in_the_dictionary_is_reported_once(phones, audio, features, caplog):
-    transcribe.transcribe(phones, audio, features, ("see", "bimab", "papa", "bimab"), Lexicon())
+def test_what_is_not_in_the_dictionary_is_reported_once(phones, audio, caplog):
+    transcribe.transcribe(phones, audio, ("see", "bimab", "papa", "bimab"), Lexicon())
     (message,) = caplog.messages
     assert "'bimab' is not in the dictionary; read as 'b " in message
 
@@ -51,12 +46,12 @@ WRONG = ("squash", "six", "fish", "chefs")
 
 
 @pytest.mark.parametrize("network", [True, False])
-def test_a_transcript_of_something_else_is_doubted(toy_model, audio, features, caplog, network):
+def test_a_transcript_of_something_else_is_doubted(toy_model, audio, caplog, network):
     if network and find_installed_recogniser() is None:
         pytest.skip("no phone recogniser is installed")
     phones = recogniser_of(toy_model, "auto" if network else "general")
-    recognised = lambda: phones.recognition(audio, features).units  # noqa: E731
-    units, _ = transcribe.transcribe(phones, audio, features, WRONG, Lexicon(), recognised)
+    recognised = lambda: phones.recognition(audio).units  # noqa: E731
+    units, _ = transcribe.transcribe(phones, audio, WRONG, Lexicon(), recognised)
     assert (units is None) == network  # what is said is to be recognised
     (record,) = caplog.records
     assert (record.name, record.levelname) == ("lipmotion", "WARNING")
@@ -65,10 +60,10 @@ def test_a_transcript_of_something_else_is_doubted(toy_model, audio, features, c
     assert re.fullmatch(message, record.getMessage())
 
 
-def test_the_right_one_is_not(toy_model, phones, toy_sentence, audio, features, caplog):
+def test_the_right_one_is_not(toy_model, phones, toy_sentence, audio, caplog):
     for words in (toy_sentence.words, None):
-        transcribe.transcribe(recogniser_of(toy_model, "auto"), audio, features, words, Lexicon())
-    transcribe.transcribe(phones, audio, features, WRONG, Lexicon())  # without general models nothing is doubted
+        transcribe.transcribe(recogniser_of(toy_model, "auto"), audio, words, Lexicon())
+    transcribe.transcribe(phones, audio, WRONG, Lexicon())  # without general models nothing is doubted
     assert not caplog.records
 
 
@@ -83,15 +78,15 @@ def corrected(audio: Any, words: tuple[str, ...]) -> transcribe.Transcription:
     phones = recogniser_of(load_model(), "auto")
 
     def recognised() -> Timeline[Unit]:
-        return select_reliable(phones.recognition(audio, audio.mfcc()).units, 0.7)
+        return select_reliable(phones.recognition(audio).units, 0.7)
 
-    return transcribe.transcribe(phones, audio, audio.mfcc(), words, Lexicon(), recognised)
+    return transcribe.transcribe(phones, audio, words, Lexicon(), recognised)
 
 
 @pytest.mark.parametrize("kept", [slice(0, 7), slice(7, None)])
 def test_speech_that_the_transcript_leaves_out_is_reported_with_its_times(welcome, kept, caplog):
     (audio, words), phones = welcome, recogniser_of(load_model(), "auto")
-    whole = transcribe.transcribe(phones, audio, audio.mfcc(), words, Lexicon())
+    whole = transcribe.transcribe(phones, audio, words, Lexicon())
     assert whole.fit.missing == ()
     assert whole.fit.share == pytest.approx(1)
     assert not caplog.records
@@ -113,7 +108,7 @@ def test_speech_that_the_transcript_leaves_out_is_reported_with_its_times(welcom
 def test_words_here_and_there_are_no_worse_than_none(welcome, kept):
     """Words beside those that are left out are not stretched over them, however short they are."""
     (audio, words), phones = welcome, recogniser_of(load_model(), "auto")
-    right, none = phones.align(audio, audio.mfcc(), words, Lexicon()), phones.recognition(audio, audio.mfcc()).units
+    right, none = phones.align(audio, words, Lexicon()), phones.recognition(audio).units
     some = corrected(audio, words[kept]).units
     assert some is not None
     wanted, with_some, with_none = (
@@ -128,7 +123,7 @@ def test_in_noise_words_are_where_they_are_heard(welcome):
     noisy = analysed(mix_noise(audio, "white", 3, [], 0))
     places_s = [
         [span.start_s for span in group_words(units) if span.label]
-        for units, _ in (transcribe.transcribe(phones, a, a.mfcc(), words, Lexicon()) for a in (audio, noisy))
+        for units, _ in (transcribe.transcribe(phones, a, words, Lexicon()) for a in (audio, noisy))
     ]
     assert np.array(places_s[1]) == pytest.approx(
         np.array(places_s[0]), abs=0.2
@@ -148,7 +143,7 @@ def test_fast_speech_keeps_the_words_that_are_recognised(recordings):
 def test_a_sentence_that_nobody_says_is_left_out(welcome, first, caplog):
     (audio, words), phones = welcome, recogniser_of(load_model(), "auto")
     extra = split_words("nobody answered the bell")
-    whole = transcribe.transcribe(phones, audio, audio.mfcc(), words, Lexicon()).units
+    whole = transcribe.transcribe(phones, audio, words, Lexicon()).units
     longer = corrected(audio, (*extra, *words) if first else (*words, *extra))
     assert [span.label for span in longer.units] == [span.label for span in whole]
     assert tuple(word.word for word in longer.fit.unsaid) == extra
@@ -159,9 +154,7 @@ def test_a_sentence_that_nobody_says_is_left_out(welcome, first, caplog):
 def test_speech_outside_of_the_times_of_a_transcript_is_reported(welcome, caplog):
     audio, words = welcome
     first = TranscriptLine(tuple(map(TimedWord, words[:2])), 0.3, 0.9)
-    part = transcribe.transcribe(
-        recogniser_of(load_model(), "auto"), audio, audio.mfcc(), TimedTranscript((first,)), Lexicon()
-    )
+    part = transcribe.transcribe(recogniser_of(load_model(), "auto"), audio, TimedTranscript((first,)), Lexicon())
     assert part.fit.share < 0.5
     (record,) = caplog.records
     assert "to leave out words at" in record.getMessage()
@@ -173,6 +166,6 @@ def test_a_long_word_is_not_repeated_in_full(caplog):
     assert len(message) < 300
 
 
-def test_words_beyond_the_recording_are_refused(phones, audio, features):
+def test_words_beyond_the_recording_are_refused(phones, audio):
     with pytest.raises(AlignmentError, match="nobody says so much"):
-        transcribe.transcribe(phones, audio, features, ("five",) * 5000, Lexicon())
+        transcribe.transcribe(phones, audio, ("five",) * 5000, Lexicon())

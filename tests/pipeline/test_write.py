@@ -18,13 +18,14 @@ from lipmotion.articulation.delivery import close_on_frame_grid
 from lipmotion.articulation.rest import LAUGH_GAP
 from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
-from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth_poses
+from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth_poses
 from lipmotion.pipeline.outputs.motion_files import with_articulation
 from lipmotion.pipeline.outputs.output import OutputSettings, create_outputs, plan, shift_prosody
 from lipmotion.types import Audio, Constraints, Pin, Prosody, Timeline
 from lipmotion.types.delivery import MoodKey
 from lipmotion_faces import Staging
 from lipmotion_faces.outputs import drawn_video
+from lipmotion_faces.outputs.drawn_video import deliver_to_face
 from lipmotion_faces.outputs.scenes import build_scene
 from lipmotion_faces.outputs.shown_faces import ShownPerson, shown_face
 from meshes.heads import head, write_glb

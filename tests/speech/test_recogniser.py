@@ -25,7 +25,7 @@ from lipmotion.speech.recognition.recognised_speech import (
 )
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.stats.constrained_mllr import log_determinant
-from lipmotion.types import Audio, Features, Timeline, Unit
+from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon
 from lipmotion.units.phones import SHORT_PAUSE_S, count_phone_edits
 from pipeline.made import features_of, read_sound
@@ -45,12 +45,12 @@ def hmm(toy_model: Model) -> Any:
 
 def align(hmm: Any, audio: Audio, words: Sequence[str], lexicon: Lexicon, kind: str = "own") -> Timeline[Unit]:
     sound = read_sound(audio)
-    return recogniser.Recogniser(hmm, kind).align(sound, sound.mfcc(), words, lexicon)
+    return recogniser.Recogniser(hmm, kind).align(sound, words, lexicon)
 
 
 def recognise(hmm: Any, audio: Audio, kind: str = "own") -> Timeline[Unit]:
     sound = read_sound(audio)
-    return recogniser.Recogniser(hmm, kind).recognition(sound, sound.mfcc()).units
+    return recogniser.Recogniser(hmm, kind).recognition(sound).units
 
 
 def phones(units: Timeline[Unit]) -> list[str]:
@@ -179,7 +179,7 @@ def test_own_models_that_learned_little_do_not_align(hmm: Any, sentences: list[T
     assert aligned == align(hmm, said.audio, said.words, lexicon, "general")
     assert aligned != align(hmm, said.audio, said.words, lexicon, "own")
     found = recognise(hmm, said.audio, "auto")
-    again = recogniser.Recogniser(hmm, "general").align_phones(said.audio, features_of(said.audio), found)
+    again = recogniser.Recogniser(hmm, "general").align_phones(said.audio, found)
     assert phones(found) == phones(again)
     assert [span.start_s for span in found] == pytest.approx([span.start_s for span in again], abs=0.011)
 
@@ -245,7 +245,7 @@ def test_labels_are_those_of_the_words_that_are_believed() -> None:
 
 def test_what_was_recognised() -> None:
     labels = [LabelledFrames(*each) for each in ((0, "sil"), (10, "b", 0), (20, "iy", 0), (40, "z"))]
-    clip = Features(np.zeros((51, 39), np.float32), 0.5)
+    clip = read_sound(Audio(np.zeros(8000, np.float32), 16_000))
     found, doubtful = (build_recognition(labels, [RecognisedWord("bee", sure)], clip, None) for sure in (0.8, 0.3))
     (word,) = found.words
     assert (word.start_s, word.end_s, word.label.text) == (pytest.approx(0.1), pytest.approx(0.4), "bee")
@@ -330,7 +330,7 @@ def test_the_speaker_of_the_training_has_full_weight_and_changes_little(
         features = features_of(audio)
         changed = one.own_features(read_sound(audio)) - features.values
         assert np.sqrt(np.square(changed).mean()) < 0.5
-        first, then = ([s.label.phone for s in each.recognition(audio, features).units] for each in (before, after))
+        first, then = ([s.label.phone for s in each.recognition(audio).units] for each in (before, after))
         assert count_phone_edits(first, then) <= 2
     long = estimate_adaptation(toy_model.phones, voice * 3)  # features and their deltas move together
     assert long.speech_s == pytest.approx(3 * same_speaker.speech_s, rel=0.1)

@@ -13,7 +13,7 @@ from lipmotion.speech.recognition.transcript_evidence import _best_path
 from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon
 from lipmotion_faces.corpus.folder import spell_name
-from pipeline.made import features_of, read_sound, recogniser_of
+from pipeline.made import read_sound, recogniser_of
 from testing.toy import ToySentence, toy_sentences
 
 FRAME_S = 0.02
@@ -266,7 +266,7 @@ def test_a_part_of_a_transcript_is_noticed_and_a_whole_one_is_not(recordings: Pa
         audio, words = read_sound(recordings / "grid-s1" / "clips" / f"{name}.mkv"), spell_name(name)
         assert words is not None
         for said, kept in ((words, True), (words[:3], False)):
-            units = phones.align(audio, features_of(audio), said, Lexicon())
+            units = phones.align(audio, said, Lexicon())
             noticed = bool(agreement.measure_fit(audio, units).missing)
             whole, half = whole + (kept and noticed), half + (noticed and not kept)
     assert whole == 0

@@ -40,7 +40,7 @@ def welcome(without_a_phone_recogniser: None) -> Audio:  # noqa: ARG001
 
 
 def recognition(audio: Audio, kind: str = "auto") -> recognised_speech.Recognition:
-    return recogniser_of(load_model(), kind).recognition(audio, read_sound(audio).mfcc())
+    return recogniser_of(load_model(), kind).recognition(audio)
 
 
 def texts(found: recognised_speech.Recognition) -> list[str]:
@@ -49,7 +49,7 @@ def texts(found: recognised_speech.Recognition) -> list[str]:
 
 @pytest.mark.long
 def test_words_decide_the_phones_of_english(welcome: Audio) -> None:
-    aligned = recogniser_of(load_model(), "auto").align(welcome, read_sound(welcome).mfcc(), SAID, Lexicon())
+    aligned = recogniser_of(load_model(), "auto").align(welcome, SAID, Lexicon())
     found = recognition(welcome)
     assert texts(found) == SAID
     assert found.word_s > 9 * found.phone_s
@@ -277,9 +277,9 @@ needs_hama = pytest.mark.skipif(find_installed_recogniser() is None, reason="ham
 @needs_hama
 def test_unsure_posteriors_leave_phones_to_the_models(request: pytest.FixtureRequest) -> None:
     noisy = read_sound(mix_noise(read_welcome(), "white", -5))
-    found = recogniser_of(load_model(), "auto").recognition(noisy, noisy.mfcc())
+    found = recogniser_of(load_model(), "auto").recognition(noisy)
     request.getfixturevalue("without_a_phone_recogniser")
-    alone = recogniser_of(load_model(), "auto").recognition(noisy, noisy.mfcc())
+    alone = recogniser_of(load_model(), "auto").recognition(noisy)
     assert found.units == alone.units
     assert found.posterior is None
 
@@ -287,7 +287,7 @@ def test_unsure_posteriors_leave_phones_to_the_models(request: pytest.FixtureReq
 @needs_hama
 def test_the_welcome_is_understood() -> None:
     audio = read_welcome()
-    found = recogniser_of(load_model(), "auto").recognition(audio, audio.mfcc())
+    found = recogniser_of(load_model(), "auto").recognition(audio)
     assert [span.label.text for span in found.words][:7] == "please speak and my lips will move".split()
     assert (found.confidence or 0) > 0.6
     assert (found.posterior or 0) > 0.8

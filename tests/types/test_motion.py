@@ -76,7 +76,7 @@ def test_whole_multiples_keep_the_last_frame() -> None:
         assert len(motion(rows, 100.0).resampled(50.0).values) == (rows - 1) // 2 + 1
         assert len(motion(rows, 25.0).resampled(100.0).values) == 4 * (rows - 1) + 1
     for rate_hz in (0.0, -25.0, float("nan"), float("inf")):
-        with pytest.raises(InputError, match=f"motion rate is {rate_hz} Hz"):
+        with pytest.raises(InputError, match=f"rate is {rate_hz} Hz, required more than 0"):
             motion().resampled(rate_hz)
 
 

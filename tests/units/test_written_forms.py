@@ -5,7 +5,7 @@ import pytest
 
 from lipmotion import load_model
 from lipmotion.units import Lexicon, find_words, group_words, split_words, text_normalisation, written_forms
-from pipeline.made import features_of, recogniser_of
+from pipeline.made import recogniser_of
 from testing.formant_synthesiser import synthesise
 
 TEXTS: dict[str, list[tuple[str, str]]] = json.loads(Path(__file__).with_name("said_texts.json").read_text("utf-8"))
@@ -48,7 +48,7 @@ def test_the_sound_chooses_the_reading() -> None:
             [("sil", 0.2), *((phone, 0.09) for phone in phones), ("sil", 0.2)], rate_hz=16_000, seed=1
         )
         given = ("mother", "saw", *text_normalisation.tokenise(text), "to", "baby")
-        units = recogniser.align(audio, features_of(audio), given, lexicon)
+        units = recogniser.align(audio, given, lexicon)
         found = tuple(span.label for span in group_words(units) if span.label)
         wrong += [(text, found)] if found != words else []
     assert not wrong

@@ -19,6 +19,7 @@ from lipmotion.articulation.phone_targets import GESTURES, OVAL, PURSED_PRESS, S
 from lipmotion.articulation.rest import find_rest_frames, measure_at_rest
 from lipmotion.errors import InputError, shorten_list
 from lipmotion.types import Motion, Timeline, Unit
+from lipmotion.types.motion import compute_frame_times
 
 Curve = NDArray[np.float64]
 
@@ -115,7 +116,7 @@ class SpokenMouth:
         """Return the same mouth at another frame rate, to its last frame, with the contact of ``show_contact``."""
         if abs(fps - self.rate_hz) < 1e-9:
             return self
-        time_s = frame_times(len(self.gap), self.rate_hz, fps)
+        time_s = compute_frame_times(len(self.gap), self.rate_hz, fps)
         rows = np.stack(list(self._curves().values()), axis=1)
         sampled = sample_pictures(rows, self.contact, self.rate_hz, time_s)
         return SpokenMouth(fps, *(np.ascontiguousarray(column) for column in sampled.T))
@@ -132,11 +133,6 @@ class SpokenMouth:
 
     def _curves(self) -> dict[str, Curve]:
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "rate_hz"}
-
-
-def frame_times(frames: int, rate_hz: float, fps: float) -> Curve:
-    """Return the times of pictures, ``fps`` a second, of so many frames of motion, to the last one [shape=(N,)]."""
-    return np.arange(int(np.floor((frames - 1) / rate_hz * fps + 1e-9)) + 1) / fps
 
 
 def find_mouth(motion: Motion, units: Timeline[Unit], fps: float | None = None) -> SpokenMouth:

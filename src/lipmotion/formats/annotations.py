@@ -155,32 +155,13 @@ def read_xml_tiers(text: str, where: str) -> list[LabelTier]:
 
 def _read_elan(root: Element, where: str) -> list[LabelTier]:
     """Return the tiers of ELAN. Annotations without times divide another one: they are one label with its time."""
-    unit = next((each.get("TIME_UNITS") for each in root.iter("HEADER")), None) or "milliseconds"
-    if unit != "milliseconds":
-        raise InputError(f"{where}: its times are {shorten(unit)}, required milliseconds; save it again in ELAN")
-    media = [(each.get("TIME_ORIGIN") or "0", each.get("MEDIA_URL", "")) for each in root.iter("MEDIA_DESCRIPTOR")]
-    origin_s, url = max(((_parse_seconds(f"{origin}ms", {}, where), url) for origin, url in media), default=(0.0, ""))
-    if origin_s:
-        what = "its times begin %.2f s after the start of %s: they are moved by that"
-        LOG.warning(f"%s: {what}; cut the recording there if it is another one", where, origin_s, shorten(url))
-    slots = {each.get("TIME_SLOT_ID"): each.get("TIME_VALUE") for each in root.iter("TIME_SLOT")}
-    times_s = {name: origin_s + _parse_seconds(f"{ms}ms", {}, where) if ms else math.nan for name, ms in slots.items()}
-    spans_s: dict[str | None, tuple[float, float]] = {}
-    for each in root.iter("ALIGNABLE_ANNOTATION"):
-        start_s, end_s = (times_s.get(each.get(f"TIME_SLOT_REF{edge}"), math.nan) for edge in (1, 2))
-        spans_s[each.get("ANNOTATION_ID")] = start_s, end_s
+    spans_s = _read_elan_spans(root, _read_elan_origin(root, where), where)
     owners = {each.get("ANNOTATION_ID"): each.get("ANNOTATION_REF") for each in root.iter("REF_ANNOTATION")}
     tiers: list[LabelTier] = []
     for tier in root.iter("TIER"):
         name = tier.get("TIER_ID", "")
         texts: dict[str | None, list[str]] = defaultdict(list)
-        after: dict[str | None, list[Element]] = defaultdict(list)
-        for each in (*tier.iter("ALIGNABLE_ANNOTATION"), *tier.iter("REF_ANNOTATION")):
-            after[each.get("PREVIOUS_ANNOTATION")].append(each)
-        in_order = after.pop(None, [])
-        for each in in_order:  # which grows by what follows each
-            in_order += after.pop(each.get("ANNOTATION_ID"), [])
-        for each in (*in_order, *(each for rest in after.values() for each in rest)):
+        for each in _order_annotations(tier):
             aligned = each.get("ANNOTATION_ID")
             for _ in range(DEEPEST):
                 aligned = owners.get(aligned, aligned) if aligned not in spans_s else aligned
@@ -193,6 +174,41 @@ def _read_elan(root: Element, where: str) -> list[LabelTier]:
         role = named.role or (OTHER if is_part else LINES if named.speaker else "")
         tiers.append(LabelTier(name, named.labels, role, named.speaker))
     return tiers
+
+
+def _read_elan_origin(root: Element, where: str) -> float:
+    """Return when in the recording the times of ELAN begin, in seconds, with a warning if that is not at its start."""
+    unit = next((each.get("TIME_UNITS") for each in root.iter("HEADER")), None) or "milliseconds"
+    if unit != "milliseconds":
+        raise InputError(f"{where}: its times are {shorten(unit)}, required milliseconds; save it again in ELAN")
+    media = [(each.get("TIME_ORIGIN") or "0", each.get("MEDIA_URL", "")) for each in root.iter("MEDIA_DESCRIPTOR")]
+    origin_s, url = max(((_parse_seconds(f"{origin}ms", {}, where), url) for origin, url in media), default=(0.0, ""))
+    if origin_s:
+        what = "its times begin %.2f s after the start of %s: they are moved by that"
+        LOG.warning(f"%s: {what}; cut the recording there if it is another one", where, origin_s, shorten(url))
+    return origin_s
+
+
+def _read_elan_spans(root: Element, origin_s: float, where: str) -> dict[str | None, tuple[float, float]]:
+    """Return starts and ends in seconds by the annotations that have some; NaN where a time slot has no value."""
+    slots = {each.get("TIME_SLOT_ID"): each.get("TIME_VALUE") for each in root.iter("TIME_SLOT")}
+    times_s = {name: origin_s + _parse_seconds(f"{ms}ms", {}, where) if ms else math.nan for name, ms in slots.items()}
+    spans_s: dict[str | None, tuple[float, float]] = {}
+    for each in root.iter("ALIGNABLE_ANNOTATION"):
+        start_s, end_s = (times_s.get(each.get(f"TIME_SLOT_REF{edge}"), math.nan) for edge in (1, 2))
+        spans_s[each.get("ANNOTATION_ID")] = start_s, end_s
+    return spans_s
+
+
+def _order_annotations(tier: Element) -> list[Element]:
+    """Return the annotations of a tier: each after the one that it names as the previous one, wherever it stands."""
+    after: dict[str | None, list[Element]] = defaultdict(list)
+    for each in (*tier.iter("ALIGNABLE_ANNOTATION"), *tier.iter("REF_ANNOTATION")):
+        after[each.get("PREVIOUS_ANNOTATION")].append(each)
+    in_order = after.pop(None, [])
+    for each in in_order:  # which grows by what follows each
+        in_order += after.pop(each.get("ANNOTATION_ID"), [])
+    return [*in_order, *(each for rest in after.values() for each in rest)]
 
 
 def _read_captions(root: Element, where: str) -> LabelTier:

@@ -331,8 +331,8 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
 def _points(motion: Motion) -> list[int]:
     """Return the numbers of the points that have all three channels, in order."""
     numbers = [int(match[1]) for name in motion.names if (match := _POINT.match(name)) and name.startswith("x")]
-    eyes = {Channel(f"{axis}_{point}") for point in numbers for axis in "xyz"} & set(motion.channels)
-    return [point for point in numbers if all(Channel(f"{axis}_{point}") in eyes for axis in "xyz")]
+    known = set(motion.channels)
+    return [point for point in numbers if all(Channel(f"{axis}_{point}") in known for axis in "xyz")]
 
 
 MOTION_FORMAT = MotionFormat(write, read, check, min_frames=1, max_bytes=1 << 28)

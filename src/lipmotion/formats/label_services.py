@@ -412,8 +412,8 @@ def _read_stamp(item: Any) -> dict[str, Any]:
     return {"text": text, "start": start, "end": end}
 
 
-def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
-    """Return lists of items in time: the phones, and what each speaker says; None: there are none."""
+def _collect_lists(objects: Objects, where: str) -> Lists:
+    """Return the items of all objects by their lists. Raises InputError: pieces whose times each begin at 0."""
     lists: Lists = defaultdict(list)
     if all("sentence" in str(item.get("type")).lower() for _, item in objects):  # without words beside them
         objects = [(place, {**item, "type": "word"}) for place, item in objects]
@@ -427,6 +427,12 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     missed = sum(isinstance(word, dict) and word.get("case") == MISSED for word in words)
     if missed and where:
         LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
+    return lists
+
+
+def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
+    """Return lists of items in time: the phones, and what each speaker says; None: there are none."""
+    lists = _collect_lists(objects, where)
     spoken, phones = (_choose_rows(lists, phones=kind) for kind in (False, True))
     if not (spoken or phones):
         if not (any(lists.values()) and all(item.keys() <= {*NAMES["text_alone"]} for _, item in objects)):
@@ -445,10 +451,7 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
 
 def _build_spoken_tiers(spoken: list[Row], where: str, *, may_be_phones: bool) -> list[LabelTier]:
     """Return a tier of each speaker: of words if nearly all rows are, else of lines, or of what may be phones."""
-    half = len(spoken) // 2  # Google's last result repeats the first half, with speakers
-    first, again = ([(row.text, row.start) for row in part] for part in (spoken[:half], spoken[half:]))
-    if half and first == again and spoken[0].speaker != spoken[-1].speaker:
-        spoken = spoken[half:]
+    spoken = _leave_out_repetition(spoken)
     if any(len({part.speaker for part in row.parts}) > 1 for row in spoken):
         spoken = [part for row in spoken for part in row.parts or (row,)]
     role, has_parts = _choose_role(spoken, where), any(each.parts for each in spoken)
@@ -456,14 +459,26 @@ def _build_spoken_tiers(spoken: list[Row], where: str, *, may_be_phones: bool) -
     for each, label in zip(spoken, _scale_rows(spoken, role, where), strict=True):
         by_speaker[each.speaker or (each.parts[0].speaker if each.parts else "")].append(label)
     for labels in by_speaker.values():
-        pairs = pairwise(each for each in labels if not math.isnan(each.start_s))
-        back = next((after for before, after in pairs if after.start_s < before.start_s - ROUNDING_S), None)
-        if back and where:
-            what = "before the one ahead of it; all are put in order of time: correct it if those of pieces begin anew"
-            LOG.warning("%s: %s starts at %.2f s, %s", where, back.position, back.start_s, what)
+        _warn_of_disorder(labels, where)
     if may_be_phones and not has_parts and not any(each.role == WORDS for each in spoken):
         role = PHONE_LABELS if all(holds_phones(LabelTier("", tuple(each))) for each in by_speaker.values()) else role
     return [LabelTier(who or role, tuple(labels), role, who) for who, labels in by_speaker.items()]
+
+
+def _leave_out_repetition(spoken: list[Row]) -> list[Row]:
+    """Return rows without the first half where the other one repeats it with speakers, as Google's last result does."""
+    half = len(spoken) // 2
+    first, again = ([(row.text, row.start) for row in part] for part in (spoken[:half], spoken[half:]))
+    return spoken[half:] if half and first == again and spoken[0].speaker != spoken[-1].speaker else spoken
+
+
+def _warn_of_disorder(labels: list[TimedLabel], where: str) -> None:
+    """Log a warning if a speaker's labels are not in order of time."""
+    pairs = pairwise(each for each in labels if not math.isnan(each.start_s))
+    back = next((after for before, after in pairs if after.start_s < before.start_s - ROUNDING_S), None)
+    if back and where:
+        what = "before the one ahead of it; all are put in order of time: correct it if those of pieces begin anew"
+        LOG.warning("%s: %s starts at %.2f s, %s", where, back.position, back.start_s, what)
 
 
 def _choose_role(spoken: list[Row], where: str) -> str:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 DECIBEL = np.log(10) / 10  # a decibel, as natural logarithm of energy
@@ -80,6 +79,5 @@ def find_spoken_frames(log_energy: NDArray[np.floating]) -> NDArray[np.bool_]:
 
 def find_quiet_frames(log_energy: NDArray[np.floating]) -> NDArray[np.bool_]:
     """Return which frames are too quiet for speech [shape=(T,)], from natural logarithms [shape=(T,)]."""
-    padded = np.pad(log_energy, QUIET_REACH_FRAMES, "edge")
-    loudest = sliding_window_view(padded, 2 * QUIET_REACH_FRAMES + 1).max(axis=1)
+    loudest = scipy.ndimage.maximum_filter1d(log_energy, 2 * QUIET_REACH_FRAMES + 1, mode="nearest")
     return loudest < measure_levels(log_energy)[0] - QUIET_DROP

@@ -341,13 +341,7 @@ class Session:
         from lipmotion.articulation.phone_targets import GESTURES, with_gestures
         from lipmotion.pipeline.outputs.curve_sets import check_edit
 
-        def is_modelled(channel: str) -> bool:
-            if channel in MODELLED:
-                return True
-            motion = self._with_pins(phone_steps, ()).motion
-            return channel in motion.names and motion.channels[motion.column(channel)].unit == WEIGHT
-
-        modelled = tuple(edit for edit in edits if isinstance(edit, Pin) and is_modelled(edit.channel))
+        modelled = tuple(e for e in edits if isinstance(e, Pin) and self._is_modelled(e.channel, phone_steps))
         generation = self._with_pins(phone_steps, modelled)
         for edit in edits:
             if isinstance(edit, Gain) and not edit.channel:
@@ -366,6 +360,13 @@ class Session:
         stated = (step.stated for step in remove_pins(steps) if isinstance(step, CurveStep))
         pinned_s = tuple(edit.time_s for edit in stated if isinstance(edit, Pin))
         return replace(generation.with_motion(motion), curve_edits=others, pinned_s=pinned_s)
+
+    def _is_modelled(self, channel: str, phone_steps: tuple[Step, ...]) -> bool:
+        """Return whether the engine moves a channel through pins: that of a mouth, or a weight of its motion."""
+        if channel in MODELLED:
+            return True
+        motion = self._with_pins(phone_steps, ()).motion
+        return channel in motion.names and motion.channels[motion.column(channel)].unit == WEIGHT
 
     def _with_pins(self, phone_steps: tuple[Step, ...], pins: tuple[Pin, ...]) -> Generation:
         """Return the engine's motion after some edits of phones, through pins; while sketching, a sketch of it."""

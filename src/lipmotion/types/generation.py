@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.types.audio import Audio, VoiceEvent
 from lipmotion.types.delivery import MoodKey
 from lipmotion.types.edits import CurveEdit
-from lipmotion.types.motion import Motion, interpolate_rows
+from lipmotion.types.motion import Motion, compute_frame_times, interpolate_rows
 from lipmotion.types.timeline import Span, SpeechKnowledge, Timeline, Unit
 
 RowChange = Callable[[NDArray[np.floating[Any]]], NDArray[np.floating[Any]]]
@@ -185,7 +185,7 @@ class Generation:
 
     def sample_times(self, rate_hz: float) -> NDArray[np.float64]:
         """Return when frames at another rate are taken, in seconds [shape=(N,)]: at pins, those nearest to them."""
-        time_s = self.motion.selected(self.motion.names[:1]).resampled(rate_hz).time_s
+        time_s = compute_frame_times(len(self.motion.values), self.motion.rate_hz, rate_hz)
         own_hz = self.motion.rate_hz
         for pinned_s in self.pinned_s:
             time_s[min(round(pinned_s * rate_hz), len(time_s) - 1)] = np.floor(pinned_s * own_hz + 0.5) / own_hz

@@ -101,10 +101,17 @@ class Motion:
 
     def resampled(self, rate_hz: float) -> Motion:
         """Return the motion at another rate, by linear interpolation. Raises InputError: the rate is not positive."""
-        if not 0 < rate_hz < float("inf"):
-            raise InputError(f"motion rate is {rate_hz} Hz, required more than 0 and finite")
-        count = int(np.floor((len(self.values) - 1) / self.rate_hz * rate_hz + 1e-9)) + 1
-        return Motion(self.at(np.arange(count) / rate_hz), rate_hz, self.channels)
+        return Motion(self.at(compute_frame_times(len(self.values), self.rate_hz, rate_hz)), rate_hz, self.channels)
+
+
+def compute_frame_times(frames: int, rate_hz: float, fps: float) -> NDArray[np.float64]:
+    """Return when pictures of so many frames are shown, ``fps`` a second, to the last one, in seconds [shape=(N,)].
+
+    Raises InputError: a rate that is not positive.
+    """
+    if not 0 < fps < float("inf"):
+        raise InputError(f"the frame rate is {fps} Hz, required more than 0 and finite")
+    return np.arange(int(np.floor((frames - 1) / rate_hz * fps + 1e-9)) + 1) / fps
 
 
 def interpolate_rows(

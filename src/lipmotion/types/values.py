@@ -25,10 +25,11 @@ _CLOCK = r"(?:([0-9]{1,6}):)?([0-9]{1,2}):([0-9]{1,2}(?:[.,][0-9]{1,9})?)"
 _WHOLE = re.compile("[-+]?[0-9]{1,18}")
 
 
-def suggest(name: str, names: Iterable[str]) -> str:
-    """Return which of some names is like one that is none of them, for a message; empty: none is."""
-    lower = {each.lower(): each for each in names}
-    return "".join(f" (is it {lower[near]}?)" for near in get_close_matches(name.lower(), lower, 1))
+def suggest(name: str, names: Iterable[str], form: str = " (is it {}?)", count: int = 1) -> str:
+    """Return up to ``count`` names that are like one that is none of them, in the form of a message; empty: none is."""
+    lower = {each.lower(): each for each in reversed([*names])}
+    near = [lower[each] for each in get_close_matches(name.lower(), lower, count)]
+    return form.format(", ".join(near)) if near else ""
 
 
 class SchemaError(InputError):

@@ -20,11 +20,14 @@ def read_table(name: str) -> dict[str, str]:
 
 
 def read_patterns(path: Path) -> dict[str, re.Pattern[str]]:
-    """Return the regular expressions of a table as of ``read_table``; ``<NAME>`` in one is that of a row before."""
+    """Return the regular expressions of a table as of ``read_table``; ``<NAME>`` in one is that of a row before.
+
+    Rows whose names begin with an underscore are pieces of others alone.
+    """
     patterns: dict[str, str] = {}
     for name, form in _read_rows(path).items():
         patterns[name] = re.sub("<([A-Z_]{3,})>", lambda piece: patterns[piece[1]], form)
-    return {name: re.compile(pattern) for name, pattern in patterns.items()}
+    return {name: re.compile(pattern) for name, pattern in patterns.items() if name[0] != "_"}
 
 
 def _read_rows(path: Path) -> dict[str, str]:

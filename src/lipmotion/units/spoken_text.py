@@ -30,6 +30,7 @@ WORDS = {name: frozenset(words.split()) for name, words in read_table("spoken_wo
 """Words by what they are in texts and labels: of silence, of speech that is not known, no names, ..."""
 LONGEST_LINE = 1 << 18  # maximum characters of a line: a label may hold four hours of speech
 LOG = logging.getLogger("lipmotion")
+Matches = Sequence[re.Match[str]]
 SYNONYMS: dict[str, tuple[str, float]] = {
     word: (mood, float(strength))
     for meaning, words in read_table("moods").items()
@@ -82,8 +83,8 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
         return ""
 
     def leave_out_marks(name: str, text: str) -> str:
-        matches = list(MARKS[name].finditer(text))
-        return MARKS[name].sub(leave_out, text) if matches and _mark_lines(name, matches, text) else text
+        found = list(MARKS[name].finditer(text))
+        return MARKS[name].sub(leave_out, text) if found and ARE_MARKS[name](found, text.split("\n")) else text
 
     def leave_out_name(match: re.Match[str]) -> str:
         name = match[1] or match[2]
@@ -105,32 +106,46 @@ def remove_speakers(text: str, names: frozenset[str] | None = None) -> tuple[str
     if len(cues) > 1 or any("(" in cue[1] for cue in cues):
         text = MARKS["DIRECTION"].sub(leave_out, MARKS["CUE"].sub(leave_out, text))
     text = MARKS["SPEAKER"].sub(leave_out_name, text)
-    lines = [MARKS["SCRIPT"].fullmatch(line) for line in text.splitlines() if line.strip()]
-    tags = [line[1] for line in lines if line and line[1]]
-    if tags and all(lines) and not WORDS["no_tags"] & {*tags} and (len(lines) > 1 or not (lines[0] and lines[0][2])):
+    if _is_game_script(text):
         text = re.sub(r'^[^"\n]+(?=")', leave_out, text, flags=re.MULTILINE)
     return text, [name for name in left_out if name]
 
 
-def _mark_lines(name: str, matches: list[re.Match[str]], text: str) -> bool:
-    """Return whether what was found of a pattern at the starts of lines are names, times or numbers of the lines."""
-    rows = text.split("\n")
-    if name == "RECORDING":
-        return len(matches) == sum(map(bool, rows))
-    if name == "DATED":
-        return len(matches) > 1 or any(each[1] or "T" in each[0] for each in matches)
-    if name == "STAMP":
-        times_s = [parse_clock(stamp[1]) for stamp in matches]
-        is_full = all(stamp[1].count(":") == 2 or "[" in stamp[0] for stamp in matches)  # no time of day that is said
-        rise = len(times_s) > 1 and times_s == sorted({*times_s})
-        return times_s[0] == 0 or (rise and (is_full or times_s[0] < 60))
-    if name in ("ASKED", "DASHED"):
-        names = {line[1] for line in matches}
-        return len(names) > 1 and (name == "ASKED" or len(names) < len(matches) == sum(map(bool, rows)))
-    numbers = [int(line[1] or ord(line[2])) for line in matches]
-    counted = len(numbers) > 1 and all(b in (a + 1, 1, ord("a")) for a, b in pairwise(numbers))
-    padded = all(re.match(r"0\d\d", line[1] or "") and line[1] != "007" for line in matches)
-    return counted if name == "NUMBER" else padded or (counted and numbers[0] < 2 and len(numbers) == len(rows))
+def _is_game_script(text: str) -> bool:
+    """Return whether all lines are those of a game's script, quotes behind who speaks, and one says who."""
+    lines = [MARKS["SCRIPT"].fullmatch(line) for line in text.splitlines() if line.strip()]
+    tags = [line[1] for line in lines if line and line[1]]
+    is_stated = len(lines) > 1 or any(line and not line[2] for line in lines)  # one line says no look
+    return bool(tags) and all(lines) and is_stated and not WORDS["no_tags"] & {*tags}
+
+
+def _rise_from_start(stamps: Matches) -> bool:
+    """Return whether times at the starts of lines are those of a recording: from 0, or rising from the first minute."""
+    times_s = [parse_clock(stamp[1]) for stamp in stamps]
+    is_full = all(stamp[1].count(":") == 2 or "[" in stamp[0] for stamp in stamps)  # no time of day that is said
+    rise = len(times_s) > 1 and times_s == sorted({*times_s})
+    return times_s[0] == 0 or (rise and (is_full or times_s[0] < 60))
+
+
+def _count_up(numbers: Matches) -> bool:
+    """Return whether numbers or letters at the starts of lines each follow the one before, or begin again."""
+    counts = [int(line[1] or ord(line[2])) for line in numbers]
+    return len(counts) > 1 and all(b in (a + 1, 1, ord("a")) for a, b in pairwise(counts))
+
+
+ARE_MARKS: dict[str, Callable[[Matches, Sequence[str]], bool]] = {
+    "RECORDING": lambda found, rows: len(found) == sum(map(bool, rows)),
+    "DATED": lambda found, _: len(found) > 1 or any(line[1] or "T" in line[0] for line in found),
+    "STAMP": lambda found, _: _rise_from_start(found),
+    "NUMBER": lambda found, _: _count_up(found),
+    "ASKED": lambda found, _: len({line[1] for line in found}) > 1,
+    "BARE_NUMBER": lambda found, rows: (
+        all(re.match(r"(?!007$)0\d\d", line[1]) for line in found)
+        or (_count_up(found) and int(found[0][1]) < 2 and len(found) == len(rows))
+    ),
+    "DASHED": lambda found, rows: 1 < len({line[1] for line in found}) < len(found) == sum(map(bool, rows)),
+}
+"""Whether what is found of a pattern at the starts of lines are names, times or numbers of them, in their order."""
 
 
 def find_speaker_names(texts: Iterable[str]) -> frozenset[str]:
@@ -219,12 +234,9 @@ def time_moods(tags: Sequence[MoodTag], units: Timeline[Unit]) -> tuple[MoodKey,
     spans = words or [(span.start_s, span.end_s) for span in units]
     if not tags or not spans:
         return ()
-    keys = []
-    for tag in tags:
-        place = round(tag.share * len(spans))
-        time_s = 0.0 if place == 0 else spans[place][0] if place < len(spans) else spans[-1][1]
-        keys.append(MoodKey(max(time_s, 0.0), tag.mood, tag.strength))
-    return sort_moods(keys)
+    edges_s = [0.0, *(start_s for start_s, _ in spans[1:]), spans[-1][1]]
+    times_s = (edges_s[min(round(tag.share * len(spans)), len(spans))] for tag in tags)
+    return sort_moods([MoodKey(max(at_s, 0.0), t.mood, t.strength) for at_s, t in zip(times_s, tags, strict=True)])
 
 
 def _meaning(tag: re.Match[str]) -> tuple[str, float] | None:

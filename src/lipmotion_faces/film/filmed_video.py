@@ -19,6 +19,7 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Mark, Outputs
 from lipmotion.storage.sources import check_source, has_video
 from lipmotion.types import GREY, Audio, Monitor, Motion, Timeline, Unit, silent_monitor
+from lipmotion.types.motion import compute_frame_times
 from lipmotion.types.progress import REPORT_INTERVAL, with_progress
 from lipmotion_faces.appearance.person import FaceCodes, measure_levels_at
 from lipmotion_faces.appearance.placing import cut
@@ -119,15 +120,13 @@ def make_film(  # noqa: PLR0913
     eigenlips = model.eigenlips if model is not None else None
 
     def make_codes(rate_hz: float) -> FaceCodes:  # what the lower face is like in every frame
-        if not 0 < rate_hz < float("inf"):
-            raise InputError(f"the frame rate is {rate_hz}, required more than 0")
-        count = int(np.floor((len(motion.values) - 1) / motion.rate_hz * rate_hz + 1e-9)) + 1
-        codes = predict_codes(face, motion, units or Timeline(()), count, rate_hz, eigenlips)
+        time_s = compute_frame_times(len(motion.values), motion.rate_hz, rate_hz)
+        codes = predict_codes(face, motion, units or Timeline(()), len(time_s), rate_hz, eigenlips)
         if options.jaw != "energy":
             return codes
         if sound is None:
             raise InputError("a jaw that follows the energy needs the sound; give the recording")
-        return face.appearance.with_jaw_of_sound(codes, measure_levels_at(sound, np.arange(count) / rate_hz))
+        return face.appearance.with_jaw_of_sound(codes, measure_levels_at(sound, time_s))
 
     stitching = AS_PRINTED if options.refinement == "paper" else STITCHING
     if options.overlay == "inset" and speech is not None:

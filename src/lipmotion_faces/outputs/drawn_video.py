@@ -12,12 +12,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.delivery import Delivery, close_on_frame_grid, find_closed_times
+from lipmotion.articulation.phone_targets import with_gestures
 from lipmotion.errors import ExportError
 from lipmotion.kernels.compiler import numba_works
-from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes
+from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes, with_mouth
+from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.pipeline.outputs.curve_sets import show_edited_curves, with_curves
+from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth_poses
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.types import Audio, Generation, Motion
+from lipmotion.types import Audio, Generation, Motion, Prosody
 from lipmotion_faces.base import TRANSPARENT, Staging
 
 LOG = logging.getLogger("lipmotion")
@@ -26,6 +31,38 @@ VIDEO_SUFFIXES = (OPAQUE_SUFFIX, ".webm", ".mov")  # videos with sound; all but 
 SOUND_RATE_HZ = 48_000  # sampling rate of the sound track
 DRAWN_HZ, FASTEST_HZ = 25.0, 240.0
 """Frame rate of videos of drawn faces, and the highest one: each picture is drawn, and no screen shows more."""
+
+
+def deliver_to_face(
+    generation: Generation,
+    delivery: Delivery,
+    fps: float,
+    character: DrivenCharacter | None = None,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+) -> Generation:
+    """Return generated motion as a face shows it: with the channels that faces draw, and held poses at the frame rate.
+
+    character : whose weights are shown, where the face is a character with blendshapes
+    staging, prosody : as of ``show_edited_curves``, which all other edits of curves go through
+    """
+    shown = with_drawn_channels(deliver(generation, delivery))
+    solved = character if character is not None and character.shapes is not None else None
+    shown = show_edited_curves(shown, staging, prosody, mouth=solved is None)
+    if shown.curve_edits and solved is not None:
+        shown = with_curves(shown, solved)[0]
+    if not (frames := delivery.hold_frames(fps)):
+        return shown
+    shown = shown.with_motion(with_gestures(shown.motion, shown.units))
+    closed_s, shown = find_closed_times(shown), close_on_frame_grid(shown, fps)
+    if solved is not None:
+        shown = with_curves(shown, solved)[0]
+    return hold_mouth_poses(shown.resampled(fps), frames, closed_s)
+
+
+def with_drawn_channels(generation: Generation) -> Generation:
+    """Return a generation with the channels that faces draw: those of a mouth, where it has blendshapes."""
+    return generation.with_motion(with_mouth(generation.motion)) if is_of_blendshapes(generation.motion) else generation
 
 
 class VideoOutput(Output):

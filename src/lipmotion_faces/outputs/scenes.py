@@ -14,18 +14,18 @@ from lipmotion.articulation.contact import sample_pictures
 from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.liveliness import CALM
-from lipmotion.articulation.mouth import find_mouth, frame_times
+from lipmotion.articulation.mouth import find_mouth
 from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.formats.base import Thinning
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves, eye_and_brow_weights
 from lipmotion.meshes.model.mesh import Blendshape, turn_head
 from lipmotion.pipeline.outputs.curve_sets import apply_weight_edits
-from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth_poses, with_drawn_channels
+from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth_poses
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_recorded_prosody
 from lipmotion.storage.files import sound_reference
 from lipmotion.types import Channel, Generation, Motion, Prosody, Span, StateTrace, Timeline, Unit
-from lipmotion.types.motion import WEIGHT
+from lipmotion.types.motion import WEIGHT, compute_frame_times
 from lipmotion.units import SILENCE
 from lipmotion_faces.base import Staging, stage_liveliness
 from lipmotion_faces.characters.binding import PosedCharacter
@@ -33,7 +33,7 @@ from lipmotion_faces.characters.fbx import convert_to_fbx, find_blender
 from lipmotion_faces.characters.gltf_writer import write_animated_gltf, write_gltf_scene
 from lipmotion_faces.characters.scene import HeadTurn, Scene
 from lipmotion_faces.characters.usd_writer import format_asset, write_usda
-from lipmotion_faces.outputs.drawn_video import check_drawable
+from lipmotion_faces.outputs.drawn_video import check_drawable, with_drawn_channels
 
 GLTF, USD, FBX = ".glb", ".usda", ".fbx"
 SCENE_SUFFIXES = (GLTF, USD, FBX)
@@ -133,7 +133,7 @@ def build_head_scene(
     from lipmotion_faces.head.stage import fit_mouth_weights, make_figure, make_figure_mesh
 
     motion, units, hertz = generation.motion, generation.units, rate_hz or generation.motion.rate_hz
-    times_s = frame_times(len(motion.values), motion.rate_hz, hertz)
+    times_s = compute_frame_times(len(motion.values), motion.rate_hz, hertz)
     around, wanted = _select_around(frames, MARGIN)
     if frames is None:
         mouth = find_mouth(motion, units, hertz)
@@ -198,7 +198,7 @@ def build_character_scene(
     rows = np.concatenate([weights.values[around], *(curve[:, None] for curve in extra.values())], axis=1)
     channels = weights.channels + tuple(Channel(name, WEIGHT) for name in extra)
     hertz = rate if frames is not None else rate_hz or rate
-    shown = sample_pictures(rows, mouth.contact[there], rate, frame_times(len(rows), rate, hertz))
+    shown = sample_pictures(rows, mouth.contact[there], rate, compute_frame_times(len(rows), rate, hertz))
     return Scene(character.mesh, Motion(shown[wanted], hertz, channels), original=character.file)
 
 

@@ -9,12 +9,11 @@ from typing import Any
 from lipmotion.errors import InputError
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.edits import Edits
-from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import measure_prosody, shift_prosody
 from lipmotion.pipeline.session import Cache, Session
 from lipmotion.types import Prosody, frame_of
 from lipmotion_faces.base import DrawnMotion, DrawsSingly, Face, Picture
-from lipmotion_faces.outputs.drawn_video import DRAWN_HZ, read_sound
+from lipmotion_faces.outputs.drawn_video import DRAWN_HZ, deliver_to_face, read_sound
 from lipmotion_faces.registry import stage_face
 
 

@@ -14,7 +14,6 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.cues import check_cue_options, cues
 from lipmotion.pipeline.outputs.curve_sets import WEIGHTS
-from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace, measure_prosody, shift_prosody
 from lipmotion.storage.sources import check_kind, is_file
 from lipmotion.types import Channel, Generation, Motion, Prosody, Timeline
@@ -218,7 +217,7 @@ def _deliver(performance: Performance) -> Generation:
         character = character or settings.face.character
     prosody = performance.cached(_measure_played_prosody) if performance.generation.curve_edits else None
     hertz, staging = _find_rate(settings), settings.staging
-    return deliver_to_face(performance.generation, settings.delivery, hertz, character, staging, prosody)
+    return drawn_video.deliver_to_face(performance.generation, settings.delivery, hertz, character, staging, prosody)
 
 
 def _measure_played_prosody(performance: Performance) -> Prosody:

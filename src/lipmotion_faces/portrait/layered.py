@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import SCENE, TRANSPARENT, DrawnMotion, Face, Staging
 from lipmotion_faces.kernels.painting import warp_bytes
@@ -123,19 +124,8 @@ EYE_DISTANCE = 0.285  # height of the picture that stands for an eye distance, i
 
 MOOD_RISE, MOOD_FALL = 0.1, 0.08  # how far a mood raises and lowers the brows, which are one layer
 MOUTHS = {
-    "rest": MouthPose(0.0, teeth=0.0),
-    "mbp": MouthPose(0.0),
-    "fv": MouthPose(0.05, tuck=1.0),
-    "th": MouthPose(0.1, tongue=1.0),
-    "l": MouthPose(0.14, 0.98, tongue=0.6),
-    "s": MouthPose(0.11, 1.02, tongue=0.2, teeth=0.88),
-    "sh": MouthPose(0.11, 0.94, tongue=0.25, protrusion=0.5, teeth=0.9),
-    "ee": MouthPose(0.12, 1.08, teeth=0.72),
-    "eh": MouthPose(0.2, 1.05, teeth=0.57, oval=0.2),
-    "aa": MouthPose(0.2, 0.97, teeth=0.45, oval=0.85),
-    "r": MouthPose(0.1, 0.91, tongue=0.2, protrusion=0.5, teeth=0.4),
-    "oh": MouthPose(0.12, 0.9, protrusion=0.72, teeth=0.2),
-    "oo": MouthPose(0.07, 0.88, protrusion=0.9, teeth=0.08),
+    row.pop("name"): MouthPose(**{number: float(value) for number, value in row.items()})
+    for row in map(dict, read_shipped_table(__package__, "mouths.csv"))
 }
 """The mouths that a drawing may have, as layers ``mouth-NAME``; ``rest`` is required, what is missing is replaced."""
 _WEIGHTS = {"gap": 5.0, "width": 1.5, "tongue": 1.0, "tuck": 0.9, "protrusion": 1.0, "teeth": 1.8, "oval": 1.0}

@@ -17,11 +17,10 @@ from lipmotion.pipeline.edit_files import EditFile, create_edit_file, read_edits
 from lipmotion.pipeline.edits import STEPS, MoodStep, parse_step
 from lipmotion.pipeline.generation import GRID_S, MARGIN_S
 from lipmotion.pipeline.outputs.curve_sets import make_curves
-from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import measure_prosody
 from lipmotion.types import Audio, Constraints, Generation, Outlook, Span, Speech, Timeline, Unit
 from lipmotion.units import group_words
-from lipmotion_faces.outputs.drawn_video import load_track
+from lipmotion_faces.outputs.drawn_video import deliver_to_face, load_track
 from lipmotion_faces.registry import stage_face
 from pipeline.made import performed, write_sound
 from testing.toy import ToySentence

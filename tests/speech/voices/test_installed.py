@@ -14,7 +14,7 @@ from lipmotion import Model, errors
 from lipmotion.speech.sound.acoustic_conditions import mix_noise
 from lipmotion.speech.voices import installed, synthesiser
 from lipmotion.units import PHONES, Lexicon, is_silent, split_words
-from pipeline.made import features_of, recogniser_of
+from pipeline.made import recogniser_of
 
 FAKED = [
     synthesiser.SyntheticVoice("kal16", "flite", "kal"),
@@ -174,7 +174,7 @@ def test_the_times_of_real_voices_are_those_of_the_aligner(real: synthesiser.Syn
     recogniser, late_s = recogniser_of(toy_model, "general"), []
     for audio, units, _ in installed.speak_sentences(TEXTS, real):
         room = mix_noise(audio, "white", 50)
-        placed = recogniser.align_phones(room, features_of(room), units)
+        placed = recogniser.align_phones(room, units)
         said, aligned = ([span for span in part if not is_silent(span.label.phone)] for part in (units, placed))
         late_s += [a.start_s - b.start_s for a, b in zip(said, aligned, strict=True)]
     assert np.median(np.abs(late_s)) < 0.02  # two frames; flite 0.013, festival with kal 0.015

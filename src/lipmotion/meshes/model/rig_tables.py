@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, shorten
 from lipmotion.storage.text_table import from_field, read_whole_table
 from lipmotion.types import Channel, Motion
-from lipmotion.types.values import parse_number
+from lipmotion.types.values import parse_number, suggest
 
 COLUMNS = ("control", "source", "gain", "offset", "low", "high")
 CONTROL = "control"  # the unit of controls of a user's rig
@@ -68,9 +67,7 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
 def suggest_names(name: str, names: Iterable[str]) -> str:
     """Return what a message says where there is no such name: the nearest ones, or else the first ones."""
     known = list(dict.fromkeys(names))
-    by_lower = {each.lower(): each for each in reversed(known)}
-    near = [by_lower[each] for each in get_close_matches(name.lower(), by_lower, 3)]
-    return f"nearest: {', '.join(near)}" if near else f"there are {shorten(', '.join(known)) or 'none'}"
+    return suggest(name, known, "nearest: {}", 3) or f"there are {shorten(', '.join(known)) or 'none'}"
 
 
 def apply_rig(rows: Sequence[RigRow], sources: Mapping[str, NDArray[np.float64]], rate_hz: float) -> Motion:

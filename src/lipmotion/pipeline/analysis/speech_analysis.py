@@ -209,7 +209,7 @@ def align_between(
     if stop > len(audio.samples) // HOP:
         raise AlignmentError(f"the recording ends at {audio.duration_s:.2f} s")
     segment = audio.stretch(first, stop)
-    spans = list(_open_recogniser(model, request).align(segment, segment.mfcc(), words, lexicon).shifted(start_s))
+    spans = list(_open_recogniser(model, request).align(segment, words, lexicon).shifted(start_s))
     for place in () if pauses else (0, -1):
         while len(spans) > 1 and is_silent(spans[place].label.phone):
             del spans[place]
@@ -227,7 +227,7 @@ def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: Par
     results: list[Recognition] = []
 
     def recognise() -> Recognition:
-        results.append(phones.recognition(audio, features, each, english=request.language == ENGLISH))
+        results.append(phones.recognition(audio, each, english=request.language == ENGLISH))
         return results[-1]
 
     @cache
@@ -245,7 +245,7 @@ def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: Par
         from lipmotion.pipeline.analysis.transcribe import transcribe
 
         lexicon = read_lexicon(request)
-        aligned, fit = transcribe(phones, audio, audio.mfcc(), words, lexicon, lambda: recognised().units)
+        aligned, fit = transcribe(phones, audio, words, lexicon, lambda: recognised().units)
         if aligned is not None:
             speech = build_speech(model.engine, audio, features, aligned, phones.kind, each)
             tags = words.tags if isinstance(words, TimedTranscript) else ()
@@ -354,7 +354,7 @@ def recognise_speech(
             within = engine.recognise(learned, part.speech)
         if within is not None:
             try:
-                within = select_reliable(phones.align_phones(sound, sound.mfcc(), within), 0.0)
+                within = select_reliable(phones.align_phones(sound, within), 0.0)
             except AlignmentError:
                 within = None
         knows_voice = within is not None

@@ -18,7 +18,6 @@ from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit
 from lipmotion.speech.recognition.anchors import REACH_S, bound_words, find_anchors, leave_out_late_lines
 from lipmotion.speech.recognition.network.posteriors import (
     POSTERIOR_STEP,
-    WORD_BOUNDARY,
     find_stretches,
     mean_posterior,
     read_posteriors,
@@ -36,7 +35,7 @@ from lipmotion.speech.recognition.transcript_evidence import (
 )
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.voices.espeak import LanguageLexicon
-from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, TimedTranscript, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Audio, Span, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, Pronunciation, check_words, is_silent
 from lipmotion.units.phones import count_phone_edits
 
@@ -65,14 +64,13 @@ class Transcription(NamedTuple):
 def transcribe(
     phones: Recogniser,
     audio: Audio,
-    features: Features,
     words: Sequence[str] | TimedTranscript | None,
     lexicon: Lexicon,
     recognised: Callable[[], Timeline[Unit]] | None = None,
 ) -> Transcription:
     """Return the phones in time of a recording, with warnings for the user.
 
-    features   : of the audio, from ``mfcc``
+    audio      : an ``AnalysedAudio`` shares its features with what else is computed of it
     words      : the spoken words in lower case, also with times, within which they are aligned; or None
     recognised : recognises phones in time with their confidence; None: nothing is corrected
     Warnings are logged for guessed pronunciations and, with general phone models, for words that do not agree with the
@@ -80,6 +78,7 @@ def transcribe(
     it is sure, words that nobody says are left out, and speech that has no words is recognised.
     Raises AlignmentError: the words cannot be aligned with the recording.
     """
+    audio = analysed(audio)
     if isinstance(words, TimedTranscript):
         words = leave_out_late_lines(words, audio.duration_s)
     spoken = words.words if isinstance(words, TimedTranscript) else words or ()
@@ -90,44 +89,55 @@ def transcribe(
     is_heard = not isinstance(lexicon, LanguageLexicon) and uses_network(phones.kind)
     refused: AlignmentError | None = None
     try:
-        units = align_or_recognise(phones, audio, features, words, lexicon)
+        units = align_or_recognise(phones, audio, words, lexicon)
     except AlignmentError as error:  # too much for the recording: some of the words may be said all the same
         check_words(spoken, audio.duration_s)
-        if not is_heard or recognised is None or compute_phone_posteriors(analysed(audio))[1] < PHONE_POSTERIORS[0]:
+        if not is_heard or recognised is None or compute_phone_posteriors(audio)[1] < PHONE_POSTERIORS[0]:
             raise
-        refused = error
-        labels = [Unit(phone, word=word) for word in spoken for phone in lexicon.pronunciations(word)[0]]
-        edges_s = np.linspace(0, audio.duration_s, len(labels) + 1).tolist()  # each for the same time
-        units = Timeline(tuple(map(Span, edges_s[:-1], edges_s[1:], labels)))
+        refused, units = error, _spread_evenly(spoken, lexicon, audio.duration_s)
     if words is None or phones.kind == "own":
         return Transcription(units, None)
     fit = measure_fit(audio, units)
     if not is_heard:
         warn_of_misfit(fit)
         return Transcription(units, fit)
-    posteriors, sure = compute_phone_posteriors(analysed(audio))
-    costs = SURE_COSTS if sure >= WORD_POSTERIORS[0] else WORD_COSTS
-    evidence = find_evidence(posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units, costs)
-    corrected = recognised is not None and (refused is not None or (evidence.others and sure >= PHONE_POSTERIORS[0]))
-    phones_recognised = recognised() if recognised is not None and corrected else Timeline[Unit](())
-    evidence = _compare(evidence, phones_recognised) if corrected else evidence
-    fit = replace(fit, missing=evidence.gaps, evidence=evidence)
-    warn_of_misfit(fit, corrected=bool(corrected))
+    evidence, heard = _compare_with_sound(audio, units, recognised, refused is not None)
+    fit, corrected = replace(fit, missing=evidence.gaps, evidence=evidence), heard is not None
+    warn_of_misfit(fit, corrected=corrected)
     if fit.is_doubtful and corrected:
         return Transcription(None, fit)
     if refused is not None and not evidence.unsaid:
         raise refused
     is_wrong, timed = bool(evidence.gaps or evidence.unsaid), isinstance(words, TimedTranscript) and words.has_times
     if (corrected and is_wrong) or not (is_wrong or timed or _are_in_order(units, evidence)):
-        units = _correct(phones, audio, features, evidence, phones_recognised, lexicon)
+        units = _correct(phones, audio, evidence, heard or Timeline(()), lexicon)
     return Transcription(units, fit)
+
+
+def _spread_evenly(words: Sequence[str], lexicon: Lexicon, duration_s: float) -> Timeline[Unit]:
+    """Return the phones of words that cannot be aligned, each for the same time of a recording."""
+    labels = [Unit(phone, word=word) for word in words for phone in lexicon.pronunciations(word)[0]]
+    edges_s = np.linspace(0, duration_s, len(labels) + 1).tolist()
+    return Timeline(tuple(map(Span, edges_s[:-1], edges_s[1:], labels)))
+
+
+def _compare_with_sound(
+    audio: AnalysedAudio, units: Timeline[Unit], recognised: Callable[[], Timeline[Unit]] | None, is_refused: bool
+) -> tuple[TranscriptEvidence, Timeline[Unit] | None]:
+    """Return what a phone recogniser says of a transcript, and what is recognised where it seems wrong, else None."""
+    posteriors, sure = compute_phone_posteriors(audio)
+    costs = SURE_COSTS if sure >= WORD_POSTERIORS[0] else WORD_COSTS
+    evidence = find_evidence(posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units, costs)
+    if recognised is None or not (is_refused or (evidence.others and sure >= PHONE_POSTERIORS[0])):
+        return evidence, None
+    heard = recognised()
+    return _compare(evidence, heard), heard
 
 
 def compute_phone_posteriors(audio: AnalysedAudio) -> tuple[NDArray[np.float64], float]:
     """Return the log posteriors of a phone recogniser, and how sure it is of what is said, or of nothing, 0 to 1."""
     posteriors = read_posteriors(audio)
-    hears = any(stretch.token != WORD_BOUNDARY for stretch in posteriors.best_tokens)
-    sure = mean_posterior(find_stretches(audio)) if hears else 1.0
+    sure = mean_posterior(find_stretches(audio)) if posteriors.has_phones else 1.0
     return posteriors.of_phones.astype(float), sure
 
 
@@ -236,12 +246,7 @@ def _select_recognised(
 
 
 def _correct(
-    phones: Recogniser,
-    audio: Audio,
-    features: Features,
-    evidence: TranscriptEvidence,
-    recognised: Timeline[Unit],
-    lexicon: Lexicon,
+    phones: Recogniser, audio: Audio, evidence: TranscriptEvidence, recognised: Timeline[Unit], lexicon: Lexicon
 ) -> Timeline[Unit]:
     """Return the words of a transcript that are said, and what is recognised beside them, aligned."""
     labels: list[tuple[str, float | None]] = []
@@ -260,27 +265,23 @@ def _correct(
             heard_s.append((word.start_s, word.end_s))
     spans = list[Span[Unit]]()
     anchors = bound_words(heard_s)
-    for span in phones.align(audio, features, tuple(variants), Lexicon(variants), anchors):
+    for span in phones.align(audio, tuple(variants), Lexicon(variants), anchors):
         text, confidence = labels[int(span.label.word)] if span.label.word else ("", None)
         spans.append(replace(span, label=replace(span.label, word=text, confidence=confidence)))
     return Timeline(tuple(spans))
 
 
 def align_or_recognise(
-    phones: Recogniser,
-    audio: Audio,
-    features: Features,
-    words: Sequence[str] | TimedTranscript | None,
-    lexicon: Lexicon,
+    phones: Recogniser, audio: Audio, words: Sequence[str] | TimedTranscript | None, lexicon: Lexicon
 ) -> Timeline[Unit]:
     """Return the phones in time of a recording as ``transcribe`` does, without warnings."""
     if words is None:
-        return phones.recognition(audio, features).units
+        return phones.recognition(audio).units
     anchors = None
     if isinstance(words, TimedTranscript):
         anchors, words = find_anchors(words) if words.has_times else None, words.words
     check_words(words, audio.duration_s)
-    return phones.align(audio, features, words, lexicon, anchors)
+    return phones.align(audio, words, lexicon, anchors)
 
 
 def warn_of_misfit(fit: TranscriptFit, corrected: bool = False) -> None:

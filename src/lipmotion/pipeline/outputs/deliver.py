@@ -10,23 +10,13 @@ from typing import Final
 import numpy as np
 
 from lipmotion.articulation.curve_edits import GAIN_EDGE_S, weigh_span
-from lipmotion.articulation.delivery import (
-    Delivery,
-    close_on_frame_grid,
-    find_closed_times,
-    hold_poses,
-    intensify,
-    shift_in_time,
-)
+from lipmotion.articulation.delivery import Delivery, hold_poses, intensify, shift_in_time
 from lipmotion.articulation.expression import is_mood, with_moods
-from lipmotion.articulation.phone_targets import with_gestures
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes, with_mouth
-from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, to_arkit
-from lipmotion.pipeline.outputs.curve_sets import show_edited_curves, with_curves
-from lipmotion.types import Generation, Prosody, VoiceEvent
+from lipmotion.types import Generation, VoiceEvent
 from lipmotion.types.audio import LAUGHTER
-from lipmotion.types.delivery import NEUTRAL, PLAIN, MoodKey, Staging, sort_moods
+from lipmotion.types.delivery import NEUTRAL, PLAIN, MoodKey, sort_moods
 from lipmotion.types.motion import RADIAN
 
 FACTORS: Final = {PLAIN: 1.0, "whisper": 0.65, "shout": 1.5, "mumble": 0.5}
@@ -79,38 +69,6 @@ def deliver(generation: Generation, delivery: Delivery) -> Generation:
         opening = with_mouth(motion)["opening"].astype(np.float64) if is_of_blendshapes(motion) else None
         generation = intensify(generation, delivery.intensity, opening, in_place=has_moods)
     return shift_in_time(generation, delivery)
-
-
-def deliver_to_face(
-    generation: Generation,
-    delivery: Delivery,
-    fps: float,
-    character: DrivenCharacter | None = None,
-    staging: Staging | None = None,
-    prosody: Prosody | None = None,
-) -> Generation:
-    """Return generated motion as a face shows it: with the channels that faces draw, and held poses at the frame rate.
-
-    character : whose weights are shown, where the face is a character with blendshapes
-    staging, prosody : as of ``show_edited_curves``, which all other edits of curves go through
-    """
-    shown = with_drawn_channels(deliver(generation, delivery))
-    solved = character if character is not None and character.shapes is not None else None
-    shown = show_edited_curves(shown, staging, prosody, mouth=solved is None)
-    if shown.curve_edits and solved is not None:
-        shown = with_curves(shown, solved)[0]
-    if not (frames := delivery.hold_frames(fps)):
-        return shown
-    shown = shown.with_motion(with_gestures(shown.motion, shown.units))
-    closed_s, shown = find_closed_times(shown), close_on_frame_grid(shown, fps)
-    if solved is not None:
-        shown = with_curves(shown, solved)[0]
-    return hold_mouth_poses(shown.resampled(fps), frames, closed_s)
-
-
-def with_drawn_channels(generation: Generation) -> Generation:
-    """Return a generation with the channels that faces draw: those of a mouth, where it has blendshapes."""
-    return generation.with_motion(with_mouth(generation.motion)) if is_of_blendshapes(generation.motion) else generation
 
 
 def hold_mouth_poses(generation: Generation, frames: int, closed_s: Sequence[float]) -> Generation:

@@ -20,7 +20,6 @@ from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, measure_fit
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.acoustic_conditions import mix_noise
-from lipmotion.speech.sound.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import explain_missing_synthesiser, list_installed, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
@@ -129,7 +128,7 @@ def align_recordings(
                 raise InputError(f"no pronunciation of {shorten(foreign[0])!r}, required English words, or a lexicon")
             audio = read_audio(path)
             if labels.phones is None:
-                units = align_or_recognise(phones, audio, analysed(audio).mfcc(), words, lexicon)
+                units = align_or_recognise(phones, audio, words, lexicon)
             else:
                 units = labels.phones.between(0, audio.duration_s)
             score = measure_fit(audio, units).score

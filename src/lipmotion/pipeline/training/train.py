@@ -242,7 +242,7 @@ def label_phones(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> 
     if utterance.phones is not None:
         return utterance.phones
     features = Features(np.asarray(utterance.features.values), utterance.features.duration_s)
-    return align_or_recognise(phones, utterance.audio, features, utterance.words, lexicon)
+    return align_or_recognise(phones, analysed(utterance.audio, features), utterance.words, lexicon)
 
 
 def _train_phone_models(

@@ -17,7 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lipmotion.kernels.paths import find_cheapest, trace_back
-from lipmotion.speech.features.mfcc import HOP, check_samples, frame_count
+from lipmotion.speech.features.mfcc import HOP, check_samples, frame_count, reflect_ends
 from lipmotion.types import SPEECH_RATE_HZ, Audio, Prosody
 
 LOWEST_HZ, HIGHEST_HZ = 60.0, 400.0
@@ -97,7 +97,7 @@ def correlations(samples: Floats, block: slice, silence: float) -> Floats:
     np.square(x, out=x)
     energy = np.sqrt(x @ tables.early)
     energy *= np.sqrt(x @ tables.late)
-    slope = np.diff(_reflect(samples, (block.start - 1) * HOP - 1, block.stop * HOP))
+    slope = np.diff(reflect_ends(samples, (block.start - 1) * HOP - 1, block.stop * HOP))
     np.square(slope, out=slope)
     power = slope.reshape(-1, HOP).mean(axis=1)
     frication = np.float32(FRICATION_SHARE / 2) * (power[1:] + power[:-1])
@@ -138,23 +138,12 @@ def _filter_low(samples: Floats, first: int, hops: int) -> Floats:
     """Return ``hops`` · 10 ms at 4 kHz, the first sample centred ``_TAPS // 2`` after sample ``first``."""
     low_pass = _tables().low_pass
     parts = low_pass.shape[1] // _HOP
-    padded = _reflect(samples, first, first + (hops + parts - 1) * HOP)
+    padded = reflect_ends(samples, first, first + (hops + parts - 1) * HOP)
     products = padded.reshape(-1, HOP) @ low_pass  # what every 10 ms add to the same 10 ms and to those before
     low = products[:hops, :_HOP].copy()
     for part in range(1, parts):
         low += products[part : part + hops, part * _HOP : (part + 1) * _HOP]
     return low.reshape(-1)
-
-
-def _reflect(samples: Floats, first: int, end: int) -> Floats:
-    """Return samples ``first``..``end`` - 1 of the signal, reflected at both ends as often as needed."""
-    count = len(samples)
-    if first >= 0 and end <= count:
-        return samples[first:end]
-    last, outside = count - 1, np.concatenate([np.arange(first, 0), np.arange(max(first, count), end)])
-    reflected = samples[last - np.abs(last - np.abs(outside) % (2 * last))]
-    before = max(-first, 0)
-    return np.concatenate([reflected[:before], samples[max(first, 0) : end], reflected[before:]])
 
 
 def lags() -> NDArray[np.float64]:

@@ -136,9 +136,15 @@ def log_energy(samples: NDArray[np.float32]) -> NDArray[np.float32]:
 def _padded(samples: NDArray[np.float32], block: slice) -> NDArray[np.float32]:
     """Return the samples under a block of frames, and the one before; beyond both ends the signal is reflected."""
     half = WINDOW // 2
-    first, last = block.start * HOP - half - 1, (block.stop - 1) * HOP + half
-    inside = samples[max(first, 0) : min(last, len(samples))]
-    return np.pad(inside, (max(-first, 0), max(last - len(samples), 0)), mode="reflect")
+    return reflect_ends(samples, block.start * HOP - half - 1, (block.stop - 1) * HOP + half)
+
+
+def reflect_ends(samples: NDArray[np.float32], first: int, end: int) -> NDArray[np.float32]:
+    """Return samples ``first``..``end`` - 1 of a signal, reflected at both ends as often as needed."""
+    if first >= 0 and end <= len(samples):
+        return samples[first:end]
+    last = len(samples) - 1
+    return samples[last - np.abs(last - np.abs(np.arange(first, end)) % (2 * last))]
 
 
 def frame_count(samples: NDArray[np.float32]) -> int:

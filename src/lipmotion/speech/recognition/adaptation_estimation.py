@@ -65,7 +65,7 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
     adaptation, speech_s = create_adaptation(warp, weigh_own_model(scores[warp])), 0.0
     for _ in range(PASSES):
         recogniser = Recogniser(own, adaptation=adaptation)
-        densities = np.concatenate([recogniser.best_path_densities(audio, audio.mfcc()) for audio in audios])
+        densities = np.concatenate([recogniser.best_path_densities(audio) for audio in audios])
         combined = recogniser.combined
         units = (name.partition(".")[0] for name in combined.hmm.table.names)
         silent = np.array([is_silent(unit) or unit in NOISES for unit in units])

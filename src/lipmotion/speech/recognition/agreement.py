@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lipmotion.hmm.loudness import find_loud_frames, find_quiet_frames
 from lipmotion.speech.recognition.general import STATES, find_density, load_general
 from lipmotion.speech.recognition.network.posteriors import POSTERIOR_STEP
-from lipmotion.speech.recognition.transcript_evidence import TranscriptEvidence, WordEvidence, label_evidence
+from lipmotion.speech.recognition.transcript_evidence import TranscriptEvidence, WordEvidence, join_near, label_evidence
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.types import FRAME_RATE_HZ, Audio, Span, Timeline, Unit, frames_of
 from lipmotion.units import is_silent
@@ -27,7 +27,6 @@ MIN_VOICE_S = 1.0
 """Silence with so much loud sound in it is speech that the transcript leaves out; breath and coughs are shorter."""
 MIN_IDLE_S = 0.3  # given phones in silence for so long are doubted
 MIN_FITTING_SHARE = 0.9  # a transcript that fits less of the speech is worth a remark
-JOINED_S = 0.5  # places nearer than this are one stretch
 Place = tuple[float, float]  # start and end in seconds
 
 
@@ -106,7 +105,7 @@ def measure_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
                 inside = slice(*np.searchsorted(frames, (first, stop)))
                 if float(scores[inside].mean()) < LONG_PHONE_SCORE:
                     missing.append((span.start_s, span.end_s))
-    return TranscriptFit(mean, _join(missing), speech_s)
+    return TranscriptFit(mean, join_near(*np.reshape(missing, (-1, 2)).T), speech_s)
 
 
 def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArray[np.float64] | None) -> TranscriptFit:
@@ -120,7 +119,7 @@ def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArr
     if log_posteriors is not None:
         heard, idle, wrong = label_evidence(log_posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units)
         loud_s = np.flatnonzero(find_loud_frames(audio.log_energy)) / FRAME_RATE_HZ
-        loud = _join([(at_s, at_s + 1 / FRAME_RATE_HZ) for at_s in loud_s])
+        loud = join_near(loud_s, loud_s + 1 / FRAME_RATE_HZ)
         unlabelled = list[Place]()
         for start_s, end_s in heard:  # all the sound around it, as far as no phone is given
             before_s = max((span.end_s for span in spoken if span.end_s <= start_s), default=0.0)
@@ -131,24 +130,11 @@ def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArr
         missing = tuple(unlabelled)
     else:
         quiet = find_quiet_frames(audio.log_energy)
-        silent = _join(
-            [(span.start_s, span.end_s) for span in spoken if quiet[slice(*frames_of(span, len(quiet)))].all()]
-        )
-        idle = tuple((start_s, end_s) for start_s, end_s in silent if end_s - start_s >= MIN_IDLE_S)
+        silent = [span for span in spoken if quiet[slice(*frames_of(span, len(quiet)))].all()]
+        idle = join_near([span.start_s for span in silent], [span.end_s for span in silent], min_s=MIN_IDLE_S)
         missing, wrong = measure_fit(audio, units).missing, ()
     speech_s = sum(span.duration_s for span in spoken) + sum(end_s - start_s for start_s, end_s in missing)
     return TranscriptFit(0.0, missing, speech_s, None, idle, wrong)
-
-
-def _join(places: list[Place]) -> tuple[Place, ...]:
-    """Return places in time, those near one another as one."""
-    joined: list[Place] = []
-    for start_s, end_s in places:
-        if joined and start_s - joined[-1][1] <= JOINED_S:
-            joined[-1] = (joined[-1][0], end_s)
-        else:
-            joined.append((start_s, end_s))
-    return tuple(joined)
 
 
 def _score_frames(audio: AnalysedAudio, units: Timeline[Unit]) -> tuple[NDArray[np.intp], NDArray[np.float32], float]:

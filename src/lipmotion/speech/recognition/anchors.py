@@ -150,14 +150,11 @@ def find_pressed_words(placed: Sequence[PlacedWord], windows: Windows, frames: i
 
 def average_fits(placed: Sequence[PlacedWord], groups: NDArray[np.intp], frames: int) -> NDArray[np.float64]:
     """Return the fit of the words of each time, the mean over their frames [shape=(groups,)]."""
-    total, count = np.zeros(int(groups[-1]) + 1), np.zeros(int(groups[-1]) + 1)
-    ends = [item.start for item in placed[1:]] + [frames]
-    for item, stop in zip(placed, ends, strict=True):
-        if item.spoken.word >= 0:
-            group = groups[item.spoken.word]
-            total[group] += item.fit * (stop - item.start)
-            count[group] += stop - item.start
-    return total / np.maximum(count, 1)
+    words = np.array([item.spoken.word for item in placed], np.intp)
+    lengths = np.diff([*(item.start for item in placed), frames])[words >= 0]
+    fits, numbers = np.array([item.fit for item in placed])[words >= 0], groups[words[words >= 0]]
+    count = np.bincount(numbers, lengths, groups[-1] + 1)
+    return np.bincount(numbers, fits * lengths, groups[-1] + 1) / np.maximum(count, 1)
 
 
 def align_within(

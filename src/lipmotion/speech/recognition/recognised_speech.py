@@ -15,9 +15,9 @@ from lipmotion.hmm.align import align_states, place_words
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import penalise, wrap_log_likelihoods
 from lipmotion.speech.recognition.general import NOISES
-from lipmotion.speech.sound.analysed_audio import SILENT_ENERGY, Passage
+from lipmotion.speech.sound.analysed_audio import SILENT_ENERGY, AnalysedAudio, Passage
 from lipmotion.speech.sound.voice_activity import Stretch
-from lipmotion.types import FRAME_RATE_HZ, Features, Span, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, find_similar_phone, is_silent
 from lipmotion.units.phones import FULL_FORMS, SHORT_PAUSE_S
 
@@ -208,22 +208,22 @@ def time_phones(labels: Sequence[tuple[str, str]], bounds: NDArray[np.intp], dur
 
 
 def build_recognition(
-    labels: Sequence[LabelledFrames], recognised: Sequence[RecognisedWord], features: Features, similarity: float | None
+    labels: Sequence[LabelledFrames], words: Sequence[RecognisedWord], audio: AnalysedAudio, similarity: float | None
 ) -> Recognition:
-    """Return a recognition of labels of a recording; ``recognised`` are the words that they number."""
-    named = [(label.phone, recognised[label.word].text if label.word >= 0 else "") for label in labels]
+    """Return a recognition of labels of a recording; ``words`` are those that they number."""
+    named = [(label.phone, words[label.word].text if label.word >= 0 else "") for label in labels]
     firsts = [label.first for label in labels]
-    units = time_phones(named, np.array([*firsts, len(features.values)]), features.duration_s)
-    words = []
-    ends = [*firsts[1:], round(features.duration_s * FRAME_RATE_HZ)]
+    units = time_phones(named, np.array([*firsts, audio.frames]), audio.duration_s)
+    timed = []
+    ends = [*firsts[1:], round(audio.duration_s * FRAME_RATE_HZ)]
     for number, group in groupby(zip(labels, ends, strict=True), key=lambda pair: pair[0].word):
         if number >= 0:
             phones = list(group)
-            words.append(Span(phones[0][0].first / FRAME_RATE_HZ, phones[-1][1] / FRAME_RATE_HZ, recognised[number]))
+            timed.append(Span(phones[0][0].first / FRAME_RATE_HZ, phones[-1][1] / FRAME_RATE_HZ, words[number]))
     spoken = [span for span in units if not is_silent(span.label.phone)]
     word_s = sum(span.duration_s for span in spoken if span.label.word)
     phone_s = sum(span.duration_s for span in spoken) - word_s
-    return Recognition(units, Timeline(tuple(words)), word_s, phone_s, similarity)
+    return Recognition(units, Timeline(tuple(timed)), word_s, phone_s, similarity)
 
 
 def place_units(units: Timeline[LabelT], first: int, own: slice) -> Timeline[LabelT]:

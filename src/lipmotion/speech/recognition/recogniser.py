@@ -33,7 +33,7 @@ from lipmotion.speech.recognition.recognised_speech import (
 from lipmotion.speech.recognition.word_search import decode_network, list_phones, list_wordless, match_words, scan_words
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.speaker_similarity import OWN_SCORE, STRANGER_SCORE, SpeakerSimilarity, speaker_similarity
-from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Audio, ParallelMap, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, find_similar_phone, is_silent
 
 if TYPE_CHECKING:
@@ -71,14 +71,12 @@ class Recogniser:
         if self.kind not in RECOGNISER_KINDS:
             raise InputError(f"unknown recogniser {self.kind!r}; required one of: {', '.join(RECOGNISER_KINDS)}")
 
-    def recognition(
-        self, audio: Audio, features: Features, each: ParallelMap = map, *, english: bool = True
-    ) -> Recognition:
+    def recognition(self, audio: Audio, each: ParallelMap = map, *, english: bool = True) -> Recognition:
         """Return the most probable phones of a recording in time, with the words that decided them.
 
-        audio    : an ``AnalysedAudio`` shares its features with what else is computed of it
-        features : of the audio, as ``mfcc`` returns them; where all are 0, as in digital silence, there is silence
-        english  : whether English words are searched; in other languages, phones alone
+        audio   : an ``AnalysedAudio`` shares its features with what else is computed of it; where all of them are 0, as
+                  in digital silence, there is silence
+        english : whether English words are searched; in other languages, phones alone
         Words are recognised in every stretch of sound and aligned by our models: by a phone recogniser where it is sure
         (``speech.recognition.network``), else by pocketsphinx. Then ``auto`` compares their likelihood with that of the
         best path of phones without words: words that fit decide their phones; of the other words, the phones only
@@ -86,15 +84,14 @@ class Recogniser:
         Raises MissingDependencyError: general models or words are wanted and pocketsphinx is not installed.
         Source: Hofer 2008, Eq. 5 (Viterbi with a back-off bigram).
         """
-        audio = analysed(audio, features)
-        if not features.values.any() or not audio.passages:
-            return build_recognition([LabelledFrames(0, SILENCE)], (), features, None)
+        audio = analysed(audio)
+        if not any(passage.audio.mfcc().values.any() for passage in audio.passages):
+            return build_recognition([LabelledFrames(0, SILENCE)], (), audio, None)
         if not audio.is_passage:
             if uses_network(self.kind):
                 find_stretches(audio, each)  # of all passages at once: several processes work on them
-            sounds = (passage.audio for passage in audio.passages)
-            recognitions = [self.recognition(sound, sound.mfcc(), each, english=english) for sound in sounds]
-            return join_recognition(list(zip(audio.passages, recognitions, strict=True)), features.duration_s)
+            recognitions = [self.recognition(passage.audio, each, english=english) for passage in audio.passages]
+            return join_recognition(list(zip(audio.passages, recognitions, strict=True)), audio.duration_s)
         is_judged = self.adaptation is None and self.kind != "general"  # else nothing depends on it
         similarity = speaker_similarity(self.own, audio) if is_judged else None
         is_own = similarity is not None and similarity.score > OWN_SCORE
@@ -106,44 +103,44 @@ class Recogniser:
         spoken = scan_words(audio, each) if self.kind == "auto" and not known else None
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
         path = self._loop.network.best_path(log_likelihoods)
-        labels, recognised = self._free_labels(audio, features, path), list[RecognisedWord]()
+        labels, recognised = self._free_labels(audio, path), list[RecognisedWord]()
         if spoken is not None:
             aligning = self._log_likelihoods(audio, aligning=True)[1] if self._has_few_gaussians else log_likelihoods
             loud, free = find_loud_frames(audio.log_energy), self._loop.network.emission[path]
             parts, recognised = match_words(hmm, self._loop, log_likelihoods, aligning, free, loud, spoken)
             labels = splice(labels, parts, len(path))
-        return build_recognition(labels, recognised, features, similarity and similarity.score)
+        return build_recognition(labels, recognised, audio, similarity and similarity.score)
 
     def _network_recognition(
         self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None, *, english: bool
     ) -> Recognition:
         """Return what a phone recogniser finds in a recording: words, or phones that our models find as well."""
-        features, stretches, loud = audio.mfcc(), find_stretches(audio), find_loud_frames(audio.log_energy)
+        stretches, loud = find_stretches(audio), find_loud_frames(audio.log_energy)
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity, aligning=english)
         if english:
             parts, recognised = decode_network(hmm, log_likelihoods, loud, stretches)
         else:
             parts, recognised = list_wordless(hmm, self._loop, log_likelihoods, stretches), []
         labels = splice([LabelledFrames(0, SILENCE)], parts, len(loud))
-        recognition = build_recognition(labels, recognised, features, similarity and similarity.score)
+        recognition = build_recognition(labels, recognised, audio, similarity and similarity.score)
         return replace(recognition, posterior=mean_posterior(stretches))
 
-    def _free_labels(self, audio: AnalysedAudio, features: Features, path: NDArray[np.intp]) -> list[LabelledFrames]:
+    def _free_labels(self, audio: AnalysedAudio, path: NDArray[np.intp]) -> list[LabelledFrames]:
         """Return the phones of a recording as they are recognised without words, of their best path."""
         labels = list_phones(self._loop, path)
         if self.kind not in ("auto", "fast") or not self._has_few_gaussians:
             return labels
         named, bounds = [(label.phone, "") for label in labels], [label.first for label in labels]
-        phones = time_phones(named, np.array([*bounds, len(path)]), features.duration_s)
+        phones = time_phones(named, np.array([*bounds, len(path)]), audio.duration_s)
         try:
-            aligned = self.align_phones(audio, features, phones)
+            aligned = self.align_phones(audio, phones)
         except AlignmentError:
             return labels
         frames = [round(span.start_s * FRAME_RATE_HZ + 0.5) if span.start_s > 0 else 0 for span in aligned]
         return [LabelledFrames(frame, span.label.phone) for frame, span in zip(frames, aligned, strict=True)]
 
     def align(
-        self, audio: Audio, features: Features, words: Sequence[str], lexicon: Lexicon, anchors: Anchors | None = None
+        self, audio: Audio, words: Sequence[str], lexicon: Lexicon, anchors: Anchors | None = None
     ) -> Timeline[Unit]:
         """Return the phones of a known transcript in time: forced alignment.
 
@@ -153,7 +150,7 @@ class Recogniser:
         without a model borrows that of the most similar phone with one (``units.SIMILAR_PHONES``).
         Raises AlignmentError: the transcript does not fit into the recording. MissingDependencyError: ``recognition``.
         """
-        audio = analysed(audio, features)
+        audio = analysed(audio)
         hmm, log_likelihoods = self._log_likelihoods(audio, aligning=True)
         log_likelihoods = penalise(hmm, log_likelihoods, find_loud_frames(audio.log_energy), silent=True)
         forms_of = {word: lexicon.spoken_forms(word) for word in set(words)}
@@ -170,21 +167,22 @@ class Recogniser:
             for phone, word in form:
                 if phone != PAUSE or item.units[len(labels) - count_before] == PAUSE:  # else it was not made
                     labels.append((phone, word))
-        return time_phones(labels, bounds, features.duration_s)
+        return time_phones(labels, bounds, audio.duration_s)
 
-    def best_path_densities(self, audio: Audio, features: Features) -> NDArray[np.intp]:
+    def best_path_densities(self, audio: Audio) -> NDArray[np.intp]:
         """Return the density of each frame's state on the most probable path [shape=(T,)].
 
         They are numbered as in ``combined``, with the kind ``own`` as in the own models; of digital silence as silence.
         Raises MissingDependencyError: as ``recognition``.
         """
-        if not features.values.any():
-            return np.full(len(features.values), self.own.table.density(SILENCE, 0), np.intp)
-        _, log_likelihoods = self._log_likelihoods(analysed(audio, features))
+        audio = analysed(audio)
+        if not audio.mfcc().values.any():
+            return np.full(audio.frames, self.own.table.density(SILENCE, 0), np.intp)
+        _, log_likelihoods = self._log_likelihoods(audio)
         network = self._loop.network
         return network.emission[network.best_path(log_likelihoods)]
 
-    def align_phones(self, audio: Audio, features: Features, phones: Timeline[Unit]) -> Timeline[Unit]:
+    def align_phones(self, audio: Audio, phones: Timeline[Unit]) -> Timeline[Unit]:
         """Return known phones in time: forced alignment, with optional pauses where ``phones`` has silence.
 
         phones          : in order; their times are not used
@@ -194,7 +192,7 @@ class Recogniser:
         runs = [tuple(run) for silent, run in groupby(names, key=is_silent) if not silent]
         words = [" ".join(run) for run in runs]
         lexicon = Lexicon({word: (run,) for word, run in zip(words, runs, strict=True)})
-        aligned = self.align(audio, features, words, lexicon)
+        aligned = self.align(audio, words, lexicon)
         return Timeline(tuple(replace(span, label=replace(span.label, word="")) for span in aligned))
 
     @cached_property

@@ -19,7 +19,7 @@ from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, SIMILAR_PHONES, is_silent
@@ -39,8 +39,8 @@ MIN_STRETCH_S, LONGEST_STRETCH_S = 10.0, 30.0
 
 LABEL_REACH_S, COMPARED, MIN_AGREEING = 0.1, 9, 0.4
 """Given phones are compared with what is heard so near to them; of so many together fewer agree if they are wrong."""
-RUN_PAUSE_S, MIN_RUN, MIN_DOUBT_S = 0.5, 3, 0.3
-"""What is doubted is a stretch if it is nearer to one another, and so much and so long together."""
+NEAR_S, MIN_RUN, MIN_DOUBT_S = 0.5, 3, 0.3
+"""Places in time that are nearer are one stretch; phones are doubted if they are so many and so long together."""
 
 SILENT = [*(number for number, phone in enumerate(PHONES) if is_silent(phone)), len(PHONES)]
 """The columns of silence, of pauses and of none of the phones."""
@@ -268,17 +268,19 @@ def label_evidence(log_posteriors: Array, frame_s: float, units: Timeline[Unit])
     if len(right):
         share = np.convolve(right, window, "same") / np.convolve(np.ones(len(right)), window, "same")
     doubted_s = compared_s[order][share < MIN_AGREEING]
-    idle, wrong = _runs(starts_s[~is_near], ends_s[~is_near]), _runs(doubted_s, doubted_s)
-    return LabelEvidence(_runs(times_s[alone], times_s[alone], MIN_GAP_S), idle, wrong)
+    idle = join_near(starts_s[~is_near], ends_s[~is_near], MIN_RUN, MIN_DOUBT_S)
+    wrong = join_near(doubted_s, doubted_s, MIN_RUN, MIN_DOUBT_S)
+    return LabelEvidence(join_near(times_s[alone], times_s[alone], MIN_RUN, MIN_GAP_S), idle, wrong)
 
 
-def _runs(starts_s: Array, ends_s: Array, min_s: float = MIN_DOUBT_S) -> tuple[tuple[float, float], ...]:
-    """Return stretches of at least ``MIN_RUN`` times near one another."""
-    if not len(starts_s):
-        return ()
-    cuts = np.flatnonzero(starts_s[1:] - ends_s[:-1] > RUN_PAUSE_S) + 1
-    runs = zip(np.split(starts_s, cuts), np.split(ends_s, cuts), strict=True)
-    spans = [(float(starts[0]), float(ends[-1])) for starts, ends in runs if len(starts) >= MIN_RUN]
+def join_near(
+    starts_s: ArrayLike, ends_s: ArrayLike, count: int = 1, min_s: float = 0.0
+) -> tuple[tuple[float, float], ...]:
+    """Return places in time, those near one another as one, as far as they are so many together and last so long."""
+    starts, ends = np.asarray(starts_s, float), np.asarray(ends_s, float)
+    cuts = np.flatnonzero(starts[1:] - ends[:-1] > NEAR_S) + 1
+    runs = zip(np.split(starts, cuts), np.split(ends, cuts), strict=True)
+    spans = [(float(first[0]), float(last[-1])) for first, last in runs if len(first) >= count]
     return tuple((start_s, end_s) for start_s, end_s in spans if end_s - start_s >= min_s)
 
 

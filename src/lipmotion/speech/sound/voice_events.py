@@ -15,7 +15,6 @@ from itertools import pairwise
 
 import numpy as np
 import scipy
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lipmotion.speech.features.f0 import log_f0
@@ -85,7 +84,7 @@ BREATH_LOW_DB = -4.0  # level under 1 kHz beside that from 1 to 3.5 kHz, at most
 PAUSE_PIECE_S = 600.0  # longer pauses are searched in pieces: silence may last for hours
 QUIET_REACH = round(2 * FRAME_RATE_HZ)  # the quiet around a pause is looked for so many frames beside it
 QUIET_SHARE = 0.08  # share of the frames around one that are at most as loud as the quiet there
-BLOCK_FRAMES = 2000  # frames whose surroundings are in memory at once
+BLOCK_FRAMES = 2000  # frames whose powers are in memory at once
 
 
 def find_voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
@@ -189,10 +188,8 @@ def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, i
         for inside in [(centres >= lowest_hz) & (centres < highest_hz)]
     )
     level = scipy.ndimage.gaussian_filter1d(DB * np.log(bright), SMOOTHING_FRAMES, mode="nearest")
-    windows = sliding_window_view(np.pad(level, QUIET_REACH, "edge"), 2 * QUIET_REACH + 1)
-    rank = int(QUIET_SHARE * windows.shape[1])
-    blocks = (windows[first : first + BLOCK_FRAMES] for first in range(0, len(windows), BLOCK_FRAMES))
-    quiet = np.concatenate([np.partition(block, rank, axis=1)[:, rank].copy() for block in blocks])
+    around = 2 * QUIET_REACH + 1
+    quiet = scipy.ndimage.rank_filter(level, int(QUIET_SHARE * around), around, mode="nearest")
     edges = np.flatnonzero(np.diff(np.r_[False, (level > quiet + BREATH_RISE_DB[0]) & ~voiced, False]))
     for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         if not BREATH_S[0] <= (stop - first) / FRAME_RATE_HZ <= BREATH_S[1]:
