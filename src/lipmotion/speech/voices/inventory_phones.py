@@ -32,7 +32,7 @@ def convert_phones(
 ) -> Timeline[Unit]:
     """Return the phones of a synthesised sentence in time, as forced alignment would label them.
 
-    phone_map  : labels to phones (``phone_maps``)
+    phone_map  : labels to phones (``synthesiser.PhoneMap``)
     words      : of the sentence; or what is written of it between blanks, in time, where the synthesiser tells
     lexicon    : pronunciations of the words (None: the sentence is not English, its words stay as they are written)
     duration_s : of the sound; what no label covers is silence
