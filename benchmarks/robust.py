@@ -122,7 +122,7 @@ def phones(corpora: Path, model: Model, _: Path | None) -> None:
         recordings.append((audio, spoken(span.label.phone for span in aligned)))
     for kind in RECOGNISER_KINDS:
         phone_recogniser = open_recogniser(model.phones, kind)
-        found = [phone_recogniser.recognition(audio) for audio, _ in recordings]
+        found = [phone_recogniser.recognise(audio) for audio, _ in recordings]
         errors = [
             count_phone_edits(wanted, spoken(s.label.phone for s in each.units))
             for each, (_, wanted) in zip(found, recordings, strict=True)
@@ -130,7 +130,7 @@ def phones(corpora: Path, model: Model, _: Path | None) -> None:
         count = sum(len(wanted) for _, wanted in recordings)
         total_s = sum(audio.duration_s for audio, _ in recordings)
         times = [
-            seconds(lambda: [phone_recogniser.recognition(a) for a, _ in recordings])  # noqa: B023
+            seconds(lambda: [phone_recogniser.recognise(a) for a, _ in recordings])  # noqa: B023
             for _ in range(5)
         ]
         show(
@@ -236,7 +236,7 @@ def foreign(corpora: Path, model: Model, _: Path | None) -> None:
     ):
         audio = read_audio(corpora / name)
         audio = Audio(audio.samples[: 40 * RATE_HZ], RATE_HZ)
-        found = recogniser.recognition(audio)
+        found = recogniser.recognise(audio)
         share = found.word_s / max(found.word_s + found.phone_s, 1e-9)
         show(f"foreign: {name}", by_words=round(share, 2), confidence=round(found.confidence or 0.0, 2))
 

@@ -21,9 +21,9 @@ def small_phone_models(monkeypatch: pytest.MonkeyPatch) -> None:
 def recognised_once() -> Iterator[None]:
     """Most examples recognise the same recordings by the same models: each is done once."""
     known: dict[tuple[int, str, bytes], Recognition] = {}
-    plain = Recogniser.recognition
+    plain = Recogniser.recognise
 
-    def recognition(self: Recogniser, audio: Audio, each: ParallelMap = map, *, english: bool = True) -> Recognition:
+    def recognise(self: Recogniser, audio: Audio, each: ParallelMap = map, *, english: bool = True) -> Recognition:
         key = id(self.own), self.kind, audio.samples.tobytes()
         if self.adaptation is not None:
             return plain(self, audio, each, english=english)
@@ -32,5 +32,5 @@ def recognised_once() -> Iterator[None]:
         return known[key]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Recogniser, "recognition", recognition)
+        patch.setattr(Recogniser, "recognise", recognise)
         yield

@@ -16,7 +16,7 @@ from lipmotion import CueSheet, read_motion
 from lipmotion.articulation.cue_sheets import choose_cues
 from lipmotion.articulation.mouth import find_mouth
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.cues import CUE_FORMATS, UNKNOWN, convert_cues, format_of, read_cues, write_cue_file
+from lipmotion.formats.cues import CUE_FORMATS, UNKNOWN, convert_cues, find_format, read_cues, write_cue_file
 from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 from lipmotion.units.phones import SHAPES
@@ -95,11 +95,11 @@ def test_what_is_written_is_read(sheet: CueSheet, tmp_path: Path) -> None:
         assert (root.findtext("metadata/soundFile") or "") == name.replace("\x07", "\\x07").replace("\x00", "\\x00")
     for name, kind in CUE_FORMATS.items():
         path = tmp_path / f"Größe.{name.upper()}"
-        write_cue_file(path, sheet, "a.wav", format_of(path))
+        write_cue_file(path, sheet, "a.wav", find_format(path))
         assert path.read_bytes().decode() == kind.text(sheet, "a.wav")
     for name in ("a.txt", "a"):
         with pytest.raises(ExportError, match=r"unknown cue format .*; required one of: \.tsv \.xml \.json \.dat"):
-            format_of(Path(name))
+            find_format(Path(name))
 
 
 def test_what_opentoonz_shows_in_every_frame(sheet: CueSheet) -> None:
@@ -226,7 +226,7 @@ def puppet() -> CueSheet:
 
 def test_every_cue_is_a_key_of_an_attachment_that_there_is(puppet: CueSheet, tmp_path: Path) -> None:
     path = tmp_path / "a.spine.json"
-    write_cue_file(path, puppet, "talk.wav", format_of(path))
+    write_cue_file(path, puppet, "talk.wav", find_format(path))
     document = json.loads(path.read_text(encoding="ascii"))
     keys = document["animations"]["speech"]["slots"]["mouth"]["attachment"]
     expected = [(cue.start_s, cue.label) for cue in puppet.cues] + [(puppet.duration_s, "X")]

@@ -9,7 +9,7 @@ import pytest
 from formats.examples import of_motion, written
 from lipmotion import read_motion
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.tables import CURVES, is_live_link_file, timecode
+from lipmotion.formats.tables import CURVES, format_timecode, is_live_link_file
 from lipmotion.meshes.fitting.blendshape_motion import arkit_weights, with_mouth
 from lipmotion.meshes.model.shape_names import ARKIT_52, ARKIT_MOUTH, ARKIT_OTHERS
 from lipmotion.types import WEIGHT, Channel, Generation, Motion
@@ -109,7 +109,7 @@ def test_unreal_reads_the_same_times_and_values(tmp_path: Path, rate_hz: float) 
 def test_times_carry_over() -> None:
     codes = {0.999999999: "00:00:01:00.000", 1 / 60: "00:00:00:01.000", 59.99: "00:00:59:59.400"}
     codes |= {3600 + 59.5: "01:00:59:30.000", 2 * 3600 + 5 * 60: "02:05:00:00.000"}
-    assert {time_s: timecode(time_s) for time_s in codes} == codes
+    assert {time_s: format_timecode(time_s) for time_s in codes} == codes
 
 
 RATE_HZ = 60.0

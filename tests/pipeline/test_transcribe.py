@@ -50,7 +50,7 @@ def test_a_transcript_of_something_else_is_doubted(toy_model, audio, caplog, net
     if network and find_installed_recogniser() is None:
         pytest.skip("no phone recogniser is installed")
     phones = recogniser_of(toy_model, "auto" if network else "general")
-    recognised = lambda: phones.recognition(audio).units  # noqa: E731
+    recognised = lambda: phones.recognise(audio).units  # noqa: E731
     units, _ = transcribe.transcribe(phones, audio, WRONG, Lexicon(), recognised)
     assert (units is None) == network  # what is said is to be recognised
     (record,) = caplog.records
@@ -78,7 +78,7 @@ def corrected(audio: Any, words: tuple[str, ...]) -> transcribe.Transcription:
     phones = recogniser_of(load_model(), "auto")
 
     def recognised() -> Timeline[Unit]:
-        return select_reliable(phones.recognition(audio).units, 0.7)
+        return select_reliable(phones.recognise(audio).units, 0.7)
 
     return transcribe.transcribe(phones, audio, words, Lexicon(), recognised)
 
@@ -108,7 +108,7 @@ def test_speech_that_the_transcript_leaves_out_is_reported_with_its_times(welcom
 def test_words_here_and_there_are_no_worse_than_none(welcome, kept):
     """Words beside those that are left out are not stretched over them, however short they are."""
     (audio, words), phones = welcome, recogniser_of(load_model(), "auto")
-    right, none = phones.align(audio, words, Lexicon()), phones.recognition(audio).units
+    right, none = phones.align(audio, words, Lexicon()), phones.recognise(audio).units
     some = corrected(audio, words[kept]).units
     assert some is not None
     wanted, with_some, with_none = (

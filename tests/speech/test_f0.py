@@ -15,7 +15,7 @@ from scipy.signal import butter, lfilter
 from lipmotion import Model
 from lipmotion.speech.features import f0
 from lipmotion.speech.sound.acoustic_conditions import mix_noise
-from lipmotion.speech.sound.speaker_similarity import WARPS, embed_speaker, rate_knowledge, speaker_similarity
+from lipmotion.speech.sound.speaker_similarity import WARPS, embed_speaker, measure_similarity, rate_knowledge
 from lipmotion.types import Audio
 from pipeline.made import read_sound
 from speech.mfcc_oracle import sample
@@ -59,20 +59,20 @@ def at_frames(hertz: Array) -> Array:
 
 def test_correlations_are_their_slow_twin() -> None:
     samples = voice(np.linspace(90, 200, 1700)) + noise(1700) / 20
-    assert f0.lags()[1::2].tolist() == list(range(10, 68))
+    assert f0.list_lags()[1::2].tolist() == list(range(10, 68))
     for n in (0, 5, 10):
-        fast = f0.correlations(samples, slice(0, 11), 1e-5)[n]  # type: ignore[arg-type]
+        fast = f0.correlate_frames(samples, slice(0, 11), 1e-5)[n]  # type: ignore[arg-type]
         x = frame(samples.astype(float), n)
         silence = 1e-5 + frication(samples.astype(float), n)
-        slow = [correlation(x, int(lag), silence) for lag in f0.lags()[1::2]]
+        slow = [correlation(x, int(lag), silence) for lag in f0.list_lags()[1::2]]
         assert fast[1::2] == pytest.approx(slow, abs=1e-4)
 
 
 def test_the_best_peaks_are_the_candidates() -> None:
-    correlation = np.zeros((2, len(f0.lags())), np.float32)
+    correlation = np.zeros((2, len(f0.list_lags())), np.float32)
     correlation[0, 39:42] = 0.5, 0.9, 0.7
-    pitch, cost = f0.candidates(correlation)
-    lag = f0.lags()[40] + 0.5 / 6  # the top of the parabola, a sixth of a step later
+    pitch, cost = f0.find_candidates(correlation)
+    lag = f0.list_lags()[40] + 0.5 / 6  # the top of the parabola, a sixth of a step later
     assert np.exp(pitch[0, 0]) == pytest.approx(4000 / lag)
     assert cost[0, 0] == pytest.approx(1 - (0.9 + 1 / 120) * (1 - 0.2 * lag / (4000 / 60)))
     assert np.isinf(cost[1:, 0]).all()
@@ -202,18 +202,18 @@ def frication(samples: Array, n: int) -> float:
 def test_a_warped_voice_is_warped_back(toy_model: Model) -> None:
     """Its spectra are those of the known voice, stretched."""
     audio = toy_sentences(3)[0].audio
-    before = speaker_similarity(toy_model.phones, read_sound(audio)).score
+    before = measure_similarity(toy_model.phones, read_sound(audio)).score
     for factor, expected in ((1.12, 0.88), (0.89, 1.12)):
         positions = np.arange(0, len(audio.samples) - 1, factor)
         other = Audio(np.interp(positions, np.arange(len(audio.samples)), audio.samples).astype(np.float32), 16_000)
-        similarity = speaker_similarity(toy_model.phones, read_sound(other))
+        similarity = measure_similarity(toy_model.phones, read_sound(other))
         assert abs(similarity.warp - expected) < 0.07
         assert similarity.score < before
 
 
 def test_the_warp_chosen_is_the_most_similar(toy_model: Model) -> None:
     audio, phones = read_sound(toy_sentences(3)[1].audio), toy_model.phones
-    similarity = speaker_similarity(phones, audio)
+    similarity = measure_similarity(phones, audio)
     (passage,) = audio.passages
     fits = {warp: phones.fit(passage.audio.mfcc(warp).values) for warp in WARPS}
     assert similarity.warp == max(fits, key=lambda warp: fits[warp])
@@ -222,7 +222,7 @@ def test_the_warp_chosen_is_the_most_similar(toy_model: Model) -> None:
 
 def test_voices_are_known_by_their_similarity(toy_model: Model) -> None:
     audio, phones = read_sound(toy_sentences(3)[1].audio), replace(toy_model.phones, speaker=None)
-    score = speaker_similarity(phones, audio).score
+    score = measure_similarity(phones, audio).score
     levels = [phones.typical_fit + score - other for other in (-20, -9, -6, -3, 2)]
     shifted = [rate_knowledge(replace(phones, typical_fit=level), audio) for level in levels]
     assert shifted == pytest.approx([0, 0, 0.5, 1, 1])
@@ -232,14 +232,14 @@ def test_a_recording_is_judged_by_its_longest_passage(toy_model: Model) -> None:
     """Silence, and a short line by another voice, change nothing."""
     line, other = (each.audio.samples[: len(each.audio.samples) // 160 * 160] for each in toy_sentences(3)[:2])
     silence = np.zeros(5 * 16_000, np.float32)
-    alone = speaker_similarity(toy_model.phones, read_sound(Audio(np.pad(line, 8000), 16_000)))
+    alone = measure_similarity(toy_model.phones, read_sound(Audio(np.pad(line, 8000), 16_000)))
     short = np.interp(np.arange(160 * 200) * 1.3, np.arange(len(other)), other)
     for parts in ((silence, line, silence), (short, silence, line, silence), (silence, line, silence, short)):
         audio = read_sound(Audio(np.concatenate(parts).astype(np.float32), 16_000))
-        found = speaker_similarity(toy_model.phones, audio)
+        found = measure_similarity(toy_model.phones, audio)
         assert found.warp == alone.warp
         assert found.score == pytest.approx(alone.score, abs=1e-3)
-    of_short = speaker_similarity(toy_model.phones, read_sound(Audio(short.astype(np.float32), 16_000)))
+    of_short = measure_similarity(toy_model.phones, read_sound(Audio(short.astype(np.float32), 16_000)))
     assert of_short.score != alone.score
 
 

@@ -50,7 +50,7 @@ def align(hmm: Any, audio: Audio, words: Sequence[str], lexicon: Lexicon, kind: 
 
 def recognise(hmm: Any, audio: Audio, kind: str = "own") -> Timeline[Unit]:
     sound = read_sound(audio)
-    return recogniser.Recogniser(hmm, kind).recognition(sound).units
+    return recogniser.Recogniser(hmm, kind).recognise(sound).units
 
 
 def phones(units: Timeline[Unit]) -> list[str]:
@@ -330,7 +330,7 @@ def test_the_speaker_of_the_training_has_full_weight_and_changes_little(
         features = features_of(audio)
         changed = one.own_features(read_sound(audio)) - features.values
         assert np.sqrt(np.square(changed).mean()) < 0.5
-        first, then = ([s.label.phone for s in each.recognition(audio).units] for each in (before, after))
+        first, then = ([s.label.phone for s in each.recognise(audio).units] for each in (before, after))
         assert count_phone_edits(first, then) <= 2
     long = estimate_adaptation(toy_model.phones, voice * 3)  # features and their deltas move together
     assert long.speech_s == pytest.approx(3 * same_speaker.speech_s, rel=0.1)

@@ -9,7 +9,7 @@ from lipmotion import load_model
 from lipmotion.speech.features.mfcc import general_features
 from lipmotion.speech.recognition import agreement, general
 from lipmotion.speech.recognition import transcript_evidence as module
-from lipmotion.speech.recognition.transcript_evidence import _best_path
+from lipmotion.speech.recognition.transcript_evidence import _find_best_path
 from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon
 from lipmotion_faces.corpus.folder import spell_name
@@ -164,7 +164,7 @@ def test_the_best_path_is_the_best_of_all(seed: int) -> None:
     logits = draw.normal(0, 12, (5, len(PHONES) + 1))
     log_posteriors = logits - np.logaddexp.reduce(logits, axis=1)[:, None]
     _, said = best_by_trying(log_posteriors, words)
-    frames_of_words, _ = _best_path(log_posteriors, [np.array(word) for word in words])
+    frames_of_words, _ = _find_best_path(log_posteriors, [np.array(word) for word in words])
     assert [frames is not None for frames in frames_of_words] == said
 
 

@@ -25,7 +25,7 @@ SAID = "please speak and my lips will move five big blue boats float by".split()
 def without_a_phone_recogniser(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Words are searched by pocketsphinx, and read by rules, where ``hama`` is not installed."""
     monkeypatch.setitem(sys.modules, "hama", None)
-    cached = [find_installed_recogniser, lexicon._network, lexicon.pronounce_by_network, word_search._decoder]
+    cached = [find_installed_recogniser, lexicon._network, lexicon.pronounce_by_network, word_search._load_decoder]
     cached.append(beam_search.load_english)  # as large as the decoder, of the same words
     for each in cached:
         each.cache_clear()
@@ -40,7 +40,7 @@ def welcome(without_a_phone_recogniser: None) -> Audio:  # noqa: ARG001
 
 
 def recognition(audio: Audio, kind: str = "auto") -> recognised_speech.Recognition:
-    return recogniser_of(load_model(), kind).recognition(audio)
+    return recogniser_of(load_model(), kind).recognise(audio)
 
 
 def texts(found: recognised_speech.Recognition) -> list[str]:
@@ -144,12 +144,12 @@ def test_one_recording_does_not_change_the_next() -> None:
 
 def test_without_its_language_model_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pocketsphinx", None)
-    word_search._decoder.cache_clear()
+    word_search._load_decoder.cache_clear()
     try:
         with pytest.raises(errors.MissingDependencyError, match="pip install pocketsphinx"):
             word_search.spot_words(b"")
     finally:
-        word_search._decoder.cache_clear()
+        word_search._load_decoder.cache_clear()
 
 
 TOKENS = ("b", "p", "iː", "uː", "l", "ŋ", "t", "͡", "ʃ", posteriors.WORD_BOUNDARY, posteriors.BLANK)
@@ -277,9 +277,9 @@ needs_hama = pytest.mark.skipif(find_installed_recogniser() is None, reason="ham
 @needs_hama
 def test_unsure_posteriors_leave_phones_to_the_models(request: pytest.FixtureRequest) -> None:
     noisy = read_sound(mix_noise(read_welcome(), "white", -5))
-    found = recogniser_of(load_model(), "auto").recognition(noisy)
+    found = recogniser_of(load_model(), "auto").recognise(noisy)
     request.getfixturevalue("without_a_phone_recogniser")
-    alone = recogniser_of(load_model(), "auto").recognition(noisy)
+    alone = recogniser_of(load_model(), "auto").recognise(noisy)
     assert found.units == alone.units
     assert found.posterior is None
 
@@ -287,7 +287,7 @@ def test_unsure_posteriors_leave_phones_to_the_models(request: pytest.FixtureReq
 @needs_hama
 def test_the_welcome_is_understood() -> None:
     audio = read_welcome()
-    found = recogniser_of(load_model(), "auto").recognition(audio)
+    found = recogniser_of(load_model(), "auto").recognise(audio)
     assert [span.label.text for span in found.words][:7] == "please speak and my lips will move".split()
     assert (found.confidence or 0) > 0.6
     assert (found.posterior or 0) > 0.8

@@ -214,9 +214,9 @@ def write_c3d(path: Path, content: C3dFile) -> None:
         groups["POINT"]["LONG_FRAMES"] = float(frames)
         start, end = (np.array([number % OVERFLOW, number // OVERFLOW]) for number in (1, frames))
         groups["TRIAL"] = {"ACTUAL_START_FIELD": start, "ACTUAL_END_FIELD": end}
-    blocks = -(-(4 + len(_section(groups))) // BLOCK)
+    blocks = -(-(4 + len(_pack(groups))) // BLOCK)
     groups["POINT"]["DATA_START"] = 2 + blocks
-    section = bytes([1, MARK, blocks, INTEL_PROCESSOR]) + _section(groups)
+    section = bytes([1, MARK, blocks, INTEL_PROCESSOR]) + _pack(groups)
     header = struct.pack("<BB5HfHHf", 2, MARK, points, curves, 1, numbered, 10, -1.0, 2 + blocks, 1, content.rate_hz)
     seen = np.isfinite(content.points).all(axis=2)
     data = np.zeros((frames, points * 4 + curves), "<f4")
@@ -229,7 +229,7 @@ def write_c3d(path: Path, content: C3dFile) -> None:
         file.write(b"\0" * (-data.nbytes % BLOCK))
 
 
-def _section(groups: dict[str, dict[str, int | float | Values]]) -> bytes:
+def _pack(groups: dict[str, dict[str, int | float | Values]]) -> bytes:
     parts = []
     for number, (group, parameters) in enumerate(groups.items(), 1):
         parts.append(struct.pack("<bb", len(group), -number) + group.encode() + struct.pack("<hB", 3, 0))
@@ -256,14 +256,14 @@ def check(motion: Motion) -> None:
         if not plain or len(text) > LONGEST_LABEL_CHARACTERS:
             what = f"the name or unit {text[:60]!r} of a channel does not fit into .c3d,"
             raise ExportError(f"{what} required up to 64 ASCII characters, without blanks at its ends")
-    points = len(_points(motion))
+    points = len(_list_points(motion))
     if max(len(motion.names) - 3 * points, points + len(EYES)) > MAX_CURVES:
         raise ExportError(f"more than {MAX_CURVES} points, or other channels, which .c3d cannot name; write .npz")
 
 
 def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write all channels of the motion; points are those with x, y and z."""
-    motion, points = generation.motion, _points(generation.motion)
+    motion, points = generation.motion, _list_points(generation.motion)
     frames = len(motion.values)
     places = [np.stack([motion[f"{axis}_{point}"] for axis in "xyz"], axis=1) for point in points]
     places += [np.broadcast_to([x, 0.0, 0.0], (frames, 3)) for _, x in EYES]
@@ -328,7 +328,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     return measure_markers(to_head_frame(markers, content.unit), content.rate_hz), Timeline(())
 
 
-def _points(motion: Motion) -> list[int]:
+def _list_points(motion: Motion) -> list[int]:
     """Return the numbers of the points that have all three channels, in order."""
     numbers = [int(match[1]) for name in motion.names if (match := _POINT.match(name)) and name.startswith("x")]
     known = set(motion.channels)
@@ -384,7 +384,7 @@ def to_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
         raise InputError(f"its unit of length is {unit[:20]!r}, required mm, cm, m or inch")
     if max(float(np.abs(places).max()) for places in markers.values()) > LARGEST_COORDINATE:
         raise InputError(f"a marker is further than {LARGEST_COORDINATE:g} {unit} away; export the capture again")
-    left, right = (next((name for name in markers if _plain(name) in names), "") for names in (LEFT_EYE, RIGHT_EYE))
+    left, right = (next((name for name in markers if _clean(name) in names), "") for names in (LEFT_EYE, RIGHT_EYE))
     if not (left and right):
         size = float(np.ptp([places.mean(axis=0) for places in markers.values()], axis=0).max()) * millimetres
         if len(markers) > 1 and size < SMALLEST_FACE * MILLIMETRES:
@@ -394,7 +394,7 @@ def to_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
         return {name: places * millimetres / MILLIMETRES for name, places in markers.items()}
     rigid = [left, right]
     for name in markers:
-        plain = _plain(name)
+        plain = _clean(name)
         beginnings = (plain.removeprefix("left").removeprefix("right"), plain[1:])
         if name not in rigid and any(each.startswith(RIGID) for each in beginnings):
             rigid.append(name)
@@ -419,7 +419,7 @@ def to_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
     return {name: turned[:, len(rigid) + column] for column, name in enumerate(moving)}
 
 
-def _plain(name: str) -> str:
+def _clean(name: str) -> str:
     return "".join(letter for letter in name.lower() if letter.isalnum())
 
 

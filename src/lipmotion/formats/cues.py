@@ -192,7 +192,7 @@ def format_project(sheet: CueSheet, sound_file: str) -> str:
     runs = find_runs(np.array([shape != REST for shape in names], bool)).tolist()
     phrases = [_list_words(sheet, first, stop - 1) for first, stop in runs]
     texts = [" ".join(word for *_, word in phrase) for phrase in phrases]
-    lines = [MARK, _one_line(" ".join(sound_file.split())) or "sound.wav", f"{sheet.fps:.0f}", f"{len(names)}"]
+    lines = [MARK, _escape_line(" ".join(sound_file.split())) or "sound.wav", f"{sheet.fps:.0f}", f"{len(names)}"]
     lines += ["1", "\tVoice 1", f"\t{'|'.join(texts)}", f"\t{len(phrases)}"]
     for phrase, words in zip(phrases, texts, strict=True):
         lines += [f"\t\t{words}", f"\t\t{phrase[0][0]}", f"\t\t{phrase[-1][1]}", f"\t\t{len(phrase)}"]
@@ -211,7 +211,7 @@ def _list_words(sheet: CueSheet, first: int, last: int) -> list[Part]:
     for span in takewhile(lambda span: int(span.start_s * sheet.fps) <= last, islice(spans, begin, None)):
         start = int(span.start_s * sheet.fps)
         start = first if not parts else max(start, first)
-        word = _one_line("".join(span.label.split())) or UNKNOWN
+        word = _escape_line("".join(span.label.split())) or UNKNOWN
         if parts and start <= parts[-1][0]:
             parts[-1] = (parts[-1][0], last, f"{parts[-1][2]}-{word}")
             continue
@@ -221,7 +221,7 @@ def _list_words(sheet: CueSheet, first: int, last: int) -> list[Part]:
     return parts or [(first, last, UNKNOWN)]
 
 
-def _one_line(text: str) -> str:
+def _escape_line(text: str) -> str:
     """Return a text without what ends a line here: ``|``, or control characters, which are shown as escapes."""
     text = text.replace("|", "/")
     return text if is_line(text) else printable(text)
@@ -320,7 +320,7 @@ WIDENING = 0.12  # by how much the mouth is wider than at rest where the spread 
 LARGEST_BYTES = 1 << 24
 
 
-def format_of(path: Path) -> str:
+def find_format(path: Path) -> str:
     """Return the format of a file's suffix. Raises ExportError: no format has this suffix."""
     ends = [name for name in CUE_FORMATS if path.name.lower().endswith(f".{name}")]
     if not ends:

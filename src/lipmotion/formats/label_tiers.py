@@ -366,7 +366,7 @@ def split_ipa(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
     """Return phones in IPA as phones of the inventory, in the same time.
 
     Symbols that are one sound together are one phone, as ``a`` and ``ɪ``; a symbol of several sounds is divided into
-    equal times; marks, as those of stress and length, are part of the phone before. Source: ``units.read_ipa``.
+    equal times; marks, as those of stress and length, are part of the phone before. Source: ``units.ipa_phones``.
     Raises InputError: a symbol that is none of IPA, with its place.
     """
     unspoken = [label.text in PAUSES or classify_label(label.text) is not SpokenAs.SPEECH for label in labels]

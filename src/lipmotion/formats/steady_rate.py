@@ -145,7 +145,7 @@ def resample_rows(
     Raises InputError: a row goes far back, too many are left out, no rows, or most of the time has none.
     """
     ordered = _find_ordered(time_s)
-    time_s, values = _from_beginning(time_s[ordered], values[ordered])
+    time_s, values = _extend_to_start(time_s[ordered], values[ordered])
     measured: NDArray[np.bool_] = np.asarray(np.isfinite(values).any(axis=0))
     if not measured.any():
         raise InputError("0 rows with values, required two or more")
@@ -154,7 +154,7 @@ def resample_rows(
         LOG.warning("columns without any number are left out: %s", shorten(empty))
     names = [name for name, there in zip(names, measured, strict=True) if there]
     values = values[:, measured]
-    channels = [_channel(name, unit) for name in names]
+    channels = [_choose_channel(name, unit) for name in names]
     foreign = [column for column, channel in enumerate(channels) if channel.unit == EYE_DISTANCE]
     if foreign:
         what = f"{len(foreign)} columns have no name of a blendshape and count as eye distances, up to"
@@ -182,7 +182,7 @@ def resample_rows(
     return Motion(rows[:, :-1], rate_hz, tuple(channels)), rows[:, -1] > 0.5
 
 
-def _from_beginning(time_s: Array, values: Array) -> tuple[Array, Array]:
+def _extend_to_start(time_s: Array, values: Array) -> tuple[Array, Array]:
     """Return times and rows with empty rows before those that begin late, as where pictures have no face."""
     steps = np.diff(time_s)
     step_s = float(steps[steps < 1.5 * np.median(steps)].mean()) if len(steps) else np.inf
@@ -195,7 +195,7 @@ def _name_spans(spans: Sequence[tuple[float, float]]) -> str:
     return shorten_list([f"{start_s:.2f}–{end_s:.2f} s" for start_s, end_s in spans], 4)
 
 
-def _channel(name: str, unit: str) -> Channel:
+def _choose_channel(name: str, unit: str) -> Channel:
     if angle := re.fullmatch(rf"(.*?)(eye)?({'|'.join(ANGLES)})", name, re.IGNORECASE):
         part, eye = angle[1][:1].lower() + angle[1][1:], (angle[2] or "").title()
         return Channel(f"{part}{eye}{angle[3].title()}", RADIAN)

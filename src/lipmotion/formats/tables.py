@@ -102,7 +102,7 @@ def read_table_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
     return Motion(values[:, 1:], steady_rate.exact_rate(round(float(1 / step_s), 6)), channels), Timeline(())
 
 
-def timecode(time_s: float) -> str:
+def format_timecode(time_s: float) -> str:
     """Return a time as the app writes it, ``HH:MM:SS:FF.mmm``, with ``FF.mmm`` in 60ths of a second."""
     seconds, part = divmod(round(time_s * TICKS_HZ * 1000), TICKS_HZ * 1000)
     frames, part = divmod(part, 1000)
@@ -119,7 +119,7 @@ def write_take(path: Path, generation: Generation, _source: Mapping[str, str], _
     with path.open("w", encoding="ascii", newline="\n") as file:
         file.write(",".join([*BEFORE_CURVES, *CURVES]) + "\n")
         for time_s, row in zip(motion.time_s.tolist(), table + 0.0, strict=True):
-            file.write(f"{timecode(time_s)},{len(CURVES)},{form % tuple(row.tolist())}\n")
+            file.write(f"{format_timecode(time_s)},{len(CURVES)},{form % tuple(row.tolist())}\n")
 
 
 def is_live_link_file(path: Path) -> bool:

@@ -56,8 +56,8 @@ def parse_line_tiers(text: str, where: str) -> list[LabelTier] | None:
     text = re.sub(r"\A\t(?=\S)", "#\t", re.sub(r"\A\ufeff?sep=.[ \t\r]*\n", "\n", text))  # Excel's, pandas'
     text = MARKS["MARKERS"].sub(r"\1text", text)
     if esps := MARKS["ESPS"].match(text):
-        return _read_points(_lines("\n" * esps[0].count("\n") + text[esps.end() :]), where, ends=True)
-    lines = _lines(text)
+        return _read_points(_list_lines("\n" * esps[0].count("\n") + text[esps.end() :]), where, ends=True)
+    lines = _list_lines(text)
     first = lines[0][1] if lines else ""
     if MARKS["RTTM"].match(first):
         raise InputError(f"{where}: is RTTM, which says who speaks and no words; give a transcript or labels")
@@ -72,7 +72,7 @@ def parse_line_tiers(text: str, where: str) -> list[LabelTier] | None:
     return next((each for each in tiers if each is not None), None)
 
 
-def _lines(text: str) -> Lines:
+def _list_lines(text: str) -> Lines:
     """Return number and text of every line, except blank ones and Audacity's pitch ranges."""
     stripped = ((number, line.strip()) for number, line in enumerate(StringIO(text), 1))
     return [(number, line) for number, line in stripped if line and not line.startswith("\\")]
@@ -167,7 +167,7 @@ def _read_lrs(text: str, where: str) -> list[LabelTier]:
         return [LabelTier("Text", (TimedLabel(math.nan, math.nan, words, "line 1"),), LINES)]
     rows = re.split(r"\n\s*\n", text[heading.start() :], maxsplit=1)[0]
     padded = "\n" * text.count("\n", 0, heading.start()) + re.sub(r"[ \t]+", "\t", rows)
-    return _read_table(_lines(padded), _find_columns("WORD\tSTART\tEND"), where)
+    return _read_table(_list_lines(padded), _find_columns("WORD\tSTART\tEND"), where)
 
 
 def _find_columns(line: str) -> dict[str, int]:
@@ -181,7 +181,7 @@ def _find_columns(line: str) -> dict[str, int]:
 
 
 def _read_table(lines: Lines, columns: dict[str, int], where: str, known_header: str = "") -> list[LabelTier]:
-    """Return the tiers of a table, of the Montreal Forced Aligner or any; ``given``: its header."""
+    """Return the tiers of a table, of the Montreal Forced Aligner or any; ``known_header``: that of one without a header."""
     header = known_header or lines[0][1]
     delimiter = max(",;\t", key=header.count)
     kinds: dict[tuple[str, str], list[TimedLabel]] = defaultdict(list)

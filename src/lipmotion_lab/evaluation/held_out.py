@@ -133,7 +133,7 @@ def load_held_out(  # noqa: PLR0913
         tracks = [utterance.track for utterance in training or utterances]
         threshold = find_threshold([np.asarray(each.motion[OPENING], float)[np.asarray(each.seen)] for each in tracks])
     recognised = with_progress(utterances, "phones: recognition", sub_monitor(monitor, 0.4, 0.9))
-    recognitions = [phones.recognition(analysed(each.audio, each.features)) for each in recognised]
+    recognitions = [phones.recognise(analysed(each.audio, each.features)) for each in recognised]
     conditions = {AUDIO_ONLY: [each.units for each in recognitions]}
     if all(utterance.words or utterance.phones for utterance in utterances):
         conditions[WITH_TRANSCRIPT] = reference

@@ -137,7 +137,7 @@ def recognise_words(
     from lipmotion.pipeline.workers import map_in_processes
 
     each: ParallelMap = map if workers == 1 else map_in_processes(workers)
-    return recogniser.recognition(audio, report_seconds(each, audio.duration_s, monitor))
+    return recogniser.recognise(audio, report_seconds(each, audio.duration_s, monitor))
 
 
 def report_seconds(each: ParallelMap, duration_s: float, monitor: Monitor) -> ParallelMap:

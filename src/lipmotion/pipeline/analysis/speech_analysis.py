@@ -227,7 +227,7 @@ def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: Par
     results: list[Recognition] = []
 
     def recognise() -> Recognition:
-        results.append(phones.recognition(audio, each, english=request.language == ENGLISH))
+        results.append(phones.recognise(audio, each, english=request.language == ENGLISH))
         return results[-1]
 
     @cache

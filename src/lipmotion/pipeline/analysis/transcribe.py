@@ -276,7 +276,7 @@ def align_or_recognise(
 ) -> Timeline[Unit]:
     """Return the phones in time of a recording as ``transcribe`` does, without warnings."""
     if words is None:
-        return phones.recognition(audio).units
+        return phones.recognise(audio).units
     anchors = None
     if isinstance(words, TimedTranscript):
         anchors, words = find_anchors(words) if words.has_times else None, words.words

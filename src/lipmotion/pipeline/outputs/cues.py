@@ -12,7 +12,7 @@ import numpy as np
 from lipmotion.articulation.cue_sheets import CUES_FPS, CueSheet, choose_cues
 from lipmotion.articulation.delivery import Delivery, shift_in_time
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.cues import CUE_FORMATS, format_of, write_cue_file
+from lipmotion.formats.cues import CUE_FORMATS, find_format, write_cue_file
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.pipeline.outputs.curve_sets import show_edited_curves
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
@@ -87,7 +87,7 @@ def write_cues(
     paths = [Path(output) for output in ([outputs] if isinstance(outputs, str | Path) else outputs)]
     check_cue_outputs(paths, speech, form)
     for path in paths:
-        write_cue_file(path, sheet, as_text(speech), form or format_of(path))
+        write_cue_file(path, sheet, as_text(speech), form or find_format(path))
 
 
 def check_cue_options(fps: float, hold_frames: int | None, shapes: str) -> None:
@@ -107,7 +107,7 @@ def check_cue_outputs(outputs: Sequence[Path], speech: str | Path, form: str | N
     check_distinct(outputs)
     for path in outputs:
         if form is None:
-            format_of(path)
+            find_format(path)
         check_target(path, speech or None)
 
 
@@ -125,4 +125,4 @@ class CueOutput(Output):
         fps, recording = self.settings.outputs.fps or CUES_FPS, self.settings.recording
         sheet = cues(performance.generation, fps=fps, delivery=self.settings.delivery)
         speech = "" if recording is None else as_text(recording)
-        return partial(write_cue_file, self.path, sheet, speech, format_of(self.path))
+        return partial(write_cue_file, self.path, sheet, speech, find_format(self.path))

@@ -71,7 +71,7 @@ def synthesise_sentences(
     voices  : None: all that are installed
     Every sentence gets 0.25 s of silence before and after it, and white noise 50 dB under the speech. The same
     arguments give the same samples.
-    Raises MissingDependencyError: no synthesiser is installed. Raises InputError: as ``speech.voices.speak_sentences``.
+    Raises MissingDependencyError: no synthesiser is installed. Raises InputError: as ``speak_sentences``.
     """
     chosen = list_installed() if voices is None else tuple(voices)
     if not chosen:

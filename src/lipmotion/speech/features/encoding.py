@@ -82,7 +82,7 @@ def log_mel_spectrum(samples: Array) -> Array:
     """Return the log mel spectrum that the network takes, of every whole window of samples [shape=(T, 80)]."""
     window = np.hanning(WINDOW + 1)[:-1].astype(np.float32)
     spectrum = np.fft.rfft(sliding_window_view(samples * np.float32(LEVEL), WINDOW)[::HOP] * window)
-    powers = (np.square(spectrum.real) + np.square(spectrum.imag)).astype(np.float32) @ _filters()
+    powers = (np.square(spectrum.real) + np.square(spectrum.imag)).astype(np.float32) @ _make_filters()
     result: Array = (np.log10(np.maximum(powers, np.float32(10**FLOOR))) + 4) / 4
     return result
 
@@ -97,7 +97,7 @@ def encode_window(log_mel: Array, encoder: Encoder) -> Array:
         padded = np.pad(x, ((1, 1), (0, 0)))
         columns = [padded[first : first + len(x) : stride] for first in range(3)]
         x = _gelu(np.concatenate(columns, axis=1) @ kernel + bias)
-    x += _positions(x.shape)
+    x += _compute_positions(x.shape)
     for (attend, attend_bias), (merge, merge_bias), (widen, widen_bias), (narrow, narrow_bias) in encoder.layers:
         queries, keys, values = np.split(_standardise(x) @ attend + attend_bias, 3, axis=1)
         q, k, v = (part.reshape(len(x), HEADS, -1).swapaxes(0, 1) for part in (queries, keys, values))
@@ -131,7 +131,7 @@ def _standardise(x: Array) -> Array:
 
 
 @cache
-def _positions(shape: tuple[int, int]) -> Array:
+def _compute_positions(shape: tuple[int, int]) -> Array:
     """Return what tells the network where in its window a row is: Vaswani et al. 2017, §3.5."""
     angles = np.arange(shape[0])[:, None] * np.exp(-np.log(10_000) / (shape[1] // 2 - 1) * np.arange(shape[1] // 2))
     return np.concatenate([np.sin(angles), np.cos(angles)], axis=1).astype(np.float32)
@@ -182,7 +182,7 @@ def find_encoder(arrays: Mapping[str, NDArray[Any]]) -> Encoder:
 
 
 @cache
-def _filters() -> Array:
+def _make_filters() -> Array:
     """Return Whisper's triangular filters, equally spaced in Slaney's mel and of equal area [shape=(201, 80)]."""
     top = 15 + np.log(SPEECH_RATE_HZ / 2 / 1000) * 27 / np.log(6.4)
     mel = np.linspace(0, top, BANDS + 2)

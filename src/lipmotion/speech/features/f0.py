@@ -17,7 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lipmotion.kernels.paths import find_cheapest, trace_back
-from lipmotion.speech.features.mfcc import HOP, check_samples, frame_count, reflect_ends
+from lipmotion.speech.features.mfcc import HOP, check_samples, count_frames, reflect_ends
 from lipmotion.types import SPEECH_RATE_HZ, Audio, Prosody
 
 LOWEST_HZ, HIGHEST_HZ = 60.0, 400.0
@@ -63,13 +63,13 @@ def log_f0(audio: Audio) -> Floats:
         power, square = power + powers.sum(), square + np.square(powers).sum()
     silence = SILENCE_POWER * (square / power if power else 0.0)
     silence += ROUNDING_POWER * float(max(samples.max(), -samples.min())) ** 2
-    frames = frame_count(samples)
+    frames = count_frames(samples)
     pitch = np.empty((CANDIDATES + 1, frames), np.float32)
     pointers = np.empty((frames, CANDIDATES + 1), np.uint8)
     arrival, pitch[-1] = np.zeros(CANDIDATES + 1), np.nan
     for start in range(0, frames, BLOCK):
         block = slice(start, min(start + BLOCK, frames))
-        pitch[:-1, block], cost = candidates(correlations(samples, block, silence))
+        pitch[:-1, block], cost = find_candidates(correlate_frames(samples, block, silence))
         # from every candidate, the last being unvoiced, to those of the next frame; the first frame continues itself
         earlier = np.concatenate([pitch[:-1, max(start - 1, 0), None], pitch[:-1, block][:, :-1]], axis=1)
         steps = np.full((CANDIDATES + 1, CANDIDATES + 1, cost.shape[1]), VOICING_CHANGE_COST)
@@ -81,14 +81,14 @@ def log_f0(audio: Audio) -> Floats:
     return pitch[trace_back(pointers, int(arrival.argmin())), np.arange(frames)]
 
 
-def correlations(samples: Floats, block: slice, silence: float) -> Floats:
-    """Return the normalised autocorrelation around every frame of a block, at the lags of ``lags()`` [shape=(n, L)].
+def correlate_frames(samples: Floats, block: slice, silence: float) -> Floats:
+    """Return the normalised autocorrelation around every frame of a block, at the lags of ``list_lags`` [shape=(n, L)].
 
     silence : power below which correlations become smaller
     With x the low-passed signal, w the window, both around the frame, and s = ``silence`` + the frame's frication:
     Σ w(t) x(t) w(t+k) x(t+k) / (√(Σ w(t) w(t+k) x²(t) · Σ w(t) w(t+k) x²(t+k)) + s · Σ w(t) w(t+k)), at most 1.
     """
-    tables = _tables()
+    tables = _make_tables()
     low = _filter_low(samples, block.start * HOP - _REACH, block.stop - block.start + _WINDOW // _HOP)
     x = sliding_window_view(low, _WINDOW)[: len(low) - _WINDOW : _HOP].copy()
     spectrum = x @ tables.fourier
@@ -106,15 +106,15 @@ def correlations(samples: Floats, block: slice, silence: float) -> Floats:
     return correlation
 
 
-def candidates(correlation: Floats) -> tuple[Floats, Floats]:
+def find_candidates(correlation: Floats) -> tuple[Floats, Floats]:
     """Return the logarithm of F0 at the best peaks of every frame, and their costs [shapes=(CANDIDATES, n)].
 
-    correlation : from ``correlations`` [shape=(n, L)]
+    correlation : from ``correlate_frames`` [shape=(n, L)]
     In a frame with fewer peaks the others have infinite cost.
     """
     middle = correlation[:, 1:-1]
     is_maximum = (middle > correlation[:, :-2]) & (middle >= correlation[:, 2:]) & (middle > 0)
-    weighted = np.where(is_maximum, middle * _weigh_lag(lags()[1:-1]), 0).astype(np.float32)
+    weighted = np.where(is_maximum, middle * _weigh_lag(list_lags()[1:-1]), 0).astype(np.float32)
     rows = np.arange(len(weighted))
     peaks = np.empty((CANDIDATES, len(weighted)), np.intp)
     is_peak = np.empty((CANDIDATES, len(weighted)), bool)
@@ -125,7 +125,7 @@ def candidates(correlation: Floats) -> tuple[Floats, Floats]:
     left, top, right = (correlation[rows, peaks + side] for side in (0, 1, 2))
     bend = np.where(is_peak, 2 * top - left - right, 1)
     offset = np.where(is_peak, (right - left) / (2 * bend), 0)  # of the top of the parabola through the three
-    lag = np.clip(lags()[peaks + 1] + 0.5 * offset, _RATE_HZ / HIGHEST_HZ, _RATE_HZ / LOWEST_HZ)
+    lag = np.clip(list_lags()[peaks + 1] + 0.5 * offset, _RATE_HZ / HIGHEST_HZ, _RATE_HZ / LOWEST_HZ)
     height = (top + (right - left) * offset / 4) * _weigh_lag(lag)
     return np.log(_RATE_HZ / lag).astype(np.float32), np.where(is_peak, 1 - height, np.inf).astype(np.float32)
 
@@ -136,7 +136,7 @@ def _weigh_lag(lag: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _filter_low(samples: Floats, first: int, hops: int) -> Floats:
     """Return ``hops`` · 10 ms at 4 kHz, the first sample centred ``_TAPS // 2`` after sample ``first``."""
-    low_pass = _tables().low_pass
+    low_pass = _make_tables().low_pass
     parts = low_pass.shape[1] // _HOP
     padded = reflect_ends(samples, first, first + (hops + parts - 1) * HOP)
     products = padded.reshape(-1, HOP) @ low_pass  # what every 10 ms add to the same 10 ms and to those before
@@ -146,7 +146,7 @@ def _filter_low(samples: Floats, first: int, hops: int) -> Floats:
     return low.reshape(-1)
 
 
-def lags() -> NDArray[np.float64]:
+def list_lags() -> NDArray[np.float64]:
     """Return the lags in samples at 4 kHz, half samples apart, one more at either end than the range [shape=(L,)]."""
     return np.arange(2 * _RATE_HZ / HIGHEST_HZ - 1, 2 * _RATE_HZ / LOWEST_HZ + 2) // 1 / 2
 
@@ -163,13 +163,13 @@ class _Tables(NamedTuple):
 
 
 @cache
-def _tables() -> _Tables:
-    time, size = np.arange(float(_WINDOW))[:, None], _WINDOW + int(lags()[-1]) + 1
+def _make_tables() -> _Tables:
+    time, size = np.arange(float(_WINDOW))[:, None], _WINDOW + int(list_lags()[-1]) + 1
     bins = np.arange(int(1.5 * _PASSED_HZ[1] / _RATE_HZ * size))
     angle = 2 * np.pi * time * bins / size
-    fourier = np.concatenate([np.cos(angle), np.sin(angle)], axis=1) * _window(time)
-    inverse = np.cos(2 * np.pi / size * bins[:, None] * lags()) * np.where(bins == 0, 1, 2)[:, None] / size
-    early, late = (_window(time) * _window(time + side * lags()) for side in (1, -1))
+    fourier = np.concatenate([np.cos(angle), np.sin(angle)], axis=1) * _make_window(time)
+    inverse = np.cos(2 * np.pi / size * bins[:, None] * list_lags()) * np.where(bins == 0, 1, 2)[:, None] / size
+    early, late = (_make_window(time) * _make_window(time + side * list_lags()) for side in (1, -1))
     at = np.arange(_TAPS) - _TAPS // 2
     low, high = (2 * hertz / SPEECH_RATE_HZ * np.sinc(2 * hertz / SPEECH_RATE_HZ * at) for hertz in _PASSED_HZ)
     taps = (high - low) * np.hamming(_TAPS)
@@ -181,7 +181,7 @@ def _tables() -> _Tables:
     return _Tables(*(array.astype(np.float32) for array in arrays))
 
 
-def _window(time: NDArray[np.float64]) -> NDArray[np.float64]:
+def _make_window(time: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(np.abs(time + 0.5 - _WINDOW / 2) < _WINDOW / 2, np.sin(np.pi * (time + 0.5) / _WINDOW) ** 2, 0)
 
 
@@ -191,7 +191,7 @@ MIN_POWER = 1e-9  # power that is added to every frame's: digital silence is at 
 def find_prosody(audio: Audio) -> Prosody:
     """Return loudness and pitch of a sound at 16 kHz. Raises InputError: as ``speech.features.mfcc`` says."""
     samples = check_samples(audio)
-    frames = frame_count(samples)
+    frames = count_frames(samples)
     hops = samples[: (frames - 1) * HOP].reshape(-1, HOP)
     rest = samples[hops.size :].astype(np.float64)
     energy = np.append(np.einsum("ij,ij->i", hops, hops, dtype=np.float64), rest @ rest)  # from frame to frame

@@ -114,11 +114,11 @@ def log_mel(samples: NDArray[np.float32], filters: NDArray[np.float32]) -> NDArr
 def log_mels(samples: NDArray[np.float32], filter_banks: Sequence[NDArray[np.float32]]) -> list[NDArray[np.float32]]:
     """Return ``log_mel`` of every filter bank [each shape=(T, F)]; the spectra are computed once for all of them."""
     window = np.hamming(WINDOW).astype(np.float32)
-    powers = [np.empty((frame_count(samples), filters.shape[1]), np.float32) for filters in filter_banks]
-    for block in _blocks(frame_count(samples)):
-        padded = _padded(samples, block)
+    powers = [np.empty((count_frames(samples), filters.shape[1]), np.float32) for filters in filter_banks]
+    for block in _iterate_blocks(count_frames(samples)):
+        padded = _pad_block(samples, block)
         emphasised = padded[1:] - np.float32(PRE_EMPHASIS) * padded[:-1]
-        spectrum = np.fft.rfft(_frames(emphasised) * window, FFT_SIZE)
+        spectrum = np.fft.rfft(_cut_frames(emphasised) * window, FFT_SIZE)
         power_spectrum = np.square(spectrum.real) + np.square(spectrum.imag)
         for power, filters in zip(powers, filter_banks, strict=True):
             power[block] = power_spectrum @ filters
@@ -127,13 +127,13 @@ def log_mels(samples: NDArray[np.float32], filter_banks: Sequence[NDArray[np.flo
 
 def log_energy(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the logarithm of the energy around every frame, floored 80 dB under the loudest [shape=(T,)]."""
-    energy = np.empty(frame_count(samples), np.float32)
-    for block in _blocks(len(energy)):
-        energy[block] = np.square(_frames(_padded(samples, block)[1:])).sum(axis=1)
+    energy = np.empty(count_frames(samples), np.float32)
+    for block in _iterate_blocks(len(energy)):
+        energy[block] = np.square(_cut_frames(_pad_block(samples, block)[1:])).sum(axis=1)
     return _log_power(energy)
 
 
-def _padded(samples: NDArray[np.float32], block: slice) -> NDArray[np.float32]:
+def _pad_block(samples: NDArray[np.float32], block: slice) -> NDArray[np.float32]:
     """Return the samples under a block of frames, and the one before; beyond both ends the signal is reflected."""
     half = WINDOW // 2
     return reflect_ends(samples, block.start * HOP - half - 1, (block.stop - 1) * HOP + half)
@@ -147,16 +147,16 @@ def reflect_ends(samples: NDArray[np.float32], first: int, end: int) -> NDArray[
     return samples[last - np.abs(last - np.abs(np.arange(first, end)) % (2 * last))]
 
 
-def frame_count(samples: NDArray[np.float32]) -> int:
+def count_frames(samples: NDArray[np.float32]) -> int:
     """Return the number of frames of a recording: T = floor(duration · 100) + 1."""
     return int(len(samples) / SPEECH_RATE_HZ * FRAME_RATE_HZ + 1e-9) + 1
 
 
-def _blocks(frames: int) -> Iterator[slice]:
+def _iterate_blocks(frames: int) -> Iterator[slice]:
     return (slice(start, min(start + BLOCK, frames)) for start in range(0, frames, BLOCK))
 
 
-def _frames(samples: NDArray[np.float32]) -> NDArray[np.float32]:
+def _cut_frames(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the windows of samples, one every 10 ms [shape=(n, 400)]; a view."""
     return sliding_window_view(samples, WINDOW)[::HOP]
 
@@ -178,10 +178,10 @@ def mel_filters(
     hertz = np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE
     knee, top = KNEE_HZ * min(1.0, 1 / warp), SPEECH_RATE_HZ / 2
     warped = np.where(hertz <= knee, hertz * warp, warp * knee + (top - warp * knee) * (hertz - knee) / (top - knee))
-    return make_triangles(mel(warped), _edges(count, lowest_hz, highest_hz)).astype(np.float32)
+    return make_triangles(mel(warped), _list_edges(count, lowest_hz, highest_hz)).astype(np.float32)
 
 
-def _edges(count: int, lowest_hz: float, highest_hz: float) -> NDArray[np.float64]:
+def _list_edges(count: int, lowest_hz: float, highest_hz: float) -> NDArray[np.float64]:
     """Return where bands begin, are most sensitive, and end, in mel [shape=(count + 2,)]."""
     return np.linspace(mel(np.array(lowest_hz)), mel(np.array(highest_hz)), count + 2)
 
@@ -238,7 +238,7 @@ def log_bands(samples: NDArray[np.float32], warp: float = 1.0) -> NDArray[np.flo
 def find_centres() -> NDArray[np.float64]:
     """Return the frequencies in Hz at which the bands of ``log_bands`` are most sensitive [shape=(40,)]."""
     hertz = np.arange(SPEECH_RATE_HZ / 2 + 1)
-    return np.interp(_edges(*BANDS)[1:-1], mel(hertz), hertz)
+    return np.interp(_list_edges(*BANDS)[1:-1], mel(hertz), hertz)
 
 
 GENERAL_FILTERS, GENERAL_CEPSTRA = 25, 13

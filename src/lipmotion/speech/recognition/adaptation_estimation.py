@@ -65,7 +65,7 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
     adaptation, speech_s = create_adaptation(warp, weigh_own_model(scores[warp])), 0.0
     for _ in range(PASSES):
         recogniser = Recogniser(own, adaptation=adaptation)
-        densities = np.concatenate([recogniser.best_path_densities(audio) for audio in audios])
+        densities = np.concatenate([recogniser.find_path_densities(audio) for audio in audios])
         combined = recogniser.combined
         units = (name.partition(".")[0] for name in combined.hmm.table.names)
         silent = np.array([is_silent(unit) or unit in NOISES for unit in units])
@@ -77,18 +77,18 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
         free = (group[:-1, None] == group) | (np.arange(FEATURES + 1) == FEATURES)
         plain = np.arange(len(own.log_stay), dtype=np.intp)
         prior = create_prior(own.mixtures, plain).times(SHORT_RELEVANCE if short else OWN_RELEVANCE)
-        matrix = _improved(combined.hmm.mixtures, prior, own_features, densities, adaptation.own, free)
+        matrix = _improve(combined.hmm.mixtures, prior, own_features, densities, adaptation.own, free)
         streams, columns = [], combined.columns[densities]
         for number, (stream, transform) in enumerate(zip(STREAMS, adaptation.general, strict=True)):
             mixtures, features = load_general().mixtures(number), general_features[:, stream]
             prior = create_prior(mixtures, np.arange(mixtures.size[0])).times(GENERAL_RELEVANCE)
             everything = np.ones(transform.shape, bool)
-            streams.append(_improved(mixtures, prior, features, columns, transform, everything))
+            streams.append(_improve(mixtures, prior, features, columns, transform, everything))
         adaptation = replace(adaptation, own=matrix, general=np.stack(streams))
     return EstimatedAdaptation(adaptation, speech_s)
 
 
-def _improved(
+def _improve(
     mixtures: Mixtures,
     prior: AffineStatistics,
     features: NDArray[np.float32],

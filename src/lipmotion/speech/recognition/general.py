@@ -99,8 +99,8 @@ def load_general() -> GeneralModel:
     """Return the models; they are read once. Raises MissingDependencyError: not installed, or of another version."""
     folder = find_english_data() / "en-us"
     try:
-        means, variances = (_gaussians((folder / name).read_bytes()) for name in ("means", "variances"))
-        weights = _weights((folder / "sendump").read_bytes())
+        means, variances = (_read_gaussians((folder / name).read_bytes()) for name in ("means", "variances"))
+        weights = _read_weights((folder / "sendump").read_bytes())
     except (OSError, ValueError) as error:
         message = f"pocketsphinx's models are not those of its version 5 ({error}): pip install 'pocketsphinx>=5.0.4'"
         raise MissingDependencyError(message) from error
@@ -114,7 +114,7 @@ def load_general() -> GeneralModel:
     return GeneralModel(tuple(forms), tuple(constants), weights)
 
 
-def _gaussians(content: bytes) -> NDArray[np.float64]:
+def _read_gaussians(content: bytes) -> NDArray[np.float64]:
     """Return means or variances [shape=(phones, 39, 128)] of a file in Sphinx's format."""
     numbers = content[content.index(b"endhdr\n") + len(b"endhdr\n") :]
     expected = np.array([0x11223344, len(PHONES), len(STREAMS), GAUSSIANS, 13, 13, 13], "<i4").tobytes()
@@ -125,7 +125,7 @@ def _gaussians(content: bytes) -> NDArray[np.float64]:
     return by_phone.transpose(0, 1, 3, 2).reshape(len(PHONES), 39, GAUSSIANS)
 
 
-def _weights(content: bytes) -> tuple[NDArray[np.float32], ...]:
+def _read_weights(content: bytes) -> tuple[NDArray[np.float32], ...]:
     """Return the mixture weights of the states without context, which come first [each shape=(phones, 128, 3)]."""
     position = 0
     while length := int.from_bytes(content[position : position + 4], "little"):

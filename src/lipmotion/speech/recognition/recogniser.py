@@ -32,7 +32,7 @@ from lipmotion.speech.recognition.recognised_speech import (
 )
 from lipmotion.speech.recognition.word_search import decode_network, list_phones, list_wordless, match_words, scan_words
 from lipmotion.speech.sound.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.sound.speaker_similarity import OWN_SCORE, STRANGER_SCORE, SpeakerSimilarity, speaker_similarity
+from lipmotion.speech.sound.speaker_similarity import OWN_SCORE, STRANGER_SCORE, SpeakerSimilarity, measure_similarity
 from lipmotion.types import FRAME_RATE_HZ, Audio, ParallelMap, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, find_similar_phone, is_silent
 
@@ -71,7 +71,7 @@ class Recogniser:
         if self.kind not in RECOGNISER_KINDS:
             raise InputError(f"unknown recogniser {self.kind!r}; required one of: {', '.join(RECOGNISER_KINDS)}")
 
-    def recognition(self, audio: Audio, each: ParallelMap = map, *, english: bool = True) -> Recognition:
+    def recognise(self, audio: Audio, each: ParallelMap = map, *, english: bool = True) -> Recognition:
         """Return the most probable phones of a recording in time, with the words that decided them.
 
         audio   : an ``AnalysedAudio`` shares its features with what else is computed of it; where all of them are 0, as
@@ -90,33 +90,33 @@ class Recogniser:
         if not audio.is_passage:
             if uses_network(self.kind):
                 find_stretches(audio, each)  # of all passages at once: several processes work on them
-            recognitions = [self.recognition(passage.audio, each, english=english) for passage in audio.passages]
+            recognitions = [self.recognise(passage.audio, each, english=english) for passage in audio.passages]
             return join_recognition(list(zip(audio.passages, recognitions, strict=True)), audio.duration_s)
         is_judged = self.adaptation is None and self.kind != "general"  # else nothing depends on it
-        similarity = speaker_similarity(self.own, audio) if is_judged else None
+        similarity = measure_similarity(self.own, audio) if is_judged else None
         is_own = similarity is not None and similarity.score > OWN_SCORE
         known = self.kind == "auto" and is_own and self.own.bigram.perplexity < SMALL_PERPLEXITY
         if uses_network(self.kind) and not known:
             stretches = find_stretches(audio, each)
             if mean_posterior(stretches) >= WORD_POSTERIORS[0] or not english:
-                return self._network_recognition(audio, similarity, english=english)
+                return self._recognise_by_network(audio, similarity, english=english)
         spoken = scan_words(audio, each) if self.kind == "auto" and not known else None
-        hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
+        hmm, log_likelihoods = self._evaluate(audio, similarity)
         path = self._loop.network.best_path(log_likelihoods)
-        labels, recognised = self._free_labels(audio, path), list[RecognisedWord]()
+        labels, recognised = self._label_freely(audio, path), list[RecognisedWord]()
         if spoken is not None:
-            aligning = self._log_likelihoods(audio, aligning=True)[1] if self._has_few_gaussians else log_likelihoods
+            aligning = self._evaluate(audio, aligning=True)[1] if self._has_few_gaussians else log_likelihoods
             loud, free = find_loud_frames(audio.log_energy), self._loop.network.emission[path]
             parts, recognised = match_words(hmm, self._loop, log_likelihoods, aligning, free, loud, spoken)
             labels = splice(labels, parts, len(path))
         return build_recognition(labels, recognised, audio, similarity and similarity.score)
 
-    def _network_recognition(
+    def _recognise_by_network(
         self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None, *, english: bool
     ) -> Recognition:
         """Return what a phone recogniser finds in a recording: words, or phones that our models find as well."""
         stretches, loud = find_stretches(audio), find_loud_frames(audio.log_energy)
-        hmm, log_likelihoods = self._log_likelihoods(audio, similarity, aligning=english)
+        hmm, log_likelihoods = self._evaluate(audio, similarity, aligning=english)
         if english:
             parts, recognised = decode_network(hmm, log_likelihoods, loud, stretches)
         else:
@@ -125,7 +125,7 @@ class Recogniser:
         recognition = build_recognition(labels, recognised, audio, similarity and similarity.score)
         return replace(recognition, posterior=mean_posterior(stretches))
 
-    def _free_labels(self, audio: AnalysedAudio, path: NDArray[np.intp]) -> list[LabelledFrames]:
+    def _label_freely(self, audio: AnalysedAudio, path: NDArray[np.intp]) -> list[LabelledFrames]:
         """Return the phones of a recording as they are recognised without words, of their best path."""
         labels = list_phones(self._loop, path)
         if self.kind not in ("auto", "fast") or not self._has_few_gaussians:
@@ -148,10 +148,10 @@ class Recogniser:
         anchors : times of the words, within which they are aligned (``recognition.anchors``); None: anywhere
         The reading and the pronunciation of each word, and the pauses, are those with the most probable path. A phone
         without a model borrows that of the most similar phone with one (``units.SIMILAR_PHONES``).
-        Raises AlignmentError: the transcript does not fit into the recording. MissingDependencyError: ``recognition``.
+        Raises AlignmentError: the transcript does not fit into the recording. MissingDependencyError: ``recognise``.
         """
         audio = analysed(audio)
-        hmm, log_likelihoods = self._log_likelihoods(audio, aligning=True)
+        hmm, log_likelihoods = self._evaluate(audio, aligning=True)
         log_likelihoods = penalise(hmm, log_likelihoods, find_loud_frames(audio.log_energy), silent=True)
         forms_of = {word: lexicon.spoken_forms(word) for word in set(words)}
         modelled = {PAUSE, *(unit for unit in hmm.table.units if not is_silent(unit))}
@@ -159,7 +159,7 @@ class Recogniser:
             word: [tuple(find_similar_phone(phone, modelled) for phone, _ in form) for form in forms]
             for word, forms in forms_of.items()
         }
-        spoken, bounds = _aligned(hmm, log_likelihoods, [units_of[word] for word in words], anchors)
+        spoken, bounds = _align_words(hmm, log_likelihoods, [units_of[word] for word in words], anchors)
         labels: list[tuple[str, str]] = []
         for item in spoken:
             count_before = len(labels)
@@ -169,16 +169,16 @@ class Recogniser:
                     labels.append((phone, word))
         return time_phones(labels, bounds, audio.duration_s)
 
-    def best_path_densities(self, audio: Audio) -> NDArray[np.intp]:
+    def find_path_densities(self, audio: Audio) -> NDArray[np.intp]:
         """Return the density of each frame's state on the most probable path [shape=(T,)].
 
         They are numbered as in ``combined``, with the kind ``own`` as in the own models; of digital silence as silence.
-        Raises MissingDependencyError: as ``recognition``.
+        Raises MissingDependencyError: as ``recognise``.
         """
         audio = analysed(audio)
         if not audio.mfcc().values.any():
             return np.full(audio.frames, self.own.table.density(SILENCE, 0), np.intp)
-        _, log_likelihoods = self._log_likelihoods(audio)
+        _, log_likelihoods = self._evaluate(audio)
         network = self._loop.network
         return network.emission[network.best_path(log_likelihoods)]
 
@@ -209,7 +209,7 @@ class Recogniser:
     def _has_few_gaussians(self) -> bool:
         return self.own.mixtures.size[1] <= FEW_GAUSSIANS
 
-    def _log_likelihoods(
+    def _evaluate(
         self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None = None, aligning: bool = False
     ) -> tuple[UnitHmm, LogLikelihoods]:
         """Return the models that are used, and the log likelihoods of a recording under them."""
@@ -219,7 +219,7 @@ class Recogniser:
         if self.adaptation is not None and not general_alone:
             weight = self.adaptation.own_weight
         elif not general_alone:
-            similarity = similarity or speaker_similarity(self.own, audio)
+            similarity = similarity or measure_similarity(self.own, audio)
             warp, weight = similarity.warp, weigh_own_model(similarity.score)
         if weight <= 0 and not own_alone:  # not evaluated: any features will do; those of an hour are large
             cepstra = audio.mfcc().values
@@ -234,7 +234,7 @@ class Recogniser:
         return hmm, penalise(hmm, log_likelihoods, find_quiet_frames(audio.log_energy), silent=False)
 
 
-def _aligned(
+def _align_words(
     hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: list[list[tuple[str, ...]]], anchors: Anchors | None
 ) -> tuple[list[SpokenWord], NDArray[np.intp]]:
     """Return words as they were pronounced, with silences and pauses, and the bounds of their units in frames."""

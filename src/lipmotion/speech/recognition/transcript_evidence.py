@@ -117,7 +117,7 @@ def find_evidence(
     for first_s, stop_s, spans_of_words in _divide(units, divided=len(log_posteriors) * len(units) > LARGEST_SEARCH):
         at, stop = round(first_s / frame_s), None if stop_s is None else round(stop_s / frame_s)
         columns = [np.array([PHONES.index(span.label.phone) for span in spans]) for spans in spans_of_words]
-        frames_of_words, free = _best_path(log_posteriors[at:stop], columns, costs)
+        frames_of_words, free = _find_best_path(log_posteriors[at:stop], columns, costs)
         for (begin, end), (left, back) in free:
             start_s, end_s = (at + begin) * frame_s, (at + end) * frame_s
             others.append(OtherSpeech(start_s, end_s, len(words) + left, len(words) + back))
@@ -156,7 +156,7 @@ STAYED, BEGAN, SKIPPED = range(3)
 """How it came to say anything there: it did before; it begins; a word more is left out."""
 
 
-def _best_path(log_posteriors: Array, words: Sequence[Columns], costs: tuple[float, float] = WORD_COSTS) -> Path:
+def _find_best_path(log_posteriors: Array, words: Sequence[Columns], costs: tuple[float, float] = WORD_COSTS) -> Path:
     """Return the best path that says words, leaves some of them out, and says anything between them."""
     word_cost, phone_cost = costs
     columns = np.concatenate([np.zeros(0, np.intp), *words])

@@ -58,15 +58,15 @@ def spot_words(samples: bytes) -> tuple[FoundWord, ...]:
     0 where that has another word: it finds fewer words, but knows how many others were possible.
     Raises MissingDependencyError: pocketsphinx is not installed, or without its language model.
     """
-    decoder = _decoder()
+    decoder = _load_decoder()
     with _LOCK:
         decoder.reinit_feat()  # else its estimate of the noise depends on what it decoded before
         decoder.start_utt()
         if samples:
             decoder.process_raw(samples, no_search=False, full_utt=True)
-        best = _segments(decoder)
+        best = _list_segments(decoder)
         decoder.end_utt()
-        lattice = _segments(decoder)
+        lattice = _list_segments(decoder)
     words = []
     for word, start, end, _ in best:
         same = (each[3] for each in lattice if each[0] == word and max(start, each[1]) <= min(end, each[2]))
@@ -74,7 +74,7 @@ def spot_words(samples: bytes) -> tuple[FoundWord, ...]:
     return tuple(words)
 
 
-def _segments(decoder: Any) -> list[tuple[str, int, int, float]]:
+def _list_segments(decoder: Any) -> list[tuple[str, int, int, float]]:
     """Return the words of the decoder's present best path, their first and last frames, and their posteriors."""
     entries = decoder.seg() if decoder.hyp() is not None else ()
     return [
@@ -85,7 +85,7 @@ def _segments(decoder: Any) -> list[tuple[str, int, int, float]]:
 
 
 @cache
-def _decoder() -> Any:
+def _load_decoder() -> Any:
     """Return the decoder of this process; it is loaded once, in 0.2 s."""
     folder = find_english_data()
     try:

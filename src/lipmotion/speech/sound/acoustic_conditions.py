@@ -40,7 +40,7 @@ def mix_noise(audio: Audio, kind: str, snr_db: float, talkers: Sequence[Audio] =
     else:
         noise = make_babble(talkers, len(audio.samples), seed)
     noise_power = float(np.square(noise[spoken], dtype=float).mean())
-    gain = np.sqrt(_power(audio, spoken) / noise_power) * 10 ** (-snr_db / 20)
+    gain = np.sqrt(_measure_power(audio, spoken) / noise_power) * 10 ** (-snr_db / 20)
     return Audio((audio.samples + gain * noise).astype(np.float32), audio.rate_hz)
 
 
@@ -56,7 +56,7 @@ def make_babble(voices: Sequence[Audio], samples: int, seed: int = 0) -> NDArray
     rng = np.random.default_rng(seed)
     total = np.zeros(samples)
     for voice in voices:
-        level = np.sqrt(_power(voice, mark_spoken(voice)))
+        level = np.sqrt(_measure_power(voice, mark_spoken(voice)))
         start = int(rng.integers(len(voice.samples)))
         total += np.resize(np.roll(voice.samples, -start), samples) / level
     return total.astype(np.float32)
@@ -75,13 +75,13 @@ def mark_spoken(audio: Audio) -> NDArray[np.bool_]:
         loud = np.ones_like(loud)
     nearest = np.minimum((np.arange(len(samples)) + HOP // 2) // HOP, len(loud) - 1)
     spoken: NDArray[np.bool_] = loud[nearest]
-    level = np.sqrt(_power(audio, spoken))
+    level = np.sqrt(_measure_power(audio, spoken))
     if level < SILENT_RMS:
         raise InputError(f"the recording is silent (root mean square {level:.1g}); give one in which something is said")
     return spoken
 
 
-def _power(audio: Audio, spoken: NDArray[np.bool_]) -> float:
+def _measure_power(audio: Audio, spoken: NDArray[np.bool_]) -> float:
     return float(np.square(audio.samples[spoken], dtype=float).mean())
 
 
@@ -130,7 +130,7 @@ def apply_condition(audio: Audio, voices: Sequence[Audio], rng: np.random.Genera
     """
     samples, level = audio.samples.astype(float), 0.0
     with suppress(InputError):  # a recording without sound
-        level = _power(audio, mark_spoken(audio))
+        level = _measure_power(audio, mark_spoken(audio))
     if level <= 0 or rng.random() < CLEAN_PROBABILITY:
         return audio, 0.0
     added = 0.0
@@ -145,7 +145,7 @@ def apply_condition(audio: Audio, voices: Sequence[Audio], rng: np.random.Genera
     if rng.random() < NOISE_PROBABILITY:
         share = 10 ** (-rng.uniform(*SNR_DB) / 10)
         is_babble = voices and rng.random() < BABBLE_PROBABILITY
-        noise = _babble(voices, len(samples), rng) if is_babble else _colour(len(samples), rng)
+        noise = _mix_voices(voices, len(samples), rng) if is_babble else _make_noise(len(samples), rng)
         samples, added = samples + noise * np.sqrt(level * share), added + share
     if rng.random() < FILTER_PROBABILITY:
         samples = _filter(samples, rng)
@@ -161,7 +161,7 @@ def _resample(samples: NDArray[np.floating], factor: float) -> Samples:
     return np.interp(np.arange(count) * factor, np.arange(len(samples)), samples)
 
 
-def _babble(voices: Sequence[Audio], count: int, rng: np.random.Generator) -> Samples:
+def _mix_voices(voices: Sequence[Audio], count: int, rng: np.random.Generator) -> Samples:
     """Return voices at random speeds and levels, of power 1 in all [shape=(count,)]."""
     total = np.zeros(count)
     for _ in range(int(rng.integers(1, MAX_TALKERS + 1))):
@@ -172,7 +172,7 @@ def _babble(voices: Sequence[Audio], count: int, rng: np.random.Generator) -> Sa
     return total / (total.std() + 1e-9)
 
 
-def _colour(count: int, rng: np.random.Generator) -> Samples:
+def _make_noise(count: int, rng: np.random.Generator) -> Samples:
     """Return noise of a random colour, sometimes with hum, of power 1 [shape=(count,)]."""
     size = next_fast_len(count, real=True)
     hertz = np.maximum(np.fft.rfftfreq(size, 1 / SPEECH_RATE_HZ), 50.0)

@@ -19,7 +19,7 @@ from lipmotion.speech.features.mfcc import (
     HOP,
     WINDOW,
     check_samples,
-    frame_count,
+    count_frames,
     general_features,
     log_energy,
     mfcc_of_warps,
@@ -113,7 +113,7 @@ class AnalysedAudio(Audio):
         pieces, waiting = [], [(0, check_samples(self))]
         while waiting:
             start, samples = waiting.pop()
-            heard = _heard(samples)
+            heard = _find_heard(samples)
             start, samples = start + heard.start, samples[heard]
             if len(samples) < WINDOW:
                 continue
@@ -145,7 +145,7 @@ class AnalysedAudio(Audio):
     @cached_property
     def frames(self) -> int:
         """T, the number of frames at 100 Hz."""
-        return frame_count(self.samples)
+        return count_frames(self.samples)
 
     @property
     def recorded(self) -> slice:
@@ -268,7 +268,7 @@ class _LevelledPiece:
         return result
 
 
-def _heard(samples: NDArray[np.float32]) -> slice:
+def _find_heard(samples: NDArray[np.float32]) -> slice:
     """Return the samples without digital silence before and after them; none where there is nothing else."""
     sound = samples != 0
     return slice(int(sound.argmax()), len(sound) - int(sound[::-1].argmax())) if sound.any() else slice(0, 0)
@@ -370,13 +370,13 @@ def analysed(audio: Audio, features: Features | None = None) -> AnalysedAudio:
     features : of the recording, from ``mfcc``, if they are known; they are not computed then
     """
     if not isinstance(audio, AnalysedAudio):
-        audio = AnalysedAudio(_without_offset(audio.samples), audio.rate_hz)
+        audio = AnalysedAudio(_remove_offset(audio.samples), audio.rate_hz)
     if features is not None and isinstance(features.values, np.ndarray):
         audio._mfcc.setdefault(1.0, features)
     return audio
 
 
-def _without_offset(samples: NDArray[np.float32]) -> NDArray[np.float32]:
+def _remove_offset(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return samples without offsets between digital silences; where one changes, without all slower than a voice."""
     if 1 < max(samples.max(initial=0), -samples.min(initial=0)) < np.inf:  # few such would make all others quiet
         few = np.count_nonzero(np.abs(samples) > 1) < SPIKE_SHARE * np.count_nonzero(samples)
@@ -385,7 +385,7 @@ def _without_offset(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     sound, result = np.flatnonzero(samples[: count * HOP].reshape(count, HOP).any(axis=1)), samples
     for part in np.split(sound, np.flatnonzero(np.diff(sound) > SILENT_FRAMES) + 1) if len(sound) else ():
         first = part[0] * HOP
-        heard = _heard(samples[first : (part[-1] + 2) * HOP])  # the next frame is silent, or not whole
+        heard = _find_heard(samples[first : (part[-1] + 2) * HOP])  # the next frame is silent, or not whole
         place = slice(first + heard.start, first + heard.stop)
         frames = samples[place][: (heard.stop - heard.start) // HOP * HOP].reshape(-1, HOP)
         if not len(frames):

@@ -34,7 +34,7 @@ def reduce_noise(samples: NDArray[np.float32], energy: NDArray[np.float32]) -> N
     """
     power = np.exp(energy, dtype=np.float64)
     quiet, middle = np.quantile(power, (0.1, 0.5))
-    strength = np.interp(_decibels(power[power >= middle].mean(), quiet), NOISY_DB, (1, 0))
+    strength = np.interp(_to_decibels(power[power >= middle].mean(), quiet), NOISY_DB, (1, 0))
     if not strength:
         return samples
     from scipy.ndimage import uniform_filter
@@ -46,7 +46,7 @@ def reduce_noise(samples: NDArray[np.float32], energy: NDArray[np.float32]) -> N
     judged = [samples[start : start + BLOCK + 3 * HOP] for start in starts[:: -(-len(starts) // MAX_BLOCKS)]]
     averages = [uniform_filter(transform.spectrogram(block)[:, 2:-2], AVERAGED, mode="nearest") for block in judged]
     low, noise, high = np.quantile(np.concatenate(averages, axis=1), (0.1, 0.2, 0.4), axis=1)[:, :, None]
-    spread_db = _decibels(high, low)
+    spread_db = _to_decibels(high, low)
     exponent = strength * np.interp(spread_db, STEADY_DB, (1, 0))
     lowest_gain = LOWEST_GAIN * np.clip(spread_db, 0.1, 1)
     result = np.empty_like(samples)
@@ -60,5 +60,5 @@ def reduce_noise(samples: NDArray[np.float32], energy: NDArray[np.float32]) -> N
     return result if np.square(result).mean() > LEAST_REST * np.square(samples).mean() else samples
 
 
-def _decibels(power: NDArray[np.float64] | float, reference: NDArray[np.float64] | float) -> NDArray[np.float64]:
+def _to_decibels(power: NDArray[np.float64] | float, reference: NDArray[np.float64] | float) -> NDArray[np.float64]:
     return 10 * np.log10(np.maximum(power, 1e-20) / np.maximum(reference, 1e-20))

@@ -42,7 +42,7 @@ def average_powers(samples: NDArray[np.float32], size: int) -> Array:
 def list_spans(levels: Array) -> list[tuple[float, float]]:
     """Return start and end of every stretch between two pauses, s.
 
-    levels : of ``levels_db``
+    levels : of ``measure_levels_db``
     Other sounds that are as loud as speech count as speech.
     """
     size = round(BLOCK_S / STEP_S)

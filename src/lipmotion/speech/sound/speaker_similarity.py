@@ -39,7 +39,7 @@ class SpeakerSimilarity(NamedTuple):
     score: float
 
 
-def speaker_similarity(hmm: UnitHmm, audio: AnalysedAudio) -> SpeakerSimilarity:
+def measure_similarity(hmm: UnitHmm, audio: AnalysedAudio) -> SpeakerSimilarity:
     """Return the speaker similarity of a recording to the training data of some models, at the best of ``WARPS``.
 
     A recording is judged by its longest passage.
@@ -50,7 +50,7 @@ def speaker_similarity(hmm: UnitHmm, audio: AnalysedAudio) -> SpeakerSimilarity:
 
     def judge() -> SpeakerSimilarity:
         part = _select_judged(stretch)
-        form, warped = _densities(hmm), zip(WARPS, part.mfcc_of_warps(WARPS), strict=True)
+        form, warped = _load_densities(hmm), zip(WARPS, part.mfcc_of_warps(WARPS), strict=True)
         fits = {warp: float(form.log_likelihood(features.values).max(axis=1).mean()) for warp, features in warped}
         warp = find_warp(fits)
         stretch.forget_warps()
@@ -65,7 +65,7 @@ def rate_knowledge(hmm: UnitHmm, audio: AnalysedAudio) -> float:
     By the speaker similarity or the likeness of speaker vectors, whichever says more: noise makes every voice
     dissimilar, and vectors of short recordings are unlike. In noise less likeness is needed.
     """
-    by_score = float(np.interp(speaker_similarity(hmm, audio).score, (STRANGER_SCORE, OWN_SCORE), (0, 1)))
+    by_score = float(np.interp(measure_similarity(hmm, audio).score, (STRANGER_SCORE, OWN_SCORE), (0, 1)))
     if hmm.speaker is None or by_score >= 1:
         return by_score
     stretch = _find_passage(audio)
@@ -102,7 +102,7 @@ def _select_judged(stretch: AnalysedAudio) -> AnalysedAudio:
 
 
 @lru_cache(maxsize=2)
-def _densities(hmm: UnitHmm) -> QuadraticForm:
+def _load_densities(hmm: UnitHmm) -> QuadraticForm:
     """Return the densities of ``UnitHmm.fit``, ready for use; those of the last models are kept."""
     return hmm.mixtures.quadratic(np.arange(len(hmm.log_stay), dtype=np.intp))
 

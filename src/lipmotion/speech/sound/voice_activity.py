@@ -109,8 +109,8 @@ def find_passages(log_energy: NDArray[np.float32]) -> list[Stretch]:
             before = (runs[number - 1].end + run.first + 1) // 2 if number else region.first
             after = (run.end + runs[number + 1].first + 1) // 2 if number + 1 < len(runs) else region.end
             first, end = max(before, run.first - PASSAGE_MARGIN), min(after, run.end + PASSAGE_MARGIN)
-            lead = _margin(log_energy[first : run.first][::-1], floor, 1)
-            passages.append(Stretch(run.first - lead, run.end + _margin(log_energy[run.end : end], floor, 2)))
+            lead = _measure_margin(log_energy[first : run.first][::-1], floor, 1)
+            passages.append(Stretch(run.first - lead, run.end + _measure_margin(log_energy[run.end : end], floor, 2)))
     return passages
 
 
@@ -138,7 +138,7 @@ def find_tones(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) ->
     return tones
 
 
-def _margin(log_energy: NDArray[np.float32], floor: float, reaching: int) -> int:
+def _measure_margin(log_energy: NDArray[np.float32], floor: float, reaching: int) -> int:
     """Return how many frames beside a sound, from the nearest on, are of its recording, not cut or mixed."""
     zeros = np.flatnonzero(log_energy <= floor)
     count = max(int(zeros[0]) - reaching, 0) if len(zeros) else len(log_energy)

@@ -100,7 +100,7 @@ def find_voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, 
         energy_db = sound.log_energy.astype(np.float64) * DB
         level_db = scipy.ndimage.gaussian_filter1d(energy_db, SMOOTHING_FRAMES, mode="nearest")
         voiced = np.isfinite(log_f0(sound))
-        events = *_laughs(sound, level_db, voiced, phones), *_breaths(sound, level_db, voiced, phones)
+        events = *_find_laughs(sound, level_db, voiced, phones), *_find_breaths(sound, level_db, voiced, phones)
         detected += [event.shifted(at_s) for event in events]
     return tuple(sorted(detected, key=lambda event: event.start_s))
 
@@ -121,7 +121,7 @@ def silence_units(units: Timeline[Unit], others: Sequence[tuple[float, float]]) 
 DB = 10 / np.log(10)  # decibels of a natural logarithm of power
 
 
-def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:
+def _find_laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:
     """Yield laughter where hardly any words are known or confirmed."""
     sure = (span for span in units if span.label.confidence is None or span.label.confidence >= WORD_CONFIDENCE)
     words = [span for span in sure if not is_silent(span.label.phone)]
@@ -138,7 +138,7 @@ def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeli
             continue
         quietest = [before + int(level_db[before:after].argmin()) for before, after in pairwise(calls.tolist())]
         depth_db = np.mean(np.minimum(levels[1:], levels[:-1]) - level_db[quietest])
-        spectra = _bands(audio, slice(first, end))[calls - first].astype(np.float64)
+        spectra = _compute_bands(audio, slice(first, end))[calls - first].astype(np.float64)
         spectra -= spectra.mean(axis=1, keepdims=True)
         spectra /= np.maximum(np.linalg.norm(spectra, axis=1, keepdims=True), 1e-9)
         likeness = (spectra[1:] * spectra[:-1]).sum(axis=1).mean()
@@ -152,7 +152,7 @@ def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeli
             yield VoiceEvent(start_s, end_s, LAUGHTER, probability, tuple(timed_calls))
 
 
-def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:
+def _find_breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:
     heard = level_db[level_db > (SILENT_ENERGY + 1) * DB]  # within passages
     loud_db, spoken = float(np.percentile(heard if len(heard) else level_db, 95)), np.flatnonzero(voiced)
     ends_s = [0.0, *(span.end_s for span in units if not is_silent(span.label.phone))]
@@ -167,7 +167,7 @@ def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timel
     for start_s, end_s in silences:
         pause = range(round(start_s * FRAME_RATE_HZ), round(end_s * FRAME_RATE_HZ))
         around = slice(max(pause.start - QUIET_REACH, 0), min(pause.stop + QUIET_REACH, len(level_db)))
-        for begin, end, rise_db in _noises(_bands(audio, around), voiced[around]):
+        for begin, end, rise_db in _find_noises(_compute_bands(audio, around), voiced[around]):
             first, stop = begin + around.start, end + around.start
             if first < pause.start or stop > pause.stop or level_db[first:stop].max() - loud_db > BREATH_LEVEL_DB:
                 continue
@@ -179,7 +179,7 @@ def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timel
                 yield VoiceEvent(first / FRAME_RATE_HZ, stop / FRAME_RATE_HZ, BREATH, strength)
 
 
-def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, int, float]]:
+def _find_noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, int, float]]:
     """Yield first frame, the one after the last, and rise in decibels of noise that is as a breath's."""
     centres, starts = find_centres(), range(0, len(bands), BLOCK_FRAMES)
     low, middle, high, bright = (
@@ -204,7 +204,7 @@ def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, i
             yield first, stop, float(np.max(level[run] - quiet[run]))
 
 
-def _bands(audio: AnalysedAudio, frames: slice) -> NDArray[np.float32]:
+def _compute_bands(audio: AnalysedAudio, frames: slice) -> NDArray[np.float32]:
     """Return ``log_bands`` of a range of frames, computed of these alone [shape=(N, 40)]."""
     return log_bands(audio.samples[frames.start * HOP : max(frames.stop - 1, frames.start) * HOP])
 

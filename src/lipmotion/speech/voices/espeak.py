@@ -92,13 +92,13 @@ def find_wheel() -> Path | None:
     return Path(folders[0]) if folders and (Path(folders[0]) / DATA).is_dir() else None
 
 
-def _voices() -> tuple[SyntheticVoice, ...]:
+def _list_voices() -> tuple[SyntheticVoice, ...]:
     folder = find_wheel()
     variants = [name for name in VARIANTS if folder and (folder / DATA / "voices" / "!v" / name).is_file()]
     return tuple(SyntheticVoice(f"{LANGUAGE}+{name}", NAME, f"espeak-{name}") for name in variants)
 
 
-def _others() -> tuple[SyntheticVoice, ...]:
+def _list_others() -> tuple[SyntheticVoice, ...]:
     """Return a voice of every language; its name and ``+`` and one of ``VARIANTS`` name a voice, too."""
     folder, names = find_wheel(), set[str]()
     for path in (folder / DATA / "lang").rglob("*") if folder else ():
@@ -155,7 +155,7 @@ def _ask_library(task: dict[str, Any], count: int) -> list[Any]:
     return answers
 
 
-ESPEAK_NG = Synthesiser(NAME, "", _voices, _synthesise, ESPEAK_PHONES, _others, EXTRA)
+ESPEAK_NG = Synthesiser(NAME, "", _list_voices, _synthesise, ESPEAK_PHONES, _list_others, EXTRA)
 
 
 @dataclass(frozen=True)
@@ -195,7 +195,7 @@ def _pronounce(words: Sequence[str], language: str) -> dict[str, tuple[Pronuncia
             scripts = " or ".join(spoken.scripts).lower()
             raise InputError(f"{what} {scripts} letters, add it to a lexicon file, or give another language")
     voice = spoken.voice or language
-    if voice not in [each.name for each in _others()]:
+    if voice not in [each.name for each in _list_others()]:
         what = f"no pronunciation of {shorten(repr(words[0]))} in {spoken.name}: install espeak-ng"
         way_out = f"({install_command(EXTRA)}), or give a lexicon file with its {len(words)} words"
         raise MissingDependencyError(f"{what} {way_out}")

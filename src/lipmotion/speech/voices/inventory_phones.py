@@ -32,7 +32,7 @@ def convert_phones(
 ) -> Timeline[Unit]:
     """Return the phones of a synthesised sentence in time, as forced alignment would label them.
 
-    phone_map  : labels to phones (``phone_maps``)
+    phone_map  : labels to phones (``synthesiser.PhoneMap``)
     words      : of the sentence; or what is written of it between blanks, in time, where the synthesiser tells
     lexicon    : pronunciations of the words (None: the sentence is not English, its words stay as they are written)
     duration_s : of the sound; what no label covers is silence
@@ -70,9 +70,9 @@ def assign_words(phones: Sequence[str], words: Sequence[str], lexicon: Lexicon) 
 
     Both follow from the cheapest match with the words' first pronunciations; other phones belong to the word before.
     """
-    expected = [(phone, number) for number, word in enumerate(words) for phone in _pronunciation(word, lexicon)]
+    expected = [(phone, number) for number, word in enumerate(words) for phone in _pronounce(word, lexicon)]
     units, number = [], expected[0][1] if expected else 0
-    for phone, match in zip(phones, matches(phones, [phone for phone, _ in expected]), strict=True):
+    for phone, match in zip(phones, match_phones(phones, [phone for phone, _ in expected]), strict=True):
         before = number
         in_lexicon, number = expected[match] if match >= 0 else ("", number)
         name = in_lexicon if REDUCED_VOWELS.get(phone) == in_lexicon else phone
@@ -81,7 +81,7 @@ def assign_words(phones: Sequence[str], words: Sequence[str], lexicon: Lexicon) 
     return units
 
 
-def _pronunciation(word: str, lexicon: Lexicon) -> Pronunciation:
+def _pronounce(word: str, lexicon: Lexicon) -> Pronunciation:
     """Return the first pronunciation of a word; of one with letters that English has not, that of its plain letters."""
     try:
         return lexicon.pronunciations(word)[0]
@@ -108,7 +108,7 @@ def _with_written_words(phones: Phones, written: Timeline[str], lexicon: Lexicon
     return units
 
 
-def matches(spoken: Sequence[str], expected: Sequence[str]) -> list[int]:
+def match_phones(spoken: Sequence[str], expected: Sequence[str]) -> list[int]:
     """Return for each spoken phone the index of the expected one that it matches, -1 for none: least total cost.
 
     Source: Wagner & Fischer 1974 (edit distance).
@@ -117,12 +117,12 @@ def matches(spoken: Sequence[str], expected: Sequence[str]) -> list[int]:
     for row, phone in enumerate(spoken):
         above, line = costs[-1], [GAP_COST * (row + 1)]
         for column, other in enumerate(expected):
-            same = above[column] + _cost(phone, other)
+            same = above[column] + _compute_cost(phone, other)
             line.append(min(same, above[column + 1] + GAP_COST, line[column] + GAP_COST))
         costs.append(line)
     matched, row, column = [-1] * len(spoken), len(spoken), len(expected)
     while row and column:
-        if costs[row][column] == costs[row - 1][column - 1] + _cost(spoken[row - 1], expected[column - 1]):
+        if costs[row][column] == costs[row - 1][column - 1] + _compute_cost(spoken[row - 1], expected[column - 1]):
             row, column = row - 1, column - 1
             matched[row] = column
         elif costs[row][column] == costs[row - 1][column] + GAP_COST:
@@ -132,7 +132,7 @@ def matches(spoken: Sequence[str], expected: Sequence[str]) -> list[int]:
     return matched
 
 
-def _cost(phone: str, other: str) -> float:
+def _compute_cost(phone: str, other: str) -> float:
     if phone == other:
         return 0.0
     if REDUCED_VOWELS.get(phone, phone) == REDUCED_VOWELS.get(other, other) or VISEME_OF[phone] == VISEME_OF[other]:

@@ -76,7 +76,7 @@ def load_english() -> EnglishWords:
         message = f"words are recognised with the language model of pocketsphinx ({error}): pip install pocketsphinx"
         raise MissingDependencyError(message) from error
     base = float(np.log(log_math.exp(1)))
-    pronounced = _pronunciations()
+    pronounced = _read_pronunciations()
     names = list(pronounced)
     scores = np.array([model.prob([word]) for word in pronounced]) * base
     chosen = np.argsort(-scores, kind="stable")[:MAX_WORDS]
@@ -94,7 +94,7 @@ def load_english() -> EnglishWords:
     return EnglishWords(tree, words, score)
 
 
-def _pronunciations() -> dict[str, list[str]]:
+def _read_pronunciations() -> dict[str, list[str]]:
     """Return the pronunciations of every word: those of the dictionary, and those that phone networks write."""
     variants = defaultdict[str, list[str]](list)
     written = resources.files(__package__).joinpath("written_words.txt").read_text(encoding="ascii")
