@@ -181,7 +181,7 @@ def _find_columns(line: str) -> dict[str, int]:
 
 
 def _read_table(lines: Lines, columns: dict[str, int], where: str, known_header: str = "") -> list[LabelTier]:
-    """Return the tiers of a table, of the Montreal Forced Aligner or any; ``known_header``: that of one without a header."""
+    """Return the tiers of a table, of the Montreal Forced Aligner or any; ``known_header``: of one that has none."""
     header = known_header or lines[0][1]
     delimiter = max(",;\t", key=header.count)
     kinds: dict[tuple[str, str], list[TimedLabel]] = defaultdict(list)

@@ -262,7 +262,9 @@ SOUND_SHARES = (0.65, 0.35)
 nothing of it: where phones cannot be relied on at all, and where they can (docs/results/voices.md)."""
 CONFIRMED = -0.5
 """An unreliable p, b or m closes the lips where the general network hears them less open than so many deviations."""
-NEAR_S = 0.2  # seconds before and after speech in which that holds: elsewhere the mouth rests
+NEAR_S, CLEAR_DB = 0.2, (25.0, 30.0)
+"""Seconds before and after speech in which that holds; in pauses it holds as far as they are so quiet: else others may
+be speaking there, as in a babble of 10 dB, which has 18 to 26 dB between quiet and loud moments."""
 VOWEL_S, OPENING_BY_DURATION = 0.1, 0.5
 """A vowel of the first duration is as open as the table says; one that is e times as long is more open by so many
 standard deviations of the speaker, and a shorter one less (docs/results/voices.md)."""
@@ -295,14 +297,16 @@ class UnseenSpeaker:
     frames: int
     reliability: Array | float  # of the phones in time, 0 to 1 [shape=(T,)]
     voice: float  # how well training knows the voice, 0 to 1; at 1 its motion stays
+    range_db: Array | float = 0.0  # between loud and quiet moments, 0 in digital silence [shape=(T,)]
 
     def follow_sound(self, statistics: Predict, articulators: Array) -> Predict:
-        """Draw motion in and near speech towards articulators that the general network hears [shape=(T, 8)]."""
-        spoken = ~mark_distant(self.units, self.frames, NEAR_S)[:, None]
+        """Draw motion, in pauses where they are quiet, towards articulators that the general network hears [(T, 8)]."""
+        spoken = smooth_steps((~mark_distant(self.units, self.frames, NEAR_S)[:, None]).astype(float))
+        quiet = smooth_steps(np.broadcast_to(np.interp(self.range_db, CLEAR_DB, (0, 1)), self.frames)[:, None])
         unsure, sure = SOUND_SHARES
         reliability = np.broadcast_to(self.reliability, self.frames)[:, None, None]
         share = (1 - self.voice) * (unsure + reliability * (sure - unsure))
-        share = share * smooth_steps(spoken.astype(float))[:, :, None]
+        share = share * (spoken + quiet * (1 - spoken))[:, :, None]
         return draw_towards(self.prior.centre + articulators @ self.prior.matrix, share, statistics)
 
     def slow_width(self, statistics: Predict, column: int) -> Predict:

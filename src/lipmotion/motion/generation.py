@@ -103,6 +103,7 @@ class LearnedMotion:
         reliability: NDArray[np.float64] | float = 1.0,
         voice: float = 1.0,
         articulators: NDArray[np.float64] | None = None,
+        range_db: NDArray[np.float64] | float = 0.0,
     ) -> tuple[Motion, ReducedVariance]:
         """Return the motion of all channels at 100 Hz, and its variance, by parameter generation.
 
@@ -118,6 +119,7 @@ class LearnedMotion:
         reliability   : of the phones in time, 0 to 1 [shape=(T,)]
         voice         : how well training knows the voice, 0 to 1: others move as far as people do on average
         articulators  : what the general network hears [shape=(T, 8)], but of known voices whose words are given
+        range_db      : decibels between loud and quiet moments, 0 in digital silence [shape=(T,)]
         Raises InputError: a pin names no channel, lies outside the recording, is not finite, or contradicts another.
         Raises ModelFormatError: the motion leaves the limits, so that the model must be damaged.
         """
@@ -126,7 +128,7 @@ class LearnedMotion:
         if self.prior is not None:
             statistics = self.prior.blend(statistics, units, frames, reliability, voice)
             if (voice < 1 or articulators is not None) and scaling is not None and self.closure is not None:
-                speaker = articulation.UnseenSpeaker(self.prior, units, frames, reliability, voice)
+                speaker = articulation.UnseenSpeaker(self.prior, units, frames, reliability, voice, range_db)
                 statistics = speaker.raise_contrast(statistics)
                 statistics = speaker.open_before_speech(statistics)
                 ranges = find_closable_ranges(units, frames, closing_units, articulation.choose_closing_reach(voice))

@@ -47,6 +47,7 @@ class Speech:
     voice       : 0 to 1, how well the model's training knows the voice
     posteriors  : of a phone recogniser (None: the engine does not use them, or none is installed)
     encoding    : float16 array [shape=(T, 64)], of the speech encoder (None: the engine does not use it)
+    range_db    : decibels between loud and quiet moments of the sound (0: not measured)
     cache       : what was computed of the sound alone (``cached``); speech with other units shares it
     parts       : the speech of each passage of the recording, which is animated by itself (None: all is one passage);
                   empty: nothing is said. Beside it, features, spectrum, posteriors and encoding may be ``JoinedRows``
@@ -62,6 +63,7 @@ class Speech:
     voice: float = 1.0
     posteriors: TokenPosteriors | None = None
     encoding: NDArray[np.float16] | None = None
+    range_db: float = 0.0
     times_given: bool = False
     cache: dict[Any, Any] = field(default_factory=dict, repr=False)
     parts: tuple[SpeechPart, ...] | None = None

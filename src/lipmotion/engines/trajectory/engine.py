@@ -97,6 +97,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
             reliability=experts.reliability,
             articulators=None if model.prior is None else hear_articulators(speech),
             voice=speech.voice,
+            range_db=np.where(silent, 0.0, speech.range_db),
         )
         return Generation(
             motion,

@@ -283,6 +283,7 @@ def build_speech(
         )
     none = Timeline[Unit](())
     speech = Speech(features, none, f0, spectrum=spectrum, posteriors=posteriors, encoding=encoding, parts=parts)
+    speech = replace(speech, range_db=measure_level_range(audio.log_energy))
     return with_units(speech, units) if len(units) else speech
 
 
