@@ -35,7 +35,7 @@ from lipmotion.articulation.mouth import find_mouth
 from lipmotion.errors import ExportError
 from lipmotion.extensions import find_version
 from lipmotion.formats.base import MotionFormat, list_key_frames
-from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
+from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, arkit_weights
 from lipmotion.storage.files import atomic_file, check_target
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import WEIGHT, Generation, Motion
@@ -70,20 +70,15 @@ def _choose_keys(
 def write_unity(path: Path, generation: Generation, source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write one clip, named as the recording, with a curve for each weight of the motion."""
     motion, name = generation.motion, Path(source.get("path", "")).stem or "speech"
-    end_s = float(motion.time_s[-1])
     curves = "".join(_format_curve(generation, weight) for weight in _list_weights(motion)).removesuffix("\n")
     members = {"name": _quote(name), "curves": curves, "rate_hz": f"{motion.rate_hz:.9g}"}
-    text = _fill_shipped("unity_clip.yaml", **members, end_s=f"{end_s:.6f}")
+    text = _read_shipped("unity_clip.yaml").substitute(**members, end_s=f"{motion.time_s[-1]:.6f}")
     path.write_text(text, encoding="utf-8", newline="\n")
-
-
-def _fill_shipped(file: str, /, **members: str) -> str:
-    """Return the text of a file of this package, with the members that it names."""
-    return _read_shipped(file).substitute(members)
 
 
 @cache
 def _read_shipped(file: str) -> Template:
+    """Return the text of a file of this package, with places for members."""
     return Template(resources.files(__package__).joinpath(file).read_text(encoding="ascii"))
 
 
@@ -100,9 +95,9 @@ def _format_curve(generation: Generation, name: str) -> str:
         sides = (max(number - 1, 0), min(number, len(slopes) - 1))
         before, after = ("Infinity" if steps else f"{slopes[side]:.6g}" for side in sides)
         members = {"time_s": f"{time_s:.6f}", "value": f"{key:.{UNITY_DECIMALS}f}", "before": before, "after": after}
-        rows += _fill_shipped("unity_key.yaml", **members, mode=mode)
+        rows += _read_shipped("unity_key.yaml").substitute(**members, mode=mode)
     attribute = _quote(f"blendShape.{name}")
-    return _fill_shipped("unity_curve.yaml", keys=rows, attribute=attribute, path="", kind=f"{RENDERER}")
+    return _read_shipped("unity_curve.yaml").substitute(keys=rows, attribute=attribute, path="", kind=f"{RENDERER}")
 
 
 def check_godot(motion: Motion) -> None:
@@ -117,13 +112,14 @@ def write_godot(path: Path, generation: Generation, _source: Mapping[str, str], 
     """Write one resource with a track for each weight of the motion."""
     motion = generation.motion
     length, step = f"{float(motion.time_s[-1]):.9g}", f"{1 / motion.rate_hz:.6g}"
-    text = _fill_shipped("godot_animation.txt", length=length, step=step)
+    text = _read_shipped("godot_animation.txt").substitute(length=length, step=step)
+    track = _read_shipped("godot_track.txt")
     for number, name in enumerate(_list_weights(motion)):
         times_s, values, steps = _choose_keys(generation, name, 1.0, GODOT_DECIMALS, GODOT_TOLERANCE)
         rows = zip(times_s, values, strict=True)
         keys = ", ".join(f"{time_s:.9g}, 1, {value:.{GODOT_DECIMALS}g}" for time_s, value in rows)
         node = json.dumps(f"{NODE}:{name}", ensure_ascii=False)
-        text += _fill_shipped("godot_track.txt", number=f"{number}", node=node, interp=f"{int(not steps)}", keys=keys)
+        text += track.substitute(number=f"{number}", node=node, interp=f"{int(not steps)}", keys=keys)
     path.write_text(text, encoding="utf-8", newline="\n")
 
 
@@ -165,11 +161,8 @@ def write_live2d(path: Path, generation: Generation, _source: Mapping[str, str],
 
 def measure_mouth_open(generation: Generation) -> Array:
     """Return how far the mouth is open, 0 to 1 [shape=(T,)]; 0 where the lips touch."""
-    motion = generation.motion
-    if "opening" in motion.names:
-        gap = find_mouth(motion, generation.units).gap
-    else:
-        gap = _sum_effects(motion, arkit_mouth().gap)
+    motion, measured = generation.motion, "opening" in generation.motion.names
+    gap = find_mouth(motion, generation.units).gap if measured else _sum_effects(motion, arkit_mouth().gap)
     return np.clip(gap / FULL_GAP, 0.0, 1.0)
 
 
@@ -187,8 +180,8 @@ def measure_mouth_form(generation: Generation) -> Array:
 
 def _sum_effects(motion: Motion, effects: Array) -> Array:
     """Return the sum of the effects of blendshapes by their weights [shape=(T,)]."""
-    known = zip(arkit_mouth().known, effects, strict=True)
-    return sum((effect * motion[name] for name, effect in known if name in motion.names), np.zeros(len(motion.values)))
+    known, weights = zip(arkit_mouth().known, effects, strict=True), arkit_weights(motion)
+    return sum((effect * weights[name] for name, effect in known if name in weights), np.zeros(len(motion.values)))
 
 
 LIVE2D = MotionFormat(write_live2d, needs=SHOWING, min_frames=2, mouth=True)
@@ -212,7 +205,8 @@ def write_blender(path: Path, generation: Generation, source: Mapping[str, str],
     texts = read_addon(SCRIPT_MODULES).values()
     *code, main = (_IMPORT.sub("", _BEGINNING.sub("", text)) for text in texts)
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(_fill_shipped("blender_script_head.txt") + "".join(each.strip() + "\n\n\n" for each in code))
+        file.write(_read_shipped("blender_script_head.txt").substitute())
+        file.writelines(each.strip() + "\n\n\n" for each in code)
         file.write(f"RATE_HZ = {motion.rate_hz!r}\nSOUND = {source.get('path', '')!a}\n")
         file.write(f"SOUND_S = {float(source.get('start_s', 0.0))!r}\n")
         stepped = "".join(f"{name!a}, " for name in motion.names if name in generation.stepped)
@@ -245,7 +239,8 @@ def write_addon(program: str, path: str | Path) -> None:
     texts = read_addon(MODULES)
     version = re.match(r"\d+\.\d+\.\d+", find_version())
     shown = version[0] if version else NO_VERSION
-    texts["blender_manifest.toml"] = _fill_shipped("blender_manifest.toml", version=shown)  # makes it an extension
+    manifest = _read_shipped("blender_manifest.toml")  # makes it an extension
+    texts["blender_manifest.toml"] = manifest.substitute(version=shown)
     with atomic_file(path) as unfinished, zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in texts.items():
             archive.writestr(zipfile.ZipInfo(f"{FOLDER}/{name}", OLDEST), text.encode(), zipfile.ZIP_DEFLATED)
