@@ -342,9 +342,8 @@ UNITS |= {"millimetre": 1.0, "centimeter": 10.0, "centimetre": 10.0, "metre": 10
 """Units of length in millimetres, without the ``s`` of several."""
 MAX_BEHIND = 0.15  # eye distances that the markers of a face are behind the corners of the eyes on the mean
 SMALLEST_FACE = 0.2  # eye distances that the markers of a face lie apart at least
-LEFT_EYE = frozenset(("eyel", "leye", "lefteye", "eyeleft", "exl", "lex", "leyeouter", "eyelouter", "lefteyeouter"))
-"""Names of a marker at the outer corner of the speaker's left eye: without capitals, spaces and underscores."""
-RIGHT_EYE = frozenset(("eyer", "reye", "righteye", "eyeright", "exr", "rex", "reyeouter", "eyerouter", "righteyeouter"))
+OUTER_EYES = [re.compile(rf"(eye({s[0]}|{s})|({s[0]}|{s})eye|ex{s[0]}|{s[0]}ex)(outer)?") for s in ("left", "right")]
+"""Names of markers at the outer corners of the speaker's eyes: without capitals, spaces and underscores."""
 RIGID = re.compile("(left|right|.)?(forehead|head|nasion|nosebridge|glabella|temple|ear|mastoid|[lr]?fhd)")
 """Beginnings of names, after a side, of other markers that do not move against the skull."""
 MIN_RIGID_MARKERS = 3
@@ -385,7 +384,7 @@ def to_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
         raise InputError(f"its unit of length is {unit[:20]!r}, required mm, cm, m or inch")
     if max(float(np.abs(places).max()) for places in markers.values()) > LARGEST_COORDINATE:
         raise InputError(f"a marker is further than {LARGEST_COORDINATE:g} {unit} away; export the capture again")
-    left, right = (next((name for name in markers if _plain(name) in names), "") for names in (LEFT_EYE, RIGHT_EYE))
+    left, right = (next((name for name in markers if each.fullmatch(_plain(name))), "") for each in OUTER_EYES)
     if not (left and right):
         size = float(np.ptp([places.mean(axis=0) for places in markers.values()], axis=0).max()) * millimetres
         if len(markers) > 1 and size < SMALLEST_FACE * MILLIMETRES:

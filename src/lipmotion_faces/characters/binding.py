@@ -412,9 +412,9 @@ class PosedCharacter(DrivenCharacter):
 
     @cached_property
     def _mouth_names(self) -> tuple[str, ...]:
-        if self.shapes is None:
-            return ()
-        return tuple(dict.fromkeys(row.control for row in self.mouth_rows[0])) if self.table else self.shapes.names
+        if self.shapes is None or not (self.table or self.twins):
+            return self.shapes.names if self.shapes else ()
+        return tuple(dict.fromkeys(row.control for row in self.mouth_rows[0]))
 
     @cached_property
     def _other_names(self) -> tuple[str, ...]:

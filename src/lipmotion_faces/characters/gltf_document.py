@@ -354,7 +354,7 @@ class GltfArrays:
         if offset + length > len(buffer):
             raise InputError(
                 f"it refers to bytes {offset} to {offset + length} of buffer {number} with {len(buffer)} bytes; "
-                "copy it again, with its buffers"
+                "copy it again, with its buffers; or export it without compression"
             )
         return buffer[offset : offset + length], view.get("byteStride", 0)
 
