@@ -138,8 +138,7 @@ class MeshStage:
         self._bent_triangles = numbers.reshape(bent.shape).astype(np.int32)
         rows = np.flatnonzero(around[self._joined])
         self._inside = np.searchsorted(self._bent, self._joined[rows]), rows
-        normals = compute_normals(self._join(self._rest), self._joined[mesh.triangles].astype(np.int32))[self._joined]
-        self._normals = normals
+        self._normals = compute_normals(self._join(self._rest), triangles.astype(np.int32))[self._joined]
         self._share, self._pivot = self._weigh_head(character, face)
         self._eyes: list[tuple[Rows, Array, Array]] = []
         for bone in mesh.bones:
@@ -147,7 +146,7 @@ class MeshStage:
                 held = self._rest[bone.rows[bone.shares > 0.5 * bone.shares.max()]]
                 middle = (held.min(axis=0) + held.max(axis=0)) / 2
                 self._eyes.append((bone.rows, bone.shares[:, None], middle))
-        self._light, self._shine = self._light_vertices(self._rest, normals, np.arange(len(self._drawn.rows)))
+        self._light, self._shine = self._light_vertices(self._rest, self._normals, np.arange(len(self._drawn.rows)))
         self._still = self._canvas.draw(self._rest[self._drawn.rows], self._light, self._shine)
 
     def draw(self, vertices: Array, turn: Turn = STILL, gaze: Sequence[float] = (0.0, 0.0)) -> base.Picture:

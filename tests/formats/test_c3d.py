@@ -115,7 +115,7 @@ def test_movements_of_the_head_are_taken_out(tmp_path, unit, per_mm):
     np.testing.assert_allclose(motion["opening"], expected, atol=1e-5)
 
 
-def test_axes_with_z_up_and_faces_that_look_the_other_way_are_turned(tmp_path):
+def test_axes_with_z_up_and_faces_that_look_the_other_way_are_turned(tmp_path, caplog):
     still = {name: place for name, place in face().items() if "Ben" not in name}
     z_up = {name: np.stack([p[:, 0], -p[:, 2], p[:, 1]], axis=1) * 90 for name, p in still.items()}
     write_c3d(tmp_path / "a.c3d", capture(z_up))
@@ -123,6 +123,9 @@ def test_axes_with_z_up_and_faces_that_look_the_other_way_are_turned(tmp_path):
     np.testing.assert_allclose(np.stack([motion[f"{axis}_13"] for axis in "xyz"], axis=1), still["LIP_13"], atol=1e-5)
     behind = {name.split(":")[-1]: p * [-90.0, 90, -90] for name, p in still.items()}
     np.testing.assert_allclose(to_head_frame(behind, "mm")["LIP_13"], still["LIP_13"], atol=1e-9)
+    assert not caplog.messages
+    to_head_frame({name: p * [-1, 1, 1] for name, p in behind.items()}, "mm")
+    assert "eye distances behind the eyes, required in front of them" in caplog.text
     mouth = {name: p * 90 for name, p in still.items() if ":" not in name}  # no eyes: an eye distance is stated
     write_c3d(tmp_path / "a.c3d", capture(mouth))
     np.testing.assert_allclose(read_motion(tmp_path / "a.c3d")[0]["y_chin"], mouth["chin"][:, 1] / 90, atol=1e-6)

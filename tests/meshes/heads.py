@@ -1,5 +1,6 @@
 """A small head for tests: a curved sheet with a mouth cut into it, ARKit's blendshapes, teeth behind, eyes beside."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,8 @@ from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
 from lipmotion.types import Motion
 from lipmotion_faces.characters import gltf_writer, scene
 
+REPORTED = json.loads(Path(__file__).with_name("reported.json").read_text(encoding="utf-8"))
+"""Characters and their files in the manner of public reports, and what is right of each."""
 SEAM, HALF = -0.86, 0.3  # height of the mouth and half its width, in eye distances
 COLUMNS = np.linspace(-1.2, 1.2, 49)
 ROWS = np.linspace(0.34, -2.06, 49)

@@ -15,7 +15,7 @@ from lipmotion_faces.characters import binding as binding_files
 from lipmotion_faces.characters import character_files, lip_placement
 from lipmotion_faces.characters.binding import MAX_WEIGHTS, bind, paint_weights
 from lipmotion_faces.characters.surface import build_surface
-from meshes.heads import COLUMNS, HALF, SEAM, SIZE, VISEMES, head, lip_points, renamed, shaped
+from meshes.heads import COLUMNS, HALF, REPORTED, SEAM, SIZE, VISEMES, head, lip_points, renamed, shaped
 from meshes.speech import PHONES, motion, units
 from oracles.skinning import skinned_vertex_by_vertex
 
@@ -119,17 +119,8 @@ def test_written_weights_paint_the_same_binding_and_points_are_read(binding, mes
     assert [named[point] for point in binding.placement.points] == binding.placement.vertices.tolist()
 
 
-WRONG = [
-    ("vertex,weight\n1,2\n", "required vertex,point,weight"), ("vertex,point,weight\n1,17\n", "2 columns"),
-    ("vertex,point,weight\none,17,1\n", "line 2"), ("vertex,point,weight\n1,17,0.5\n1,17,0.5\n", "occur twice"),
-    ("vertex,point,weight\n1,17,1.5\n", "is 1.5, required 0 to 1"),
-    ("vertex,point,weight\n1,17,nan\n", "is nan, required 0 to 1"),
-    ("vertex,point,weight\n-1,17,1\n", "does not exist"), ("vertex,point,weight\n1,5,1\n", "is no control point"),
-]  # fmt: skip
-
-
 def test_paint_is_checked(binding, mesh, tmp_path):
-    for text, message in WRONG:
+    for text, message in REPORTED["paint"]:
         (tmp_path / "paint.csv").write_text(text)
         with pytest.raises(InputError, match=message):
             paint_weights(binding, mesh, binding_files.read_weights(tmp_path / "paint.csv"))
@@ -202,14 +193,9 @@ def test_mouths_that_do_not_open_are_refused():
 
 def test_named_points_are_checked():
     mesh = head(shapes=False)
-    for named, message in (
-        ({61: 0, 291: 1, 13: 2}, "14 are missing"),
-        ({61: 0, 291: 1, 13: 2, 14: 99999}, "vertex 99999, required 0 to"),
-        ({61: 0, 291: 1, 13: 2, 14: 2}, "are one vertex"),
-        ({61: 0, 291: 1, 13: 2, 14: 3, 5: 4}, "5 is no lip or jaw point"),
-    ):
+    for named, message in REPORTED["points"]:
         with pytest.raises(InputError, match=message):
-            lip_placement.place_lips_by_points(mesh, build_surface(mesh), named)
+            lip_placement.place_lips_by_points(mesh, build_surface(mesh), dict(named))
 
 
 def _shapes_of(mesh):

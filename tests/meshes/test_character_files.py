@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from lipmotion import errors, types
+from lipmotion.meshes.model.rig_tables import find_table
 from lipmotion_faces.characters import character_files, file_limits, gltf_writer
 from meshes.gltf import document, glb
-from meshes.heads import head, shaped, write_glb, write_obj
+from meshes.heads import REPORTED, head, shaped, write_glb, write_obj
+from meshes.speech import motion, units
 
 QUAD = (
     "mtllib look.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
@@ -49,6 +51,49 @@ def test_a_folder_has_a_neutral_mesh_and_shapes(tmp_path):
     read = character_files.read_character(tmp_path)
     assert read.shape_names == ("jawOpen", "mouthPucker")
     np.testing.assert_allclose(shaped(read, {"jawOpen": 1}), shaped(mesh, {"jawOpen": 1}), atol=1e-3)
+
+
+@pytest.mark.parametrize("row", REPORTED["folders"], ids=[row["name"] for row in REPORTED["folders"]])
+def test_folders_as_programs_write_them(tmp_path, recwarn, row):
+    mesh = head()
+    order = np.argsort(np.arange(len(mesh.vertices)) * row.get("step", 1) % len(mesh.vertices), kind="stable")
+    write_obj(tmp_path / "neutral.obj", mesh)
+    for name in ("jawOpen", "mouthPucker"):
+        moved = row.get("scale", 1) * shaped(mesh, {name: 1.0}) + row.get("shift", 0)
+        write_obj(tmp_path / f"{name}.obj", mesh, moved[order])
+    if "error" in row:
+        with pytest.raises(errors.InputError, match=row["error"]):
+            character_files.read_character(tmp_path)
+    else:
+        read = character_files.read_character(tmp_path)
+        np.testing.assert_allclose(shaped(read, {"jawOpen": 1}), shaped(mesh, {"jawOpen": 1}), atol=1e-3)
+        said = [str(each.message) for each in recwarn]
+        assert [bool(re.search(row.get("warns", "-"), each)) for each in said] == [True] * ("warns" in row)
+
+
+@pytest.mark.parametrize("row", REPORTED["heads"], ids=[row["name"] for row in REPORTED["heads"]])
+def test_heads_as_people_bring_them(tmp_path, recwarn, row):
+    """The blendshapes that speech moves, those that it leaves alone, and what is said of the rest."""
+    mesh = head()
+    names, path = row.get("names") or {name: name for name in mesh.shape_names}, tmp_path / "head.glb"
+    shapes = [
+        replace(s, name=names[s.name], displacements=row.get("scale", {}).get(s.name, 1) * s.displacements)
+        for s in mesh.shapes
+        if s.name in names
+    ]
+    last = len(mesh.vertices) - 3 * ("teeth" in row)
+    parts = [(s, s.rows >= last, "Teeth_") for s in shapes if "teeth" in row] + [(s, s.rows < last, "") for s in shapes]
+    shapes = [replace(s, name=add + s.name, rows=s.rows[i], displacements=s.displacements[i]) for s, i, add in parts]
+    write_glb(path, replace(mesh, vertices=shaped(mesh, row.get("rest", {})), shapes=tuple(shapes)))
+    if "table" in row:
+        find_table(path).write_text("control,source,gain,offset\n" + row["table"])
+    character = character_files.load_character(path)
+    weights = character.weights(motion(), units())
+    assert character.shapes.style == row["style"]
+    assert all(weights[name].max() > 0.1 for name in row["moves"])
+    assert not {*row.get("still", ())} & {*weights.names}
+    said = [str(each.message) for each in recwarn]
+    assert [bool(re.search(row.get("warns", "-"), each)) for each in said] == [True] * ("warns" in row)
 
 
 def test_both_sides_are_one_and_shapes_that_no_mouth_makes_or_of_the_other_side_are_named(tmp_path):
@@ -93,18 +138,10 @@ def test_other_files_and_folders_are_refused(tmp_path):
     refused(tmp_path, "4 vertices, required 5")
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("v 0 0 0\n", "no polygons"), ("v 0 0\nf 1 1 1\n", "no vertex of 3 numbers"),
-        ("v 0 0 nan\nf 1 1 1\n", "not finite"), ("v 0 0 zero\nf 1 1 1\n", "zero"),
-        (QUAD + "f 1 2 9\n", "names vertex 9 of 4 in line 12"), (QUAD + "f 0 1 2\n", "names vertex 0"),
-        (QUAD + "f 1 2\n", "2 corners"), (QUAD + "f one two three\n", "line 12"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("text", "message"), REPORTED["obj"])
 def test_damaged_files_are_refused(tmp_path, text, message):
     with pytest.raises(errors.InputError, match=message):
-        character_files.read_obj(_obj(tmp_path, text))
+        character_files.read_obj(_obj(tmp_path, text.replace("QUAD", QUAD)))
 
 
 def test_names_that_no_file_has_are_as_missing_ones(tmp_path):

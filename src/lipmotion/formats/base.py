@@ -26,7 +26,7 @@ from lipmotion.meshes.model.shape_names import is_known
 from lipmotion.storage.archive import UNREADABLE
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json
-from lipmotion.storage.sources import check_kind, check_regular
+from lipmotion.storage.sources import check_kind, check_regular, read_shipped_table
 from lipmotion.types import Generation, Motion, Timeline, Unit
 
 LOG = logging.getLogger("lipmotion")
@@ -87,30 +87,16 @@ class MotionFormat:
 MOTION_FORMATS: Registry[MotionFormat] = Registry(
     "motion format",
     "lipmotion.exporters",
-    {
-        "json": "lipmotion.formats.motion_document:JSON", "csv": "lipmotion.formats.tables:TABLE",
-        "npz": "lipmotion.formats.motion_document:NPZ", "livelink.csv": "lipmotion.formats.tables:LIVE_LINK",
-        "blender.py": "lipmotion.formats.game_engines:BLENDER", "c3d": "lipmotion.formats.c3d:MOTION_FORMAT",
-        "fap": "lipmotion.formats.fap:MOTION_FORMAT", "anim": "lipmotion.formats.game_engines:UNITY",
-        "tres": "lipmotion.formats.game_engines:GODOT", "vmd": "lipmotion.formats.vmd:MOTION_FORMAT",
-        "bvh": "lipmotion.formats.c3d:BVH", "a2f.json": "lipmotion.formats.motion_document:AUDIO2FACE",
-        "motion3.json": "lipmotion.formats.game_engines:LIVE2D",
-    },
-)  # fmt: skip
+    {row["suffix"]: row["place"] for row in read_shipped_table("lipmotion.formats", "motion_formats.csv")},
+)
 """Motion formats by suffix, without the first dot; a suffix may have several parts, as ``livelink.csv``."""
-_CUES = "lipmotion.formats.cues:read_cue_motion"
-_FRAMES = "lipmotion.formats.motion_document:read_frames"
 MOTION_READERS: Registry[Callable[[Path], tuple[Motion, Timeline[Unit]]]] = Registry(
     "motion reader",
     "lipmotion.motion_readers",
-    {**dict.fromkeys(("tsv", "xml", "dat", "pgo"), _CUES), "jsonl": _FRAMES},
+    {row["suffix"]: row["place"] for row in read_shipped_table("lipmotion.formats", "motion_readers.csv")},
 )
 """Readers of files that hold motion, but are not written as motion formats, by suffix as ``MOTION_FORMATS``."""
-OTHER_JSON = {
-    b'"lipmotion.motion"': ".json", b'"mouthCues"': ".tsv", b'"facsNames"': ".a2f.json", b'"weightMat"': ".a2f.json",
-    b"lendShapes": ".jsonl", b"lendshape": ".jsonl", b"ategory": ".jsonl", b'awOpen"': ".jsonl", b'"viseme":': ".tsv",
-    b'"visemes":': ".tsv",
-}  # fmt: skip
+OTHER_JSON = {row["mark"].encode(): row["suffix"] for row in read_shipped_table("lipmotion.formats", "json_marks.csv")}
 """What the beginnings of ``.json`` files hold, and the suffix of files that are read alike; the first counts."""
 JSON_HEAD = 1 << 16  # how many bytes of a ``.json`` are searched for them
 CUE_LINE = re.compile(

@@ -340,11 +340,11 @@ MILLIMETRES = 90.0  # the distance between the outer eye corners of a grown pers
 UNITS = {"mm": 1.0, "millimeter": 1.0, "cm": 10.0, "m": 1000.0, "meter": 1000.0, "in": 25.4, "inch": 25.4}
 UNITS |= {"millimetre": 1.0, "centimeter": 10.0, "centimetre": 10.0, "metre": 1000.0, "inche": 25.4}
 """Units of length in millimetres, without the ``s`` of several."""
+MAX_BEHIND = 0.15  # eye distances that the markers of a face are behind the corners of the eyes on the mean
 SMALLEST_FACE = 0.2  # eye distances that the markers of a face lie apart at least
-LEFT_EYE = frozenset(("eyel", "leye", "lefteye", "eyeleft", "exl", "lex", "leyeouter", "eyelouter", "lefteyeouter"))
-"""Names of a marker at the outer corner of the speaker's left eye: without capitals, spaces and underscores."""
-RIGHT_EYE = frozenset(("eyer", "reye", "righteye", "eyeright", "exr", "rex", "reyeouter", "eyerouter", "righteyeouter"))
-RIGID = ("forehead", "head", "nasion", "nosebridge", "glabella", "temple", "ear", "mastoid", "fhd", "lfhd", "rfhd")
+OUTER_EYES = [re.compile(rf"(eye({s[0]}|{s})|({s[0]}|{s})eye|ex{s[0]}|{s[0]}ex)(outer)?") for s in ("left", "right")]
+"""Names of markers at the outer corners of the speaker's eyes: without capitals, spaces and underscores."""
+RIGID = re.compile("(left|right|.)?(forehead|head|nasion|nosebridge|glabella|temple|ear|mastoid|[lr]?fhd)")
 """Beginnings of names, after a side, of other markers that do not move against the skull."""
 MIN_RIGID_MARKERS = 3
 LARGEST_COORDINATE = 1e6
@@ -384,7 +384,7 @@ def to_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
         raise InputError(f"its unit of length is {unit[:20]!r}, required mm, cm, m or inch")
     if max(float(np.abs(places).max()) for places in markers.values()) > LARGEST_COORDINATE:
         raise InputError(f"a marker is further than {LARGEST_COORDINATE:g} {unit} away; export the capture again")
-    left, right = (next((name for name in markers if _clean(name) in names), "") for names in (LEFT_EYE, RIGHT_EYE))
+    left, right = (next((name for name in markers if each.fullmatch(_clean(name))), "") for each in OUTER_EYES)
     if not (left and right):
         size = float(np.ptp([places.mean(axis=0) for places in markers.values()], axis=0).max()) * millimetres
         if len(markers) > 1 and size < SMALLEST_FACE * MILLIMETRES:
@@ -392,12 +392,7 @@ def to_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
             raise InputError(f"the markers lie at most {size:.2g} mm apart, {required}")
         LOG.warning("no markers EYE_L and EYE_R: required a still head, x to its left, y up, z out, of grown people")
         return {name: places * millimetres / MILLIMETRES for name, places in markers.items()}
-    rigid = [left, right]
-    for name in markers:
-        plain = _clean(name)
-        beginnings = (plain.removeprefix("left").removeprefix("right"), plain[1:])
-        if name not in rigid and any(each.startswith(RIGID) for each in beginnings):
-            rigid.append(name)
+    rigid = [left, right, *(name for name in markers if name not in {left, right} and RIGID.match(_clean(name)))]
     moving = [name for name in markers if name not in rigid]
     if not moving:
         raise InputError(f"all markers are those of the head ({', '.join(rigid[:6])}), required markers of the mouth")
@@ -416,6 +411,10 @@ def to_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
     _, y, z = turned[:, len(rigid) :].mean(axis=(0, 1))  # about x by quarters, so that the mouth is below the eyes
     cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[round(float(np.arctan2(z, -y) / (np.pi / 2))) % 4]
     turned = turned @ np.array([[1.0, 0, 0], [0, cosine, -sine], [0, sine, cosine]]).T
+    behind = -float(turned[:, len(rigid) :, 2].mean())
+    if behind > MAX_BEHIND:
+        what = f"the markers are {behind:.2f} eye distances behind the eyes, required in front of them: are its axes"
+        LOG.warning("%s left-handed, or %s and %s exchanged? Export it with right-handed axes", what, left, right)
     return {name: turned[:, len(rigid) + column] for column, name in enumerate(moving)}
 
 

@@ -35,7 +35,7 @@ from lipmotion.articulation.mouth import find_mouth
 from lipmotion.errors import ExportError
 from lipmotion.extensions import find_version
 from lipmotion.formats.base import MotionFormat, list_key_frames
-from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
+from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, arkit_weights
 from lipmotion.storage.files import atomic_file, check_target
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import WEIGHT, Generation, Motion
@@ -160,11 +160,8 @@ def write_live2d(path: Path, generation: Generation, _source: Mapping[str, str],
 
 def measure_mouth_open(generation: Generation) -> Array:
     """Return how far the mouth is open, 0 to 1 [shape=(T,)]; 0 where the lips touch."""
-    motion = generation.motion
-    if "opening" in motion.names:
-        gap = find_mouth(motion, generation.units).gap
-    else:
-        gap = _sum_effects(motion, arkit_mouth().gap)
+    motion, measured = generation.motion, "opening" in generation.motion.names
+    gap = find_mouth(motion, generation.units).gap if measured else _sum_effects(motion, arkit_mouth().gap)
     return np.clip(gap / FULL_GAP, 0.0, 1.0)
 
 
@@ -182,8 +179,8 @@ def measure_mouth_form(generation: Generation) -> Array:
 
 def _sum_effects(motion: Motion, effects: Array) -> Array:
     """Return the sum of the effects of blendshapes by their weights [shape=(T,)]."""
-    known = zip(arkit_mouth().known, effects, strict=True)
-    return sum((effect * motion[name] for name, effect in known if name in motion.names), np.zeros(len(motion.values)))
+    known, weights = zip(arkit_mouth().known, effects, strict=True), arkit_weights(motion)
+    return sum((effect * weights[name] for name, effect in known if name in weights), np.zeros(len(motion.values)))
 
 
 LIVE2D = MotionFormat(write_live2d, needs=SHOWING, min_frames=2, mouth=True)

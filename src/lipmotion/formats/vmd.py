@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lipmotion.errors import InputError
-from lipmotion.formats.base import MotionFormat, list_key_frames
+from lipmotion.errors import InputError, shorten_list
+from lipmotion.formats.base import LOG, MotionFormat, list_key_frames
 from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, gaze_to_weights, weights_to_gaze
 from lipmotion.meshes.model.mesh import ANGLES, find_head_angles, turn_head
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_VOWELS, find_vowel, to_arkit
@@ -91,6 +91,9 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
         named = ", ".join([*morphs][:8]) or "none"
         what = f"the motion has none of the morphs あ い う え お; its morphs are: {named}; it moves {len(bones)} bones"
         raise InputError(f"{what} and has {camera} keys of a camera; save the motion of the face")
+    unread = [morph for morph, keys in morphs.items() if not _find_channels(morph) and any(value for _, value in keys)]
+    if unread:
+        LOG.warning("%s: %d morphs that move are not known: %s", path, len(unread), shorten_list(unread, 8))
     frames = np.arange(max(keys[-1][0] for keys in (*morphs.values(), *bones.values())) + 1)
     curves: dict[str, tuple[np.ndarray, str]] = {}
     for morph, keys in sorted(morphs.items(), key=lambda each: each[0] not in MORPHS):

@@ -32,7 +32,7 @@ from lipmotion.storage.schema import ArraySpec, check_arrays, format_errors
 from lipmotion.storage.sources import check_source
 from lipmotion.storage.text_table import read_whole_table
 from lipmotion.types import Motion, Timeline, Unit
-from lipmotion.types.values import parse_whole
+from lipmotion.types.values import parse_number, parse_whole
 from lipmotion_faces.characters.file_limits import MAX_VERTICES
 from lipmotion_faces.characters.surface import MeshSurface
 
@@ -170,7 +170,8 @@ def paint_weights(binding: ControlBinding, mesh: Mesh, paint: Mapping[int, Mappi
     paint : for each vertex the weight of each point, 0 to 1; weights that add up to more than 1 are scaled down to 1
     Raises InputError: no such vertex or point, a weight out of its range, or too many points on a vertex.
     """
-    weights = np.zeros((len(mesh.vertices), len(binding.placement.points)))
+    points = binding.placement.points
+    weights = np.zeros((len(mesh.vertices), len(points)))
     weights[binding.rows] = binding.matrix.toarray()
     for vertex, painted in paint.items():
         if not 0 <= vertex < len(mesh.vertices):
@@ -179,10 +180,8 @@ def paint_weights(binding: ControlBinding, mesh: Mesh, paint: Mapping[int, Mappi
             raise InputError(f"the vertex {vertex} follows {len(painted)} points, required at most {MAX_WEIGHTS}")
         weights[vertex] = 0.0
         for point, value in painted.items():
-            if point not in binding.placement.points:
-                raise InputError(
-                    f"{point} is no control point, required one of {', '.join(map(str, binding.placement.points))}"
-                )
+            if point not in points:
+                raise InputError(f"{point} is no control point, required one of {', '.join(map(str, points))}")
             if not 0 <= value <= 1:
                 raise InputError(f"the weight of point {point} on vertex {vertex} is {value:g}, required 0 to 1")
             weights[vertex, binding.placement.row(point)] = value
@@ -265,10 +264,7 @@ def read_weights(path: Path) -> dict[int, dict[int, float]]:
         weights = paint.setdefault(vertex, {})
         if point in weights:
             raise InputError(f"{path}: line {number}: vertex {vertex} and point {point} occur twice; remove one")
-        try:
-            weights[point] = float(row[2])
-        except ValueError as error:
-            raise InputError(f"{path}: line {number}: {shorten(row[2])!r} is no number") from error
+        weights[point] = parse_number(row[2], f"{path}: line {number}: the weight is", finite=False)
     return paint
 
 
@@ -276,9 +272,8 @@ def write_points(path: Path, placement: LipPlacement) -> None:
     """Write the vertex of each lip and jaw point, ``point,vertex``. Raises ExportError: it cannot be written."""
     with atomic_file(path) as unfinished, unfinished.open("w", encoding="ascii", newline="\n") as file:
         file.write(",".join(POINT_COLUMNS) + "\n")
-        file.writelines(
-            f"{point},{vertex}\n" for point, vertex in zip(placement.points, placement.vertices, strict=True)
-        )
+        rows = zip(placement.points, placement.vertices, strict=True)
+        file.writelines(f"{point},{vertex}\n" for point, vertex in rows)
 
 
 def read_lip_points(path: Path) -> dict[int, int]:
@@ -417,9 +412,9 @@ class PosedCharacter(DrivenCharacter):
 
     @cached_property
     def _mouth_names(self) -> tuple[str, ...]:
-        if self.shapes is None:
-            return ()
-        return tuple(dict.fromkeys(row.control for row in self.mouth_rows[0])) if self.table else self.shapes.names
+        if self.shapes is None or not (self.table or self.twins):
+            return self.shapes.names if self.shapes else ()
+        return tuple(dict.fromkeys(row.control for row in self.mouth_rows[0]))
 
     @cached_property
     def _other_names(self) -> tuple[str, ...]:

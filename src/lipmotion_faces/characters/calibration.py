@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -113,9 +114,8 @@ def list_pose_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) ->
     Raises InputError: the character has no blendshapes of the mouth, or a row follows no curve.
     """
     edges = PAUSE_S + PHONE_S * np.arange(len(PHONES) + 1)
-    spans = [Span(0.0, PAUSE_S, Unit("sil"))]
-    spans += [Span(float(at), float(at + PHONE_S), Unit(phone)) for at, phone in zip(edges, PHONES, strict=False)]
-    spans.append(Span(float(edges[-1]), float(edges[-1] + PAUSE_S), Unit("sil")))
+    phones = pairwise([0.0, *edges.tolist(), float(edges[-1] + PAUSE_S)])
+    spans = [Span(*times, Unit(phone)) for times, phone in zip(phones, ("sil", *PHONES, "sil"), strict=True)]
     time_s = np.arange(round((edges[-1] + PAUSE_S) * RATE_HZ)) / RATE_HZ
     inside = [at + share * PHONE_S for at in edges[:-1] for share in (0.3, 0.7)]
     keys = [0.0, float(edges[0]), *inside, float(edges[-1]), float(time_s[-1])]

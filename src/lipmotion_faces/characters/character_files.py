@@ -12,13 +12,21 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shorten
-from lipmotion.meshes.model.face_shapes import FaceShapes, LipPlacement, group_by_name, measure_lip_parting
+from lipmotion.articulation.lip_points import LOWER_MIDDLE, UPPER_MIDDLE
+from lipmotion.errors import InputError, shorten, shorten_list
+from lipmotion.meshes.model.face_shapes import (
+    FaceShapes,
+    LipPlacement,
+    find_life_scale,
+    group_by_name,
+    measure_lip_parting,
+)
 from lipmotion.meshes.model.mesh import JAW, MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart, Texture
 from lipmotion.meshes.model.rig_tables import RigRow, find_table, read_rig_table, suggest_names
 from lipmotion.meshes.model.shape_names import (
     ARKIT_52,
     ARKIT_MOUTH,
+    ARKIT_OTHERS,
     CLOSED,
     VISEMES_15,
     VRM_EMOTIONS,
@@ -56,6 +64,8 @@ NEUTRAL = "neutral"
 MIN_SHARE = 1e-5
 """Vertices that a blendshape moves by less than this share of the size of the mesh are not stored: OBJ files of one
 head are written with rounded numbers."""
+MAX_STRETCH = 2.0  # so many times longer or shorter no expression makes the mean edge of a mesh
+MIN_STILL = 0.2  # a blendshape whose shift this share of the vertices has alike is moved back
 LARGEST_NUMBER = 1e9
 LARGEST_LIBRARY_BYTES = 1 << 20
 MAX_CORNERS = 1000  # most corners of a polygon
@@ -176,7 +186,8 @@ def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True
     budget = Budget()
     budget.spend("blendshapes", len(others))
     smallest = MIN_SHARE * float(np.ptp(mesh.vertices, axis=0).max())
-    shapes = []
+    edges, shapes, aside = mesh.triangles[:, :2], [], list[str]()
+    length = np.linalg.norm(np.diff(mesh.vertices[edges], axis=1), axis=2).mean()
     for path in others:
         read, places = Budget(), array("d")  # its vertices, without reading its polygons
         try:
@@ -191,8 +202,20 @@ def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True
                 f"{path}: {len(vertices)} vertices, required {len(mesh.vertices)} as in {neutral[0].name}; "
                 "move other meshes to another folder"
             )
+        stretch = float(np.linalg.norm(np.diff(vertices[edges], axis=1), axis=2).mean() / length)
+        if not 1 / MAX_STRETCH < stretch < MAX_STRETCH:
+            what = f"its edges are {stretch:.3g} times as long as in {neutral[0].name}, required about 1"
+            raise InputError(f"{path}: {what}: another unit, or order of vertices? export both alike")
+        change = np.median(vertices - mesh.vertices, axis=0)
+        still = np.abs(vertices - mesh.vertices - change).max(axis=1) <= smallest
+        if np.abs(change).max() > smallest and still.mean() > MIN_STILL:
+            vertices -= change
+            aside.append(path.stem)
         shapes.append(Blendshape.between(path.stem, mesh.vertices, vertices, smallest=smallest))
         budget.spend("displacements", len(shapes[-1].rows))
+    if aside:
+        what = f"{folder}: {len(aside)} meshes stand aside of {neutral[0].name} and are moved to it"
+        warnings.warn(f"{what}: {shorten_list(aside, 4)}", stacklevel=2)
     return replace(mesh, shapes=tuple(shapes))
 
 
@@ -329,26 +352,30 @@ def read_character(path: str | Path) -> Mesh:
 
 JAW_OPEN = "jawOpen"
 WIDEST_RAD = np.radians(22.0)  # how far a jaw turns at weight 1
+MIN_JAW_SHARE = 0.15  # a blendshape that moves less than this share of what the turn does leaves the jaw to its bone
 
 
 def with_jaw(mesh: Mesh) -> Mesh:
     """Return a mesh whose mouth opens: one with a jaw bone gets the blendshape ``jawOpen``, where it has none.
 
     The blendshape is the movement of the jaw's vertices as the bone turns about the axis from ear to ear, on a straight
-    way. A mesh that has a blendshape that opens the mouth, or no jaw bone, is returned as it is.
+    way. It also takes the place of one that hardly moves, as Character Creator's ``Jaw_Open``, which opens the mouth
+    together with the bone. Other meshes, and those without a jaw bone, are returned as they are.
     """
     bone = next((bone for bone in mesh.bones if bone.kind == JAW), None)
     if bone is None:
         return mesh
+    away = mesh.vertices[bone.rows] - bone.place
+    cosine, sine = np.cos(WIDEST_RAD), np.sin(WIDEST_RAD)
+    turned = away @ np.array([[1, 0, 0], [0, cosine, sine], [0, -sine, cosine]])
+    name = f"{JAW_OPEN}.001" if JAW_OPEN in mesh.shape_names else JAW_OPEN  # one that no animation of the file moves
+    shape = Blendshape(name, bone.rows, bone.shares[:, None] * (turned - away))
     try:
-        find_opening_shape(mesh)
+        if np.ptp(find_opening_shape(mesh).displacements) > MIN_JAW_SHARE * np.ptp(shape.displacements):
+            return mesh
     except InputError:
-        away = mesh.vertices[bone.rows] - bone.place
-        cosine, sine = np.cos(WIDEST_RAD), np.sin(WIDEST_RAD)
-        turned = away @ np.array([[1, 0, 0], [0, cosine, sine], [0, -sine, cosine]])
-        shape = Blendshape(JAW_OPEN, bone.rows, bone.shares[:, None] * (turned - away))
-        return replace(mesh, shapes=(*(each for each in mesh.shapes if each.name != JAW_OPEN), shape))
-    return mesh
+        pass
+    return replace(mesh, shapes=(*(each for each in mesh.shapes if to_arkit(each.name) != JAW_OPEN), shape))
 
 
 def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
@@ -419,6 +446,7 @@ MAX_DISPLACEMENT = 2.5  # eye distances by which a known blendshape of the mouth
 MIRRORED = 0.1  # eye distances that blendshapes of the left move places right of those of the right, together
 MIN_DISPLACEMENT = 0.02  # a blendshape that moves no lip point by this many eye distances is none of the mouth
 MAX_SHAPES = 200
+MAX_REST_GAP, MIN_OPENING_GAP = 0.05, 0.08  # eye distances: of lips at rest, and at weight 1 of what opens them most
 
 
 def find_face_shapes(mesh: Mesh, placement: LipPlacement) -> FaceShapes:
@@ -453,6 +481,18 @@ def find_face_shapes(mesh: Mesh, placement: LipPlacement) -> FaceShapes:
         )
     names = tuple(mesh.shape_names[numbers[0]] for _, numbers in shapes)
     gap = measure_lip_parting(mesh, placement)
+    upper, lower = (mesh.vertices[placement.vertices[placement.row(point)]] for point in (UPPER_MIDDLE, LOWER_MIDDLE))
+    apart = float((upper - lower) @ placement.axes[:, 1] / find_life_scale(mesh, placement))
+    if apart > MAX_REST_GAP:
+        what = f"the lips of the mesh are {apart:.2f} eye distances apart at rest, required up to {MAX_REST_GAP}:"
+        warnings.warn(f"{what} m, b and p stay open. Export it with a closed mouth", stacklevel=2)
+    opening = [numbers for known, numbers in shapes if known in {JAW_OPEN, "viseme_aa", "vowel_aa"}]
+    widest = max((float(gap[numbers].sum()) for numbers in opening), default=1.0)
+    if widest < MIN_OPENING_GAP:
+        what = f"the blendshape that opens the lips parts them by {widest:.2f} eye distances,"
+        warnings.warn(
+            f"{what} required {MIN_OPENING_GAP}: does a bone turn the jaw? Export its turn with it", stacklevel=2
+        )
     return FaceShapes(
         names,
         tuple(known for known, _ in shapes),
@@ -478,7 +518,7 @@ def _choose_mouth(mesh: Mesh, strong: NDArray[np.bool_]) -> tuple[list[tuple[str
         )
     if stated:
         return [(known, spoken[known]) for known in stated], "visemes"
-    if strong[jaw].any() and len(arkit) > 5:
+    if strong[jaw].any() and len(arkit) > 5 and arkit.keys() & {"mouthPucker", "mouthFunnel"}:
         return list(arkit.items()), "arkit"
     for kind, enough in (("viseme_", 8), ("vowel_", 3)):
         those = {
@@ -486,10 +526,19 @@ def _choose_mouth(mesh: Mesh, strong: NDArray[np.bool_]) -> tuple[list[tuple[str
             for known, numbers in spoken.items()
             if known.startswith(kind) and (strong[numbers].any() or known == "viseme_PP")
         }
-        if len(those) >= enough:
+        if len(those) >= enough and f"{kind}aa" in those:
             return list(those.items()), "visemes"
     moving = [(known, numbers) for known, numbers in arkit.items() if strong[numbers].any()]
     named = {number for _, numbers in moving for number in numbers}
-    others = [number for number in np.flatnonzero(strong).tolist() if mesh.shapes[number].called]
-    moving += [("", [number]) for number in others if number not in named]
+    unknown = []
+    for number in np.flatnonzero(strong).tolist():
+        name = mesh.shapes[number].called
+        if name and number not in named and {to_arkit(name), name.lower()}.isdisjoint({*ARKIT_OTHERS, *VRM_EMOTIONS}):
+            moving.append(("", [number]))
+            if not is_known(name) and mesh.shapes[number].source is None:
+                unknown.append(name)
+    if unknown:
+        what = f"{len(unknown)} blendshapes of unknown names move with speech as they fit: {shorten_list(unknown, 8)}."
+        do = "Empty the source of those that should not, in its table (lipmotion character FILE --write-table)"
+        warnings.warn(f"{what} {do}", stacklevel=3)
     return sorted(moving, key=lambda each: each[1]), "own"

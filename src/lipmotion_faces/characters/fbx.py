@@ -9,6 +9,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from importlib import resources
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -16,26 +17,8 @@ from lipmotion.errors import ExportError, MissingDependencyError
 from lipmotion.storage.files import atomic_file
 
 LONGEST_S = 1800  # half an hour is far more than an hour of speech takes
-SCRIPT = """
-import os, sys
-import bpy
-source, target, rate = sys.argv[-3:]
-bpy.ops.wm.read_factory_settings(use_empty=True)
-scene = bpy.context.scene
-scene.render.fps = int(rate)
-bpy.ops.import_scene.gltf(filepath=source)
-ends = [action.frame_range[1] for action in bpy.data.actions]
-scene.frame_start, scene.frame_end = 0, int(max(ends, default=0))
-bpy.ops.export_scene.fbx(
-    filepath=target,
-    bake_anim_use_all_actions=False,  # what is seen, as one animation
-    bake_anim_use_nla_strips=False,
-    bake_anim_simplify_factor=0,
-    add_leaf_bones=False,
-)
-sys.stdout.flush()
-os._exit(0)  # Blender as a Python module may crash when it is unloaded
-"""
+SCRIPT = resources.files(__package__).joinpath("fbx_script.txt").read_text(encoding="ascii")
+"""What Blender runs with three arguments: the ``.glb``, the ``.fbx``, and the frames a second."""
 
 
 def find_blender() -> list[str]:

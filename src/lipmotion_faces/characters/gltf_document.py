@@ -19,6 +19,7 @@ from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.model.mesh import HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types.values import (
     Schema,
     SchemaError,
@@ -36,7 +37,6 @@ from lipmotion_faces.characters.file_limits import ALLOWANCE, Budget
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-COMPRESSIONS = {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"}
 LARGEST_NUMBER = 1e9  # largest plausible number of a file: a place, a factor
 MAX_GROUPS = 8  # most groups of four joints a vertex
 _LISTS = (
@@ -49,8 +49,6 @@ _WORD = text(1000)
 _SIZE = whole(0, _LARGEST_INTEGER)
 _NUMBER = number(-LARGEST_NUMBER, LARGEST_NUMBER)
 ASSET = members({"asset": members({"version": text(20)}, ["version"])}, ["asset"])  # what a document of any version has
-
-
 _ANY_NUMBER = whole(-_LARGEST_INTEGER, _LARGEST_INTEGER)
 _OLD_BIND = {"mesh": _ANY_NUMBER, "index": _ANY_NUMBER, "weight": _NUMBER}
 _OLD_BINDS = items(if_fits(members(_OLD_BIND, list(_OLD_BIND))))
@@ -163,13 +161,9 @@ MAGIC, VERSION = b"glTF", 2
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 MAX_CHUNKS = 100
 LONGEST_NAME_CHARACTERS = 1000
-READABLE = {
-    *("KHR_mesh_quantization", "KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "KHR_texture_transform"),
-    *("KHR_materials_unlit", "KHR_lights_punctual", "VRM", "VRMC_vrm", "VRMC_springBone", "VRMC_node_constraint"),
-    *("VRMC_materials_mtoon", "KHR_xmp_json_ld", "KHR_animation_pointer", "VRMC_vrm_animation"),
-}
-"""Extensions that a file may require: they are read, or change nothing about the surface. All of the materials'
-extensions are accepted as well."""
+_EXTENSIONS = read_shipped_table("lipmotion_faces.characters", "gltf_extensions.csv")
+EXTENSIONS = {row["extension"]: row["is"] for row in _EXTENSIONS}
+"""Those that a file may require are readable: they are read, or change nothing about the surface, as the materials'."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,9 +223,9 @@ def read_gltf_document(path: Path) -> GltfDocument:
     except SchemaError as error:
         raise InputError(f"{error}; export it again") from error
     for name in document.parts.get("extensionsRequired", []):
-        if name in COMPRESSIONS:
+        if EXTENSIONS.get(name) == "compressed":
             raise InputError(f"it is compressed ({name}), which is not read; export it without compression")
-        if name not in READABLE and not name.startswith("KHR_materials_"):
+        if name not in EXTENSIONS and not name.startswith("KHR_materials_"):
             raise InputError(f"it requires the extension {shorten(name)!r}, which is not read; export without it")
     for index, buffer in enumerate(document.get("buffers")):
         if "uri" in buffer:
@@ -360,7 +354,7 @@ class GltfArrays:
         if offset + length > len(buffer):
             raise InputError(
                 f"it refers to bytes {offset} to {offset + length} of buffer {number} with {len(buffer)} bytes; "
-                "copy it again, with its buffers"
+                "copy it again, with its buffers; or export it without compression"
             )
         return buffer[offset : offset + length], view.get("byteStride", 0)
 
@@ -379,6 +373,8 @@ class PlacedNode:
 
 def place_nodes(document: GltfDocument) -> dict[int, PlacedNode]:
     """Return the nodes of the scene, or all roots', by number. Raises InputError: one is twice, too deep, too far."""
+    from scipy.spatial.transform import Rotation
+
     nodes, scenes = document.get("nodes"), document.get("scenes")
     if scenes:
         roots = scenes[document.parts.get("scene", 0)].get("nodes", [])
@@ -395,13 +391,9 @@ def place_nodes(document: GltfDocument) -> dict[int, PlacedNode]:
         if "matrix" in node:
             local = np.array(node["matrix"]).reshape(4, 4).T
         else:
-            x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
-            rotation = [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-            ]
-            local[:3, :3] = np.array(rotation) * node.get("scale", (1.0, 1.0, 1.0))
+            if any(node.get("rotation", ())):
+                local[:3, :3] = Rotation.from_quat(node["rotation"]).as_matrix()
+            local[:3, :3] *= node.get("scale", (1.0, 1.0, 1.0))
             local[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
         matrix = parent.matrix @ local
         if not np.abs(matrix).max() <= LARGEST_NUMBER:

@@ -45,6 +45,7 @@ MIN_DISPLACEMENT = 1e-9
 PRESETS = {"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh", "joy": "happy", "sorrow": "sad", "fun": "relaxed"}
 """Names of presets of VRM 0.x in the words of VRM 1.0; all others are the same in both."""
 FULL_WEIGHT = 100.0  # weights of VRM 0.x are per cent
+AT_REST = {"basis", "base", "neutral", "default"}  # names of the mesh itself, which Blender and others list first
 Bind = tuple[int, int, float]  # a mesh of the document, one of its morph targets, and the weight of it
 
 
@@ -418,6 +419,11 @@ def name_targets(document: GltfDocument, mesh: Mapping[str, Any], primitive: Map
     arrays = [accessors[target["POSITION"]].get("name", "") if "POSITION" in target else "" for target in targets]
     holders = [holder.get("extras", {}).get("targetNames", []) for holder in (mesh, primitive)]
     stored: list[str] = next((names for names in (*holders, arrays) if any(names)), [])
+    if len(stored) == len(targets) + 1 and stored[0].lower() in AT_REST:
+        stored = stored[1:]
+    elif len(stored) > len(targets) > 0:
+        what = f"{len(stored)} names of {len(targets)} blendshapes, required as many: the first ones are taken"
+        warnings.warn(f"{what}; export the names again", stacklevel=2)
     names: list[str] = []
     for number in range(len(targets)):
         name = clean_name(stored[number]) if number < len(stored) else ""

@@ -182,13 +182,9 @@ def _add_primitive(
     if mesh.colours is not None:
         attributes["COLOR_0"] = buffer.add(decode_srgb(mesh.colours[rows]), "VEC3", target=VERTICES)
     if scene.turn is not None:
-        share = scene.turn.share[rows]
-        joints = np.zeros((len(share), 4), np.uint8)
-        joints[:, 1] = share > 0
-        weights = np.zeros((len(share), 4))
-        weights[:, 1] = share.astype("<f4")
-        weights[:, 0] = 1 - weights[:, 1]
-        joints[weights == 0] = 0
+        share = scene.turn.share[rows].astype("<f4").astype(np.float64)
+        weights = np.pad(np.stack([1 - share, share], axis=1), ((0, 0), (0, 2)))
+        joints = (weights > 0).astype(np.uint8) * np.array([0, 1, 0, 0], np.uint8)
         number = buffer.add(joints.view("<u4").reshape(-1), "VEC4", target=VERTICES)  # four bytes each
         buffer.accessors[number] |= {"componentType": UNSIGNED_BYTE, "count": len(joints)}
         attributes |= {"JOINTS_0": number, "WEIGHTS_0": buffer.add(weights, "VEC4", target=VERTICES)}

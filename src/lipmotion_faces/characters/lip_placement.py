@@ -161,9 +161,9 @@ def find_opening_shape(mesh: Mesh) -> Blendshape:
         lambda name: "open" in name.lower() and ("mouth" in name.lower() or "jaw" in name.lower()),
     )
     for test in tests:
-        shape = next((shape for shape in mesh.shapes if len(shape.rows) and test(shape.called)), None)
-        if shape is not None:
-            return shape
+        opening = [shape for shape in mesh.shapes if len(shape.rows) and test(shape.called)]
+        if opening:  # of teeth and face that of the face
+            return max(opening, key=lambda shape: len(shape.rows))
     names = shorten(", ".join(mesh.shape_names)) or "none"
     raise InputError(
         f"no blendshape opens the mouth, required jawOpen, viseme_aa or aa; the mesh has: {names}. Say which one "

@@ -57,11 +57,7 @@ def build_surface(mesh: Mesh, split: NDArray[np.bool_] | None = None) -> MeshSur
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
-    corners = mesh.vertices[mesh.triangles]
-    faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # weighted by their areas
-    each = mesh.triangles.reshape(-1)
-    sums = [np.bincount(each, np.repeat(faces[:, axis], 3), len(mesh.vertices)) for axis in range(3)]
-    normals: NDArray[np.float64] = np.stack(sums, axis=1)
+    normals = sum_normals(mesh.vertices, mesh.triangles)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals / np.where(lengths > 0, lengths, 1.0)
     places = _number_places(mesh, normals)
@@ -72,8 +68,7 @@ def build_surface(mesh: Mesh, split: NDArray[np.bool_] | None = None) -> MeshSur
     count = int(places.max(initial=-1)) + 1
     low, high = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).T
     pairs = np.stack(np.divmod(np.unique((low * count + high)[low != high]), max(count, 1)), axis=1)
-    first = np.zeros(count, np.int64)
-    first[places[::-1]] = np.arange(len(places))[::-1]
+    first = np.unique(places, return_index=True)[1]
     along = np.linalg.norm(mesh.vertices[first[pairs[:, 0]]] - mesh.vertices[first[pairs[:, 1]]], axis=1)
     along = np.maximum(along, 1e-12)  # an edge of length 0 would be none
     edges = csr_array((along, (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
@@ -105,8 +100,7 @@ def _number_places(mesh: Mesh, normals: NDArray[np.float64]) -> Rows:
         _, together = np.unique(together * (int(ranks.max(initial=0)) + 1) + ranks.reshape(-1), return_inverse=True)
         together = together.reshape(-1)
     # of the vertices of one place, those that face apart from the first one are another place
-    first = np.full(int(together.max(initial=-1)) + 1, -1, np.int64)
-    first[together[::-1]] = np.arange(len(together))[::-1]
+    first = np.unique(together, return_index=True)[1]
     apart = np.einsum("ij,ij->i", normals, normals[first[together]]) < SAME_SIDE_COSINE
     _, places = np.unique(2 * together + apart, return_inverse=True)
     return places.reshape(-1).astype(np.int64)
@@ -121,11 +115,9 @@ def drop_back_sides(mesh: Mesh) -> Mesh:
     corners = mesh.triangles.astype(np.int64)
     low, middle, high = np.sort(corners, axis=1).T
     _, of_pair = np.unique(low * len(mesh.vertices) + middle, return_inverse=True)
-    _, same = np.unique(of_pair.reshape(-1) * len(mesh.vertices) + high, return_inverse=True)
-    same = same.reshape(-1)
-    first = np.full(int(same.max(initial=-1)) + 1, -1, np.int64)
-    first[same[::-1]] = np.arange(len(corners))[::-1]
-    partner = first[same]
+    numbers = of_pair.reshape(-1) * len(mesh.vertices) + high
+    _, first, same = np.unique(numbers, return_index=True, return_inverse=True)
+    partner = first[same.reshape(-1)]
     turned = (corners[:, 0] > corners[:, 1]) ^ (corners[:, 1] > corners[:, 2]) ^ (corners[:, 0] > corners[:, 2])
     back = turned != turned[partner]
     dropped = np.zeros(len(corners), bool)

@@ -96,18 +96,11 @@ def reduce_textures(textures: Sequence[Texture]) -> TextureTable:
 def _halve(image: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return a picture of half the height and width, at least 1 [shape=(max(H // 2, 1), max(W // 2, 1), 4)]."""
     height, width = (max(size // 2, 1) for size in image.shape[:2])
-    weighted = image.copy()
-    weighted[..., :3] *= image[..., 3:]
-    total, plain = np.zeros((height, width, 4), np.float32), np.zeros((height, width, 3), np.float32)
-    for row in range(min(2, image.shape[0])):
-        for column in range(min(2, image.shape[1])):
-            window = slice(row, row + 2 * height - 1, 2), slice(column, column + 2 * width - 1, 2)
-            total += weighted[window]
-            plain += image[window][..., :3]
-    parts = min(2, image.shape[0]) * min(2, image.shape[1])
-    alpha = total[..., 3:] / parts
-    colour = np.where(alpha > 0, total[..., :3] / np.maximum(total[..., 3:], 1e-6), plain / parts)
-    return np.concatenate([np.minimum(colour, 1), alpha], axis=2)
+    blocks = image[: 2 * height, : 2 * width].reshape(height, -1, width, min(2, image.shape[1]), 4)
+    plain, alpha = blocks.mean(axis=(1, 3)), blocks[..., 3:].sum(axis=(1, 3))
+    total = (blocks[..., :3] * blocks[..., 3:]).sum(axis=(1, 3))
+    plain[..., :3] = np.where(alpha > 0, np.minimum(total / np.maximum(alpha, 1e-6), 1), plain[..., :3])
+    return plain
 
 
 def decode_srgb(colour: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:

@@ -90,23 +90,18 @@ def write_scene(path: Path, scene: Scene, sound: Path | None = None) -> None:
     A ``.glb`` of a character from a ``.glb`` or ``.vrm`` is that file with one animation more, where that is possible.
     Raises ExportError: the file cannot be written. Raises MissingDependencyError: an ``.fbx``, and no Blender.
     """
-    if path.suffix.lower() == FBX:
-        rate_hz = FBX_RATE_HZ if scene.weights is None else min(round(scene.weights.rate_hz), FBX_RATE_HZ)
+    suffix, original, weights = path.suffix.lower(), scene.original, scene.weights
+    if suffix == FBX:
+        rate_hz = FBX_RATE_HZ if weights is None else min(round(weights.rate_hz), FBX_RATE_HZ)
         with tempfile.TemporaryDirectory() as folder:
             write_scene(Path(folder) / "scene.glb", scene)
             convert_to_fbx(Path(folder) / "scene.glb", path, rate_hz)
         return
     with_sound = replace(scene, sound="" if sound is None else sound_reference(sound, path))
-    original, weights = scene.original, scene.weights
-    if path.suffix.lower() == USD:
+    if suffix == USD:
         write_usda(path, with_sound)
         return
-    if (
-        weights is not None
-        and path.suffix.lower() == GLTF
-        and original
-        and original.suffix.lower() in ANIMATED_SUFFIXES
-    ):
+    if suffix == GLTF and weights is not None and original and original.suffix.lower() in ANIMATED_SUFFIXES:
         write = partial(write_animated_gltf, sound_s=scene.sound_s, stepped=scene.stepped, thinning=scene.thinning)
         if write(path, original, weights, with_sound.sound):
             return

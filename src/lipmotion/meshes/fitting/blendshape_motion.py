@@ -193,14 +193,14 @@ def arkit_weights(motion: Motion) -> dict[str, Array]:
     """Return the curves of a motion that are blendshapes, by ARKit's names, 0 to 1 [each shape=(T,)].
 
     Names are known in the spellings of files; of two spellings of one, the first. Blendshapes of other sets are
-    converted (``convert_to_arkit``).
+    converted (``convert_to_arkit``) where no ``jawOpen`` moves: some programs write it beside them as 0.
     """
     weights: dict[str, Array] = {}
     for name in motion.names:
         known = to_arkit(name)
         if known is not None:
             weights.setdefault(known, np.clip(motion[name].astype(np.float64), 0, 1))
-    if OPENS not in weights:
+    if OPENS not in weights or not weights[OPENS].any():
         weights |= {name: np.clip(curve, 0, 1) for name, curve in convert_to_arkit(motion).items()}
     return weights
 
@@ -213,6 +213,7 @@ def find_own_weights(motion: Motion, shapes: FaceShapes) -> Motion | None:
     """
     weights = arkit_weights(motion)
     by_name = {name: np.clip(motion[name].astype(np.float64), 0, 1) for name in shapes.names if name in motion.names}
+    by_name = {name: curve for name, curve in by_name.items() if curve.any() or to_arkit(name) != OPENS}
     curves = [by_name.get(name, weights.get(known)) for name, known in zip(shapes.names, shapes.known, strict=True)]
     if not any(curve is not None and gap > MIN_OPENING for curve, gap in zip(curves, shapes.gap, strict=True)):
         return None

@@ -92,7 +92,7 @@ class DrivenCharacter:
         if self.shapes is None:
             what = "the character is moved by control points and has no weights of blendshapes; write a video,"
             raise InputError(f"{what} or the motion without --character")
-        if not self.table:
+        if not self.table and not self.twins:
             return solve_shape_weights(motion, units, self.shapes)
         return _solve_with_table(motion, units, self.shapes, *self.mouth_rows)
 
@@ -101,16 +101,28 @@ class DrivenCharacter:
         known = {shape.name: shape.called.lower() for shape in self.mesh.shapes}
         others = {name: called for name, called in known.items() if called in VRM_EMOTIONS}
         others |= {row.control: row.source for row in self.other_rows}
+        known = {name: to_arkit(first) or find_spoken_name(first) or "" for name, first in self.twins.items()}
+        others |= {name: source.removeprefix("vowel_") for name, source in known.items()}
         return tuple(self.table.get(row.control, row) for row in list_rig_rows(self.mesh, self.shapes, others))
+
+    @cached_property
+    def twins(self) -> dict[str, str]:
+        """Blendshapes of further parts, as teeth, with the solved ones that they follow by their names."""
+        groups = (*group_by_name(self.mesh, to_arkit).values(), *group_by_name(self.mesh, find_spoken_name).values())
+        pairs = [(self.mesh.shapes[same[0]].name, self.mesh.shapes[n]) for same in groups for n in same[1:]]
+        solved = self.shapes.names if self.shapes else ()
+        return {other.name: first for first, other in pairs if first in solved and other.source is None}
 
     @cached_property
     def mouth_rows(self) -> tuple[tuple[RigRow, ...], Array]:
         """The rows that move the mouth, by solved names, and how far each parts the lips [shape=(R,)]."""
         parted, rows, numbers = measure_lip_parting(self.mesh, self.placement), list[RigRow](), list[int]()
         for number, shape in enumerate(self.mesh.shapes):
-            solved = _find_solved_name(shape, self.shapes) if self.shapes else None
+            first = self.twins.get(shape.name, "")
+            solved = first or (_find_solved_name(shape, self.shapes) if self.shapes else None)
             if solved is not None:
-                rows.append(replace(self.table.get(shape.name, make_plain_row(shape.name, shape.name)), source=solved))
+                row = self.table.get(first or shape.name, make_plain_row(shape.name, shape.name))
+                rows.append(replace(row, control=shape.name, source=solved))
                 numbers.append(number)
         return tuple(rows), parted[numbers]
 

@@ -97,11 +97,7 @@ MAX_STEPS, TOLERANCE = 2000, 1e-5
 _MOODS = read_shipped_table("lipmotion.meshes.fitting", "mood_shapes.csv")
 MOOD_SHAPES = {row["shape"]: (row["curve"], float(row["weight"])) for row in _MOODS}
 """By blendshapes: the curve of the spoken mouth that they show, and their weight where it is 1."""
-EXPRESSIONS: Mapping[str, tuple[tuple[str, float], ...]] = {
-    "happy": (("happy", 1.0),), "sad": (("sad", 1.0),), "angry": (("angry", 1.0),), "surprised": (("surprised", 1.0),),
-    "afraid": (("surprised", 0.5), ("sad", 0.5)), "disgusted": (("angry", 0.6), ("sad", 0.3)),
-    "tense": (("angry", 0.4),), "tired": (("sad", 0.3), ("relaxed", 0.4)),
-}  # fmt: skip
+EXPRESSIONS = read_shipped_table("lipmotion.meshes.fitting", "expressions.csv")
 """The expressions of VRM that stand for a mood, with their weights, on characters without finer shapes."""
 ROUNDING = {"mouthPucker": 0.5, "mouthFunnel": 0.3}  # least weights in a phone of roundness 1
 NARROWING = 0.11
@@ -343,9 +339,9 @@ def _add_mood(weights: Array, mood: Array | None) -> Array:
 def weigh_expressions(moods: Mapping[str, Array]) -> dict[str, Array]:
     """Return the weights of VRM's expressions for moods, 0 to 1, both by name [each shape=(T,)]."""
     weights: dict[str, Array] = {}
-    for mood, strength in moods.items():
-        for name, full in EXPRESSIONS[mood]:
-            weights[name] = np.clip(weights.get(name, 0.0) + full * strength, 0, 1)
+    for row in (row for row in EXPRESSIONS if row["mood"] in moods):
+        strength, name = float(row["weight"]) * moods[row["mood"]], row["expression"]
+        weights[name] = np.clip(weights.get(name, 0.0) + strength, 0, 1)
     return weights
 
 

@@ -103,12 +103,19 @@ def measure_lip_parting(mesh: Mesh, placement: LipPlacement) -> Array:
 
 
 def group_by_name(mesh: Mesh, named: Callable[[str], str | None]) -> dict[str, list[int]]:
-    """Return blendshapes' numbers by the names they are understood as: a table's, or the first that moves something."""
+    """Return blendshapes' numbers by known names: a table's, then those with vertices of their own, largest first."""
     numbers: dict[str, list[int]] = {}
     for number, shape in enumerate(mesh.shapes):
         known = named(shape.called)
         if known is not None:
             numbers.setdefault(known, []).append(number)
-    stated = {known: [each for each in same if mesh.shapes[each].source] for known, same in numbers.items()}
-    first = {known: min(same, key=lambda each: not len(mesh.shapes[each].rows)) for known, same in numbers.items()}
-    return {known: stated[known] or [first[known]] for known in numbers}
+    for known, same in numbers.items():
+        same.sort(key=lambda each: (not mesh.shapes[each].source, -len(mesh.shapes[each].rows)))
+        free, apart = np.ones(len(mesh.vertices), bool), list[int]()
+        for each in same:
+            rows = mesh.shapes[each].rows
+            if mesh.shapes[each].source or (free[rows].all() and (len(rows) or not apart)):
+                apart.append(each)
+            free[rows] = False
+        numbers[known] = apart
+    return numbers

@@ -23,11 +23,12 @@ _SPELLINGS = read_shipped_table("lipmotion.meshes.model", "spoken_names.csv")
 _VISEME_SPELLINGS = {row["spelling"]: row["viseme"] for row in _SPELLINGS if row["viseme"]}
 _VOWEL_SPELLINGS = {row["spelling"]: row["vowel"] for row in _SPELLINGS if row["vowel"]}
 _VOWEL_SPELLINGS |= dict(zip("あいうえお", VRM_VOWELS, strict=True))
-_ARKIT = {name.lower(): name for name in (*ARKIT_MOUTH, *ARKIT_OTHERS)}
+_ARKIT = {row["spelling"]: row["arkit"] for row in _SPELLINGS if row["arkit"]}
+_ARKIT |= {name.lower(): name for name in ARKIT_52}
 _SIDES = {"l": "left", "r": "right", "left": "left", "right": "right"}
 _COPY = re.compile(
     r"(?:[._ ](?:\d{1,4}|(?i:copy|mesh|head|face|body|geo|key|value|weight|(?:mesh)?shape)))+$"
-    r"|(?<=[a-z])(?:Shape|Mesh|Geo)$|\s*(?:\[.*\]|\(.*\)|%)$"
+    r"|(?<=[a-z])(?:Shape|Mesh|Geo)$|_div\d$|\s*(?:\[.*\]|\(.*\)|%)$"
 )
 """What programs add to a name: ``jawOpen.001``, ``jawOpen_Head``, ``jawOpenShape``, ``jawOpen [0..1]``."""
 

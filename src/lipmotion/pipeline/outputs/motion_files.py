@@ -32,7 +32,7 @@ from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves
 from lipmotion.meshes.model.rig_tables import CONTROL
-from lipmotion.meshes.model.shape_names import is_known, to_arkit
+from lipmotion.meshes.model.shape_names import convert_to_arkit, is_known, to_arkit
 from lipmotion.pipeline.analysis.read_request import read_units
 from lipmotion.pipeline.outputs.curve_sets import (
     ARKIT,
@@ -239,13 +239,14 @@ def _make_curves(generation: Generation, name: str, staging: Staging | None, pro
 
 def _blendshapes(motion: Motion) -> Motion | None:
     """Return the channels of a motion that are ARKit's blendshapes, by ARKit's names, and angles of head and eyes."""
-    angles = {channel.name: channel.name for channel in motion.channels if channel.unit == RADIAN}
-    known = {angles.get(name) or to_arkit(name): n for n, name in reversed(list(enumerate(motion.names)))}
+    channels = reversed([*enumerate(motion.channels)])
+    known = {each.name if each.unit == RADIAN else to_arkit(each.name): n for n, each in channels}
     columns = [(name, column) for name, column in sorted(known.items(), key=lambda each: each[1]) if name]
-    if "jawOpen" not in known:
+    jaw = known.get("jawOpen")
+    if jaw is None or (not motion.values[:, jaw].any() and convert_to_arkit(motion)):
         return None
-    channels = tuple(Channel(name, motion.channels[column].unit) for name, column in columns)
-    return Motion(motion.values[:, [column for _, column in columns]], motion.rate_hz, channels)
+    of_face = tuple(replace(motion.channels[column], name=name) for name, column in columns)
+    return Motion(motion.values[:, [column for _, column in columns]], motion.rate_hz, of_face)
 
 
 TOLERATED_S = 0.1  # sound and motion may differ so much in length without a warning
@@ -302,8 +303,7 @@ def correct_rate(motion: Motion, duration_s: float, advice: str = "") -> Motion:
     rate_hz = match_sound_rate(motion.rate_hz, len(motion.values), duration_s)
     if rate_hz != motion.rate_hz:
         lasts_s = len(motion.values) / motion.rate_hz
-        ratio = duration_s / lasts_s
-        what = f"the motion lasts {lasts_s:.2f} s, the sound {duration_s:.2f} s, {ratio:.4f} times as long"
+        what = f"the motion lasts {lasts_s:.2f} s, the sound {duration_s:.2f}, {duration_s / lasts_s:.4f} times as long"
         LOG.warning("%s: read at %.3f frames a second, not at %.3f%s", what, rate_hz, motion.rate_hz, advice)
     return replace(motion, rate_hz=rate_hz)
 
