@@ -209,7 +209,8 @@ def align_between(
     if stop > len(audio.samples) // HOP:
         raise AlignmentError(f"the recording ends at {audio.duration_s:.2f} s")
     segment = audio.stretch(first, stop)
-    spans = list(_open_recogniser(model, request).align(segment, segment.mfcc(), words, lexicon).shifted(start_s))
+    phones = open_recogniser(model.phones, request.recogniser, model.adaptation)
+    spans = list(phones.align(segment, segment.mfcc(), words, lexicon).shifted(start_s))
     for place in () if pauses else (0, -1):
         while len(spans) > 1 and is_silent(spans[place].label.phone):
             del spans[place]
@@ -217,14 +218,11 @@ def align_between(
     return spans
 
 
-def _open_recogniser(model: Model, request: Request) -> Recogniser:
-    return open_recogniser(model.phones, request.recogniser, model.adaptation)
-
-
 def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: ParallelMap) -> SpeechAnalysis:
     range_db = measure_level_range(audio.log_energy)
-    phones, features, fit = _open_recogniser(model, request), audio.joined_mfcc(), None
-    results: list[Recognition] = []
+    phones = open_recogniser(model.phones, request.recogniser, model.adaptation)
+    rows: Any = audio.joined_rows(lambda passage: passage.mfcc().values)
+    features, fit, results = Features(rows, audio.duration_s), None, list[Recognition]()
 
     def recognise() -> Recognition:
         results.append(phones.recognition(audio, features, each, english=request.language == ENGLISH))

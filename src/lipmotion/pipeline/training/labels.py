@@ -98,7 +98,9 @@ def label_utterances(
     for number, (block, arrays) in enumerate(zip(blocks, stored, strict=True)):
         results = next(labelled) if arrays is None else list(map(_read_result, arrays["results"].tolist()))
         if arrays is None:
-            checkpoint.save(f"phones-{number}", {"results": np.array(list(map(_write_result, results)))})
+            rows = [x if isinstance(x, str) else [(s.start_s, s.end_s, *astuple(s.label)) for s in x] for x in results]
+            texts = [json.dumps(row, default=float) for row in rows]
+            checkpoint.save(f"phones-{number}", {"results": np.array(texts)})
         for utterance, phones in zip(block, results, strict=True):
             if isinstance(phones, str):
                 monitor(Item(utterance.name, "skipped", phones))
@@ -116,11 +118,6 @@ def _label_block(utterances: Sequence[Utterance], labeller: Labeller) -> list[Ph
         except (AlignmentError, InputError) as error:
             results.append(str(error))
     return results
-
-
-def _write_result(phones: PhonesOrReason) -> str:
-    rows = phones if isinstance(phones, str) else [(each.start_s, each.end_s, *astuple(each.label)) for each in phones]
-    return json.dumps(rows, default=float)
 
 
 def _read_result(text: str) -> PhonesOrReason:

@@ -178,11 +178,6 @@ class AnalysedAudio(Audio):
         """Return the features of ``speech.features.mfcc.mfcc`` at one warp of the frequencies."""
         return self.mfcc_of_warps((warp,))[0]
 
-    def joined_mfcc(self) -> Features:
-        """Return ``mfcc`` with values that are ``JoinedRows``."""
-        values: Any = self.joined_rows(lambda audio: audio.mfcc().values)
-        return Features(values, self.duration_s)
-
     def mfcc_of_warps(self, warps: Sequence[float]) -> list[Features]:
         """Return the features of ``features.mfcc.mfcc`` at several warps; the missing ones are computed together."""
         missing = [warp for warp in warps if warp not in self._mfcc]
