@@ -48,7 +48,7 @@ LEVEL, LEVEL_SHARE, LEVEL_WINDOW = 0.1, 95, SOUND_HZ // 50
 LAGS_S, SMOOTHINGS_S = np.arange(-0.08, 0.33, 0.04), (0.0, 0.03, 0.06, 0.1)
 SHUT_SHARES = (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
 """What is tried of every rival: lags, smoothing (σ), and the share of its 95th percentile under which it is shut."""
-SYNC_STEP_S, RIDGE = 0.01, 1e-3
+SYNC_STEP_S, MAX_SYNC_S, RIDGE = 0.01, 5.0, 1e-3
 FOLDS = 5
 ONSET_REACH_S = 0.2  # a movement that begins nowhere within this time counts as an error of it
 ABSENT = MissingDependencyError.exit_code  # exit code of an adapter whose rival is not installed
@@ -475,6 +475,9 @@ def run_rivals(  # noqa: PLR0913
     sync_s   : each recording may be moved by so much to fit best, alike for all; limit_s: longest time of a job
     Raises InputError: no adapters, or too few recordings. Raises CorpusError: no lips in a recording.
     """
+    if not (0 <= sync_s <= MAX_SYNC_S and limit_s > 0):
+        found, required = f"{1000 * sync_s:g} ms, {limit_s:g} s for a rival", f"0 to {1000 * MAX_SYNC_S:g} ms, over 0 s"
+        raise InputError(f"recordings may be moved by up to {found}; required {required}")
     rivals, work, loading = read_rivals(adapters, only), work.resolve(), sub_monitor(monitor, 0, 0.3)
     own = choosing is None and corpus.names("val") and corpus.names("test")
     reported, other = corpus.names("test" if own else None), corpus if own else choosing

@@ -12,6 +12,7 @@ from lipmotion.errors import InputError, shorten
 from lipmotion.extensions import find_version
 from lipmotion.pipeline.batch.lines import BatchLine, check_names
 from lipmotion.pipeline.outputs.output import OutputSettings, list_outputs
+from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import values
 from lipmotion_faces.outputs.shown_faces import shown_face
 
@@ -219,35 +220,19 @@ class Preset:
 
     title  : programs that read the files
     curves : what motion files hold, as of ``Outputs.curves``
-    fps    : frames a second of motion files and videos; None: as usual
+    fps    : frames a second of motion files and videos; 0: as usual
     """
 
     name: str
     title: str
     files: tuple[str, ...]
     curves: str = ""
-    fps: float | None = None
+    fps: float = 0.0
 
 
 PRESETS = {
-    each.name: each
-    for each in (
-        Preset("arkit", "Unreal, MetaHuman: a take of Live Link Face", (".livelink.csv",)),
-        Preset("curves", "ARKit's curves as a table", (".csv",), "arkit", 60.0),
-        Preset("visemes", "Oculus, Ready Player Me: visemes as a table", (".csv",), "visemes", 60.0),
-        Preset("unity", "Unity", (".anim",)),
-        Preset("godot", "Godot", (".tres",)),
-        Preset("blender", "Blender: a script, and a take for the add-on", (".blender.py", ".livelink.csv")),
-        Preset("web", "three.js and 3D programs: a moving head", (".glb",)),
-        Preset("vrm", "VRM", (".vrma",)),
-        Preset("moho", "Moho, OpenToonz", (".cues.dat",)),
-        Preset("papagayo", "Papagayo", (".cues.pgo",)),
-        Preset("rhubarb", "Rhubarb: mouth shapes", (".cues.json", ".cues.tsv")),
-        Preset("spine", "Spine", (".cues.spine.json",)),
-        Preset("live2d", "Live2D", (".motion3.json",)),
-        Preset("video", "A video of the face", (".mp4",)),
-        Preset("labels", "Praat, ELAN, subtitles", (".TextGrid", ".vtt")),
-    )
+    row["name"]: Preset(row["name"], row["title"], tuple(row["files"].split()), row["curves"], float(row["fps"] or 0))
+    for row in read_shipped_table("lipmotion_studio", "presets.csv")
 }
 _SUFFIX = re.compile(r"(?:\.[A-Za-z0-9]{1,10}){1,3}")
 

@@ -414,7 +414,7 @@ class Studio:
         with create_folders([copy.parent]):
             write_edits(file, copy)
             request = replace(file.named, recording=self.folder.check_sound(recording), edits=copy)
-            outputs = Outputs(files, curves=preset.curves, fps=preset.fps)
+            outputs = Outputs(files, curves=preset.curves, fps=preset.fps or None)
             job, shown = Job(request, outputs), open_face(outputs)
             if face and any(isinstance(each, VideoOutput) for each in check_outputs(job, shown, request.recording)):
                 shown = self.faces.open_face(face)

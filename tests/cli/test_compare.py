@@ -1,6 +1,5 @@
 import json
 
-from cli.conftest import check_refused
 from lipmotion import compare
 
 
@@ -27,7 +26,3 @@ def test_the_figures_are_those_of_the_function_and_programs_read_lines_of_json(r
     done = run("compare", "a.csv", "a.csv", "--machine-readable")
     assert (done.code, done.err) == (0, [])
     assert json.loads(done.out[-1])["figures"]["reference"] == "a.csv"
-
-
-def test_a_league_without_adapters_says_where_they_are(run, toy_corpus):
-    check_refused(run("league", str(toy_corpus.path), "-o", "report", "--adapters", "nowhere"), 3, "extras/league")

@@ -42,25 +42,6 @@ def test_a_wrong_command_line(run):
         check_refused(run(*arguments), 2, " --help")
 
 
-def test_a_misspelt_option(run):
-    for misspelt, hint in (
-        (["animate", "a.wav", "-o", "a.json", "--fase", "woman"], "did you mean --face? see: lipmotion animate --help"),
-        (["animate", "a.wav", "--otput", "a.json"], "did you mean --output?"),
-        (["face", "build", "a.mp4", "-o", "a.face", "--speker=x"], "--speker=x; did you mean --speaker?"),
-        (["info", "--zzz"], "--zzz; see: lipmotion info --help"),
-    ):
-        check_refused(run(*misspelt), 2, hint)
-
-
-def test_a_word_that_is_no_verb(run):
-    for words, hint in (
-        (["animat", "a.wav"], "no verb 'animat'; did you mean: lipmotion animate"),
-        (["corpus", "prepar", "a", "-o", "b"], "no verb 'prepar'; did you mean: lipmotion corpus prepare"),
-        (["bogus"], "no verb 'bogus'; the verbs are: animate, batch, live, speak"),
-    ):
-        check_refused(run(*words), 2, hint)
-
-
 def _fail(error: BaseException, _: object) -> None:
     raise error
 

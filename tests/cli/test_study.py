@@ -55,7 +55,7 @@ def test_what_cannot_be_used(run, here):
     for arguments, code, words in (
         (("other.csv",), 3, "no column"),
         (("nothing.csv",), 3, "nothing.csv"),
-        (("answers.csv", "--baseline", "c7"), 3, "the baseline 'c7', required one of: c0, c1"),
+        (("answers.csv", "--baseline", "c7"), 3, "the baseline is 'c7', required one of: c0, c1"),
         (("answers.csv", "--power", "2"), 3, "a power of 2"),
         (("answers.csv", "-o", "answers.csv"), 7, "answers.csv"),
     ):

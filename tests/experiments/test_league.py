@@ -121,10 +121,11 @@ def test_what_cannot_be_compared(adapters, toy_corpus, tmp_path):
     (tmp_path / "rivals.json").write_text('{"one": {"run": 3}}')
     with pytest.raises(InputError, match="not a table"):
         read_rivals(tmp_path)
-    with pytest.raises(InputError, match="no rival 'other'"):
-        hold(adapters, toy_corpus, {"good": does("follows")}, only=["other"])
-    with pytest.raises(InputError, match="to choose on and is reported"):
-        hold(adapters, toy_corpus, {"good": does("follows")}, choosing=toy_corpus)
+    options = {"choosing": toy_corpus, "only": ["other"], "sync_s": -0.01, "limit_s": 0.0}
+    words = ("to choose on and is reported", "no rival 'other'", "-10 ms, .* 0 to 5000 ms", "0 s for a rival")
+    for (name, value), message in zip(options.items(), words, strict=True):
+        with pytest.raises(InputError, match=message):
+            hold(adapters, toy_corpus, {"good": does("follows")}, **{name: value})
     single = toy_corpus.divided({"train": toy_corpus.names("train")[:1]})
     with pytest.raises(InputError, match="two or more"):
         hold(adapters, single, {"good": does("follows")})

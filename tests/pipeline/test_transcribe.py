@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -102,6 +103,19 @@ def test_speech_that_the_transcript_leaves_out_is_reported_with_its_times(welcom
     left_out = [said[word] for word in set(words) - set(words[kept])]
     for start_s, end_s in part.fit.missing:  # each stretch covers a part of what was left out
         assert any(start_s < span.end_s and span.start_s < end_s for span in left_out)
+
+
+def test_a_word_that_is_heard_is_not_sought_far_away(welcome):
+    """Recognition takes it for something else, and something else, that the transcript lacks, for it."""
+    (audio, words), phones = welcome, recogniser_of(load_model(), "auto")
+    spans = list(phones.align(audio, words, Lexicon()))
+    places = {span.label.word: number for number, span in reversed([*enumerate(spans)])}
+    right_s = spans[places["speak"]].start_s
+    for word, others in {"speak": ("t", "t", "t", "t"), "boats": ("s", "p", "iy", "k")}.items():
+        for number, phone in enumerate(others, places[word]):
+            spans[number] = replace(spans[number], label=Unit(phone))
+    part = transcribe.transcribe(phones, audio, words[:2], Lexicon(), lambda: Timeline(tuple(spans)))
+    assert next(s.start_s for s in part.units if s.label.word == "speak") == pytest.approx(right_s, abs=0.2)
 
 
 @pytest.mark.parametrize("kept", [slice(None, None, 2), slice(1, None, 2), slice(None, None, 3)])

@@ -122,7 +122,7 @@ def load_face(path: str | Path) -> FilmedFace:
     """
     path = Path(path)
     check_source(path, "face")
-    header = read_face_header(path)
+    header = read_header_of(path, FORMAT, VERSION, "face", "give a file that `lipmotion face build` wrote")
     try:
         arrays = read_archive(path)
         with schema.format_errors("the face", "build it again"):
@@ -144,11 +144,6 @@ def load_face(path: str | Path) -> FilmedFace:
         raise ModelFormatError(f"{path}: {error}") from error
     except UNREADABLE as error:
         raise ModelFormatError(f"{path}: the face is damaged ({error}); build it again") from error
-
-
-def read_face_header(path: Path) -> dict[str, Any]:
-    """Return the header of a face's file. Raises ModelFormatError: not a face, damaged, or of another version."""
-    return read_header_of(path, FORMAT, VERSION, "face", "give a file that `lipmotion face build` wrote")
 
 
 MAX_TAKES = 1000

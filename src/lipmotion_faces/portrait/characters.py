@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import json
 from importlib import resources
+from types import SimpleNamespace
 from typing import Any
 
-from lipmotion_faces.portrait.design import Design, EyeDesign, LipDesign, Lock, Palette, close_curve, mirror_curve
+from lipmotion_faces.portrait.design import Design, EyeDesign, LipDesign, Lock, close_curve, mirror_curve
 
-PARTS = {"palette": Palette, "lips": LipDesign, "eyes": EyeDesign}
+PARTS = {"palette": SimpleNamespace, "lips": LipDesign, "eyes": EyeDesign}
 
 
 def _read_design(drawn: dict[str, Any]) -> Design:
-    """Return the design of a character: its parts, and its outlines, closed or mirrored."""
-    values: dict[str, Any] = dict(drawn)
-    values |= {name: kind(**_as_tuples(drawn[name])) for name, kind in PARTS.items() if name in drawn}
+    """Return the design of a character: its parts, its outlines, closed or mirrored, its colours, else the woman's."""
+    values: dict[str, Any] = drawn | {"palette": _DRAWN["woman"]["palette"] | drawn["palette"]}
+    values |= {name: kind(**_as_tuples(values[name])) for name, kind in PARTS.items() if name in drawn}
     values |= {name: close_curve(drawn[name]) for name in ("neck", "shoulders")}
     values |= {name: mirror_curve(drawn[name]) for name in ("cap", "hair_behind") if name in drawn}
     values["collar"] = tuple(map(close_curve, drawn.get("collar", ())))

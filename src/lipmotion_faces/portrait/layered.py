@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
+from difflib import get_close_matches
 from functools import cached_property, lru_cache, partial
+from importlib import resources
+from itertools import compress
 from pathlib import Path
 from typing import final
 
@@ -12,14 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.storage.sources import read_shipped_table
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import SCENE, TRANSPARENT, DrawnMotion, Face, Staging
 from lipmotion_faces.kernels.painting import warp_bytes
 from lipmotion_faces.portrait.geometry import PIVOT_Y, MouthPose
 from lipmotion_faces.portrait.layer import lay_over
 from lipmotion_faces.portrait.portrait_rasteriser import FacePose, list_face_poses
-from lipmotion_faces.portrait.svg_document import Drawing, Shape, read_drawing
+from lipmotion_faces.portrait.svg_document import LAYERS, MOUTH, Drawing, Shape, read_drawing
 
 Pixels = NDArray[np.float32]  # premultiplied colour 0..255 and cover 0..1 [shape=(H, W, 4)]
 Lines = Sequence[tuple[NDArray[np.float64], bool]]
@@ -116,17 +120,14 @@ def _reduce(mask: NDArray[np.bool_]) -> Pixels:
 
 
 OWN_SIZE = 640
-MOUTH = "mouth-"
 CHANGE_COST = 0.007
 """A change of mouths costs as much as this squared distance at 2 frames a second, so that none is shown too shortly."""
 EYE_DISTANCE = 0.285  # height of the picture that stands for an eye distance, in which heads and eyes are moved
 
 
 MOOD_RISE, MOOD_FALL = 0.1, 0.08  # how far a mood raises and lowers the brows, which are one layer
-MOUTHS = {
-    row.pop("name"): MouthPose(**{number: float(value) for number, value in row.items()})
-    for row in map(dict, read_shipped_table(__package__, "mouths.csv"))
-}
+_POSES = json.loads(resources.files(__package__).joinpath("mouths.json").read_text(encoding="ascii"))
+MOUTHS = {name: MouthPose(**pose) for name, pose in _POSES.items()}
 """The mouths that a drawing may have, as layers ``mouth-NAME``; ``rest`` is required, what is missing is replaced."""
 _WEIGHTS = {"gap": 5.0, "width": 1.5, "tongue": 1.0, "tuck": 0.9, "protrusion": 1.0, "teeth": 1.8, "oval": 1.0}
 """How much each number of a pose counts in the choice of its mouth."""
@@ -148,7 +149,9 @@ class LayeredFace(Face):
             known = ", ".join(MOUTH + name for name in MOUTHS)
             raise InputError(f"{path}: unknown layer {shorten(unknown[0])!r}; the mouths are: {known}")
         if "rest" not in self.mouths:
-            raise InputError(f"{path}: no layer {MOUTH}rest; name the group of the closed mouth so")
+            other = shorten(", ".join(sorted(names)) or "none")
+            raise InputError(f"{path}: no layer {MOUTH}rest, required for the closed mouth; the layers are: {other}")
+        _warn_of_still_layers(self.layers, path, len(self.mouths))
 
     def with_staging(self, staging: Staging, prosody: Prosody | None = None) -> LayeredFace:
         """Return the same drawing with other settings; ``prosody`` is of the speech that will be rendered."""
@@ -171,6 +174,17 @@ class LayeredFace(Face):
     def _painter(self) -> Callable[[tuple[FacePose, str]], NDArray[np.uint8]]:
         picture = _LayeredPicture(self.layers, self.staging)
         return lambda pose: picture.draw(*pose)
+
+
+def _warn_of_still_layers(drawing: Drawing, path: Path, mouths: int) -> None:
+    """Warn of a mouth that is always the same, and of layers outside of known ones, whose names are like theirs."""
+    known = {*LAYERS, *(MOUTH + name for name in MOUTHS)}
+    still = {name for layers, _ in drawing.shapes if not known.intersection(layers) - {"head"} for name in layers}
+    for name in sorted(name for name in still - known if any(name[:3] == each[:3] for each in known)):
+        for near in get_close_matches(name, known, 1, 0.85):
+            warnings.warn(f"{path}: the layer {shorten(name)!r} stands still (is it {near}?)", stacklevel=2)
+    if mouths == 1:
+        warnings.warn(f"{path}: {MOUTH}rest is the only mouth, and is always shown; draw others", stacklevel=2)
 
 
 def choose_mouths(poses: Sequence[MouthPose], mouths: Sequence[str], fps: float) -> list[str]:
@@ -199,6 +213,11 @@ def choose_mouths(poses: Sequence[MouthPose], mouths: Sequence[str], fps: float)
     return path[::-1]
 
 
+def _is_of_head(layers: Sequence[str]) -> bool:
+    """Return whether a shape moves with the head, in whose layer mouths, eyes and brows need not be."""
+    return any(name.startswith(MOUTH) or (name in LAYERS and name != "background") for name in layers)
+
+
 class _LayeredPicture:
     def __init__(self, drawing: Drawing, staging: Staging) -> None:
         self._size = staging.size or OWN_SIZE
@@ -208,12 +227,13 @@ class _LayeredPicture:
         scale = self._size / height
         self._to_pixels = np.array([[scale, 0, -x * scale], [0, scale, -y * scale]])
         has_head = any("head" in layers for layers, _ in drawing.shapes)
-        self._head = [(layers, shape) for layers, shape in drawing.shapes if not has_head or "head" in layers]
+        moving = [not has_head or _is_of_head(layers) for layers, _ in drawing.shapes]
+        self._head = list(compress(drawing.shapes, moving))
         behind: list[Placed] = []
         front: list[Placed] = []
         passed = False
-        for layers, shape in drawing.shapes:
-            if not has_head or "head" in layers:
+        for (layers, shape), moves in zip(drawing.shapes, moving, strict=True):
+            if moves:
                 passed = True
             elif self._scene or "background" not in layers:
                 (front if passed else behind).append((shape, (0.0, 0.0)))

@@ -8,6 +8,7 @@ teeth and tongue, they are ``SPAN`` eye distances from the middle.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from lipmotion_faces.kernels.painting import paint_band
 from lipmotion_faces.portrait import geometry
-from lipmotion_faces.portrait.design import Colour, Design, Palette
+from lipmotion_faces.portrait.design import Colour, Design
 from lipmotion_faces.portrait.layer import Window
 
 Texture = NDArray[np.float64]
@@ -171,7 +172,7 @@ class MouthTextures:
     outline: Texture
 
 
-def _make_textures(colours: Palette) -> MouthTextures:
+def _make_textures(colours: SimpleNamespace) -> MouthTextures:
     """Return textures of one colour each, with lines between the incisors and a patch of light on the tongue's tip."""
     _, x = _make_grid(1, 261)
     away = np.abs(np.abs(x) * SPAN - np.array(UPPER_TOOTH_GAPS[:3])[:, None, None]).min(axis=0)
@@ -200,7 +201,7 @@ def _make_textures(colours: Palette) -> MouthTextures:
     )
 
 
-def _shade_textures(colours: Palette) -> MouthTextures:
+def _shade_textures(colours: SimpleNamespace) -> MouthTextures:
     depth, x = _make_grid(9, 33)
     seam = np.sin(np.pi * depth) ** 0.5 * (1 - 0.6 * np.abs(x) ** 3)
     depth, x = _make_grid(12, 17)
@@ -232,7 +233,7 @@ def _shade_textures(colours: Palette) -> MouthTextures:
     )
 
 
-def _paint_lips(colours: Palette) -> tuple[Texture, Texture]:
+def _paint_lips(colours: SimpleNamespace) -> tuple[Texture, Texture]:
     """Return the upper and the lower lip, with fine creases down them and gloss."""
 
     def draw_creases(depth: Texture) -> Texture:
@@ -262,7 +263,7 @@ def _paint_teeth(colour: Colour, shadow: Colour, gaps: tuple[float, ...], dark: 
     return _make_texture(paint, np.exp(-((x * SPAN / 0.21) ** 4)) + 0 * depth)
 
 
-def _paint_tongue(colours: Palette) -> tuple[Texture, Texture]:
+def _paint_tongue(colours: SimpleNamespace) -> tuple[Texture, Texture]:
     """Return the tongue, and its tip between the teeth: in the shadow of the upper ones, round, moist at its edge."""
     colour, dark = np.array(colours.tongue), colours.cavity
     depth, x = _make_grid(16, 65)

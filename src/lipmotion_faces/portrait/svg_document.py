@@ -2,7 +2,8 @@
 
 Read are groups, paths, rectangles, circles, ellipses, polygons, polylines and lines with plain colours, strokes,
 opacity and transforms. What could reach outside the file (references, scripts, pictures, styles, entities) is refused,
-and so is what would be drawn wrongly without notice, as gradients and text. The text is UTF-8, whatever it declares.
+and so is what would be drawn wrongly without notice, as gradients, dashes and text. What is hidden is passed over, but
+not the mouths and eyes, of which one is shown at a time. The text is UTF-8, whatever it declares.
 It is read in one pass, which ends at the first thing that is refused: ``LARGEST_FILE_BYTES`` and the other limits.
 """
 
@@ -181,14 +182,6 @@ def read_numbers(text: str, max_count: int, name: str) -> list[float]:
     return numbers
 
 
-def read_points(text: str, max_count: int = MAX_POINTS) -> Points:
-    """Return the points of a polygon [shape=(N, 2)]. Raises InputError: an odd count, no numbers, or too many."""
-    numbers = read_numbers(text, 2 * max_count, "points")
-    if len(numbers) % 2 or len(numbers) < 4:
-        raise InputError(f"points have {len(numbers)} numbers, required pairs, two at least")
-    return np.array(numbers).reshape(-1, 2)
-
-
 def make_rectangle(x: float, y: float, width: float, height: float, radius: float) -> Points:
     """Return a rectangle with round corners [shape=(N, 2)]."""
     radius = min(max(radius, 0), width / 2, height / 2)
@@ -246,8 +239,12 @@ MAX_COVERED_PICTURES, LINES_PER_PICTURE = 200.0, 100.0
 LONGEST_VALUE_CHARACTERS = 100  # most letters of a number, a colour or another value of a style
 _SHAPES = {"path", "rect", "circle", "ellipse", "polygon", "polyline", "line"}
 _PASSED_OVER = {"title", "desc", "metadata", "namedview", "defs", "guide", "grid", "page", "RDF"}
-_INHERITED = ("fill", "fill-opacity", "fill-rule", "stroke", "stroke-width", "stroke-opacity")
-_UNIT = re.compile(r"(.*?)(?:px|pt|mm|cm|in)", re.DOTALL)
+_INHERITED = ("fill", "fill-opacity", "fill-rule", "stroke", "stroke-width", "stroke-opacity", "visibility")
+_UNREAD = ("stroke-dasharray", "mix-blend-mode", "vector-effect", "transform-origin", "transform")
+_UNITS = {"px": 1.0, "pt": 4 / 3, "pc": 16.0, "mm": 96 / 25.4, "cm": 96 / 2.54, "in": 96.0}
+MOUTH, EYES = "mouth-", ("eyes-open", "eyes-closed")
+LAYERS = ("head", *EYES, "pupils", "brows", "background")
+"""The layers beside those of the mouths, whose names begin with ``MOUTH``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -350,19 +347,21 @@ class _DrawingReader:
             raise InputError(f"more than {MAX_ELEMENTS} elements")
         if self.depth > DEEPEST_NESTING:
             raise InputError(f"groups in groups, more than {DEEPEST_NESTING} deep")
+        tag = name.rpartition(":")[2]
+        if tag == "style":
+            _refuse_style_sheet("xml-stylesheet")
         if self.passed:
             return
-        tag = name.rpartition(":")[2]
         if self.box is None:
             if tag != "svg":
                 raise InputError(f"not an SVG: its root is {shorten(tag)!r}")
             self.box = _read_box(attributes)
             self.groups.append(_group(attributes, _Group((), np.eye(3), {}, 1.0)))
-        elif tag in _PASSED_OVER:
+        elif tag in _PASSED_OVER or _read_style(attributes).get("display") == "none":
             self.passed = self.depth
         elif len(self.groups) < self.depth - 1:
             raise InputError(f"<{shorten(tag)}> in a shape is not read; remove it")
-        elif tag in ("g", "svg"):
+        elif tag == "g":
             self.groups.append(_group(attributes, self.groups[-1]))
         elif tag in _SHAPES:
             self._add(tag, attributes)
@@ -382,24 +381,29 @@ class _DrawingReader:
         self.points += sum(len(points) for points, _ in lines)
         check_points(MAX_POINTS - self.points)
         style, matrix = group.style, group.matrix
-        opacities = [_read_number(style.get(f"{kind}-opacity", "1"), "opacity") for kind in ("fill", "stroke")]
+        fill, filled = _read_colour(style.get("fill", "black"), "fill")
+        stroke, stroked = _read_colour(style.get("stroke", "none"), "stroke")
+        shown = group.opacity * (style.get("visibility", "visible") == "visible")
+        filled, stroked = (
+            float(np.clip(shown * alpha * _read_number(style.get(f"{kind}-opacity", "1"), "opacity"), 0, 1))
+            for kind, alpha in (("fill", filled), ("stroke", stroked))
+        )
         placed = tuple((points @ matrix[:2, :2].T + matrix[:2, 2], closed) for points, closed in lines)
         if not all(np.abs(points).max(initial=0) <= 1e3 * LARGEST_NUMBER for points, _ in placed):
             raise InputError(f"a shape is {1e3 * LARGEST_NUMBER:g} units away; check the transforms")
-        fill = _read_colour(style.get("fill", "black"), "fill")
         scale = float(np.sqrt(abs(np.linalg.det(matrix[:2, :2]))))
         shape = Shape(
             placed,
             None if tag == "line" else fill,
-            _read_colour(style.get("stroke", "none"), "stroke"),
+            stroke,
             scale * _read_number(style.get("stroke-width", "1"), "stroke-width"),
-            (float(np.clip(group.opacity * opacities[0], 0, 1)), float(np.clip(group.opacity * opacities[1], 0, 1))),
+            (filled, stroked),
             style.get("fill-rule") == "evenodd",
         )
         self.covered += _measure_cover(shape, self.box or (0, 0, 1, 1))
         if self.covered > MAX_COVERED_PICTURES:
             raise InputError(f"its shapes cover more than {MAX_COVERED_PICTURES:g} times the picture; leave some out")
-        self.shapes.append((self.groups[-1].layers, shape))
+        self.shapes.append((group.layers, shape))
 
 
 def _refuse_subset(_name: str, _system: str | None, _public: str | None, has_subset: int) -> None:
@@ -412,9 +416,9 @@ def _refuse_entity(*_: object) -> NoReturn:
     raise InputError("it declares or uses entities; save it as plain SVG")
 
 
-def _refuse_style_sheet(target: str, _: str) -> None:
+def _refuse_style_sheet(target: str, _: str = "") -> None:
     if target == "xml-stylesheet":
-        raise InputError("a style sheet is not read; convert it to plain colours")
+        raise InputError("a style sheet is not read; export presentation attributes instead")
 
 
 def _read_box(root: Mapping[str, str]) -> tuple[float, float, float, float]:
@@ -433,11 +437,41 @@ def _read_box(root: Mapping[str, str]) -> tuple[float, float, float, float]:
 
 
 def _read_number(text: str, name: str) -> float:
-    match = _UNIT.fullmatch(text.strip())
-    numbers = read_numbers(match[1] if match else text, 1, name)
+    unit = text.strip()[-2:]
+    numbers = read_numbers(text.strip().removesuffix(unit) if unit in _UNITS else text, 1, name)
     if not numbers:
         raise InputError(f"{name} is {shorten(text)!r}, required a number")
-    return numbers[0]
+    return numbers[0] * _UNITS.get(unit, 1.0)
+
+
+def _name_layer(attributes: Mapping[str, str]) -> str:
+    """Return the name of an element: of its label, ``data-name`` and id the first that names a layer, else the first.
+
+    Illustrator writes ``mouth_x2D_aa``, and ``mouth-aa_1_`` or ``mouth-aa-2`` for another one of the same name.
+    """
+    texts = [
+        re.sub(r"[\s_-]\d+_?$", "", value.strip())
+        for ending in (":label", "data-name", ":id", "id")
+        for key, value in attributes.items()
+        if key.endswith(ending) and value.strip()
+    ]
+    names = [re.sub(r"(_x[0-9A-F]{2}_|[\s_-])+", "-", text).casefold() for text in texts]
+    return next((name for name in names if name in LAYERS or name.startswith(MOUTH)), names[0] if names else "")
+
+
+def _read_style(attributes: Mapping[str, str]) -> dict[str, str]:
+    """Return the style of an element itself, shown if it is a mouth or eyes. Raises InputError: not read."""
+    style = {name: value for name, value in attributes.items() if name != "transform"}
+    for part in attributes.get("style", "").split(";"):
+        name, _, value = part.partition(":")
+        style[name.strip()] = value.strip()
+    for name in _UNREAD:
+        if style.get(name, "none") not in ("none", "normal", "0", ""):
+            raise InputError(f"{name}={shorten(style[name])!r} is not read; convert it to paths with plain colours")
+    layer = _name_layer(attributes)
+    if layer in EYES or layer.startswith(MOUTH):
+        style |= {"display": "inline", "visibility": "visible"}
+    return style
 
 
 def _group(attributes: Mapping[str, str], around: _Group) -> _Group:
@@ -448,12 +482,7 @@ def _group(attributes: Mapping[str, str], around: _Group) -> _Group:
             raise InputError(f"{shorten(name)}={shorten(value)!r} is a reference; required plain colours and shapes")
         if name.lower().startswith("on"):
             raise InputError(f"a script, {shorten(name)!r}, is not allowed")
-    names = (*_INHERITED, "opacity")
-    style = {name: attributes[name] for name in names if name in attributes}
-    for part in attributes.get("style", "").split(";"):
-        name, _, value = part.partition(":")
-        if name.strip() in names:
-            style[name.strip()] = value.strip()
+    style = {name: value for name, value in _read_style(attributes).items() if name in (*_INHERITED, "opacity")}
     for name, value in style.items():
         if len(value) > LONGEST_VALUE_CHARACTERS:
             raise InputError(f"{name} is {shorten(value)!r}, required a number or a plain colour")
@@ -461,8 +490,7 @@ def _group(attributes: Mapping[str, str], around: _Group) -> _Group:
     matrix = around.matrix
     if "transform" in attributes:
         matrix = check_matrix(matrix @ read_transform(attributes["transform"]))
-    name = next((value for key, value in attributes.items() if key.endswith(":label") and value), "")
-    layers = (*around.layers, name or attributes.get("id", ""))
+    layers = tuple(name for name in (*around.layers, _name_layer(attributes)) if name)
     return _Group(layers, matrix, {**around.style, **style}, opacity)
 
 
@@ -488,7 +516,10 @@ def _read_lines(attributes: Mapping[str, str], tag: str, max_count: int) -> list
     if tag == "path":
         return flatten_path(attributes.get("d", ""), max_count)
     if tag in ("polygon", "polyline"):
-        return [(read_points(attributes.get("points", ""), max_count), tag == "polygon")]
+        numbers = read_numbers(attributes.get("points", ""), 2 * max_count, "points")
+        if len(numbers) % 2 or len(numbers) < 4:
+            raise InputError(f"points have {len(numbers)} numbers, required pairs, two at least")
+        return [(np.array(numbers).reshape(-1, 2), tag == "polygon")]
     if tag == "line":
         return [(np.array([[read("x1"), read("y1")], [read("x2"), read("y2")]]), False)]
     if tag == "rect":
@@ -498,13 +529,16 @@ def _read_lines(attributes: Mapping[str, str], tag: str, max_count: int) -> list
     return [(make_ellipse(read("cx"), read("cy"), *radii, 4 * STEPS), True)]
 
 
-def _read_colour(text: str, name: str) -> Colour | None:
+def _read_colour(text: str, name: str) -> tuple[Colour | None, float]:
+    """Return a colour and its opacity, 0..1."""
     from PIL import ImageColor
 
     if text.strip() in ("none", "transparent"):
-        return None
+        return None, 0.0
     try:
-        red, green, blue, *_ = (min(max(part, 0), 255) for part in ImageColor.getrgb(text.strip()))
+        inside = re.fullmatch(r"rgba\((.*),(.*)\)", text.strip())
+        found = ImageColor.getrgb(f"rgb({inside[1]})" if inside else text.strip())
+        red, green, blue, alpha = (min(max(part, 0), 255) for part in (*found, 255)[:4])
+        return (red, green, blue), float(inside[2]) if inside else alpha / 255
     except ValueError as error:
         raise InputError(f"{name} is {shorten(text)!r}, required a plain colour as #40a0ff") from error
-    return red, green, blue

@@ -14,36 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.extensions import Registry
+from lipmotion.storage.sources import read_shipped_table
 
 EYE_CORNERS = (33, 263)  # outer corners, right and left: the unit of length and the x axis
 
-LIP_POINTS = (
-    # outer edge, from the right corner over the lower lip to the left corner and back over the upper lip
-    *(61, 146, 91, 181, 84, 17, 314, 405, 321, 375, 291, 409, 270, 269, 267, 0, 37, 39, 40, 185),
-    # inner edge, the same way round
-    *(78, 95, 88, 178, 87, 14, 317, 402, 318, 324, 308, 415, 310, 311, 312, 13, 82, 81, 80, 191),
+_PARTS = read_shipped_table(__package__, "points.csv")
+LIP_POINTS, JAW_POINTS, RIGID_POINTS = (
+    tuple(int(point) for row in _PARTS if row["group"] == group for point in row["points"].split())
+    for group in ("lips", "jaw", "rigid")
 )
-"""All 40 lip points of the face mesh."""
-
-JAW_POINTS = (
-    # chin: its tip, and the soft part between it and the lower lip
-    *(152, 175, 199, 200),
-    # jaw line from the chin outwards, right and left in turn
-    *(148, 377, 176, 400, 149, 378, 150, 379),
-)
-"""Chin and jaw line."""
-
-RIGID_POINTS = (
-    # forehead: skin over bone, above the brows (which rise and fall with emphasis)
-    *(10, 151, 9, 109, 338, 67, 297, 103, 332),
-    # temples: beside the eyes and above; lower down the cheeks follow the jaw
-    *(54, 284, 21, 251, 162, 389, 127, 356),
-    # bridge of the nose: bone and cartilage; the tip and the wings are moved by the upper lip
-    *(168, 6, 197, 195),
-    # eye corners: fixed by ligaments, while the lids blink
-    *(33, 133, 362, 263),
-)
-"""Points that do not move with speech; the head pose is estimated from them."""
+"""All 40 lip points of the face mesh; chin and jaw line; and those that speech does not move, of which the head pose is
+estimated."""
 
 FOREHEAD, NASION = 10, 168
 """Top of the forehead, and bridge of the nose between the eyes; they give the upright direction."""

@@ -81,9 +81,10 @@ def run_league(options: argparse.Namespace) -> None:
     from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.corpora import Corpus
     from lipmotion.storage.locks import lock_folder
-    from lipmotion_lab.league import describe_league, run_rivals, write_league
+    from lipmotion_lab.league import describe_league, read_rivals, run_rivals, write_league
 
     corpus, choosing = Corpus.open(options.recordings), options.choose and Corpus.open(options.choose)
+    read_rivals(Path(options.adapters), options.only)  # no folder is made for what cannot be run
     with report_progress(options) as report, lock_folder(options.output):
         league = run_rivals(
             corpus,

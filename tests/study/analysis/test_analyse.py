@@ -57,7 +57,7 @@ def test_more_sentences_need_fewer_raters():
 @pytest.mark.parametrize(
     ("options", "error"),
     [
-        ({"baseline": "a"}, "the baseline 'a', required one of: anchor, ph-HMM, ph-vi-CHMM, recording"),
+        ({"baseline": "a"}, "the baseline is 'a', required one of: anchor, ph-HMM, ph-vi-CHMM, recording"),
         ({"power": 1.0}, "a power of 1, required between"),
         ({"power": float("nan")}, "a power of nan, required between"),
         ({"sentences": 1}, "1 sentences of planned studies, required at least 2"),
@@ -71,6 +71,8 @@ def test_options_that_are_refused(options, error):
 def test_a_study_without_answers_is_refused():
     with pytest.raises(InputError, match="1 answers, none of which counts"):
         analyse_study([replace(rating(("r", "s"), "a", 3), practice=True)])
+    with pytest.raises(InputError, match="no opinion scores; leave --baseline out"):
+        analyse_study([replace(rating(("r", "s"), "a", 3), kind="paired", other="b", value="first")], baseline="a")
 
 
 def test_no_rater_left():

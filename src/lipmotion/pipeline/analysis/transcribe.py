@@ -46,6 +46,7 @@ FOREIGN_SHARE, MIN_FOREIGN = 0.25, 3
 MAX_STRETCHES = 3  # largest number of stretches without words that are named in one warning
 MIN_INSERTED = 2  # fewer phones between words than this belong to them: recognition errs by one
 ALIKE_SHARE = 0.34  # words are said all the same where recognition finds their phones, but for so small a share
+HEARD_REACH_S = 1.5  # a word that the posteriors hear is sought no further away; what is like it there is another one
 MAX_REPLACED, SAME_SHARE = 2, 0.6
 """So few words are said in place of others; more are of another sentence, unless so many of their phones are found."""
 
@@ -177,7 +178,8 @@ def _match_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> t
     matched, doubted, taken, end = dict[int, list[int]](), set[int](), set[int](), 0
     for first, at, size in matcher.get_matching_blocks():
         for (number, _), place in zip(wanted[first : first + size], range(at, at + size), strict=True):
-            matched.setdefault(number, []).append(place)
+            if _is_near(words[number], spans[place]):
+                matched.setdefault(number, []).append(place)
     for other in evidence.others:
         left_out = range(other.first, other.stop)
         sizes = [len(words[number].phones) for number in left_out]
@@ -194,12 +196,19 @@ def _match_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> t
             continue
         lengths = range(max(len(word.phones) - 1, 1), len(word.phones) + 2)
         runs = [range(first, first + length) for length in lengths for first in range(end, stop - length + 1)]
-        edits = [(count_phone_edits(word.phones, phones[run.start : run.stop]), run.start, run.stop) for run in runs]
+        near = (run for run in runs if _is_near(word, spans[run.start]) and _is_near(word, spans[run.stop - 1]))
+        edits = [(count_phone_edits(word.phones, phones[run.start : run.stop]), run.start, run.stop) for run in near]
         if edits and min(edits)[0] <= ALIKE_SHARE * len(word.phones):
             _, first, end = min(edits)
             words[number] = word._replace(start_s=spans[first].start_s, end_s=spans[end - 1].end_s, is_said=True)
             taken.update(range(first, end))
     return words, taken
+
+
+def _is_near(word: WordEvidence, span: Span[Unit]) -> bool:
+    """Return whether a phone may be one of a word: that of a word that is heard is within ``HEARD_REACH_S`` of it."""
+    reach_s = HEARD_REACH_S if word.is_said else np.inf
+    return bool(word.start_s - reach_s < span.end_s and span.start_s < word.end_s + reach_s)
 
 
 def _are_in_order(units: Timeline[Unit], evidence: TranscriptEvidence) -> bool:

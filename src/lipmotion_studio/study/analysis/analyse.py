@@ -172,8 +172,8 @@ def analyse_study(
         )
     conditions = sorted({each.condition for each in counted if each.kind != PAIRED})
     if baseline is not None and baseline not in conditions:
-        known = ", ".join(conditions) or "no condition, as nothing was rated"
-        raise InputError(f"the baseline {shorten(baseline)!r}, required one of: {known}")
+        known = ", ".join(conditions) or "none, for these are no opinion scores; leave --baseline out"
+        raise InputError(f"the baseline is {shorten(baseline)!r}, required one of: {known}")
     if not 0.05 < power < 1:
         raise InputError(f"a power of {power:g}, required between 0.05 and 1, such as {USUAL_POWER}")
     if sentences is not None and sentences < 2:
