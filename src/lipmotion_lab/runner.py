@@ -251,9 +251,6 @@ class Stamp:
         words = (word.rpartition("=") for word in command)
         lists = {split: len(corpus.names(split)) for split in SPLITS}
         lexicon = "the user's" if settings.lexicon else "none but the dictionary"
-        engines = {
-            name: json.dumps(ENGINES.load(name).Config().as_mapping(), sort_keys=True) for name in ENGINES.built_in
-        }
         return {
             "command": shlex.join(
                 f"{option}{equals}{Path(value).name if Path(value).is_absolute() else value}"
@@ -266,9 +263,15 @@ class Stamp:
             "seed": settings.seed,
             "options": {"workers": settings.workers, "lexicon": lexicon},
             "commit": find_commit(ROOT),
-            "engines": {name: hashlib.sha256(text.encode()).hexdigest()[:DIGITS] for name, text in engines.items()},
+            "engines": {name: digest_engine(name) for name in ENGINES.built_in},
             **_describe_machine(),
         }
+
+
+def digest_engine(name: str) -> str:
+    """Return the digits that name the default options of an engine."""
+    options = json.dumps(ENGINES.load(name).Config().as_mapping(), sort_keys=True)
+    return hashlib.sha256(options.encode()).hexdigest()[:DIGITS]
 
 
 def _describe_machine() -> dict[str, Any]:
