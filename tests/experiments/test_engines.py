@@ -177,6 +177,8 @@ def test_channels_that_are_not_there_are_dashes(toy_corpus, tmp_path):
     row = made["rows"][0]["conditions"]["audio only"]
     assert (row["acc_width"], row["acc_outer"]) == (None, None)
     assert build_learning_section(made).table.as_lines()[1].split()[-2:] == ["–", "–"]
+    made["rows"][0]["BLSTM"] = {"channels": {"outer": {"ours": 0.9, "acc": 0.8, "gain_95": [0.05, 0.15]}}}
+    assert "8 recordings, outer: 0.900, BLSTM 0.800" in build_learning_section(made).as_text()
 
 
 def test_by_default_the_training_list_is_shuffled_and_no_finished_size_is_trained_again(

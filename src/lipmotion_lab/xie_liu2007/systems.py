@@ -34,7 +34,7 @@ TIED = {"unseen_loss": UNSEEN_LOSS, "start_asynchrony": 1}
 """Factorial chains that are tied together: rare joint states lose 10 nats, and the chains begin a state apart."""
 TOGETHER = {"moves_together": True}
 NETWORK_SETTINGS: tuple[Sequence[Options], ...] = (
-    [{"rate": rate} for rate in (4e-3, 2e-3, 1e-3, 8e-3)],
+    [{"rate": rate} for rate in (4e-3, 2e-3, 1e-3, 8e-3, 1.6e-2, 3.2e-2)],
     [{"cells": 192}],
     [{"steps": steps} for steps in (100.0, 200.0)],
 )
