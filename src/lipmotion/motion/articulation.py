@@ -260,11 +260,11 @@ def measure_articulators(motion: NDArray[np.floating[Any]], names: Sequence[str]
 SOUND_SHARES = (0.65, 0.35)
 """Share of the motion that the general network hears, after all that is done for such a voice, where training knows
 nothing of it: where phones cannot be relied on at all, and where they can (docs/results/voices.md)."""
+NEAR_S, CLEAR_DB = 0.2, (25.0, 30.0)
+"""Seconds before and after speech in which that holds. Further away it holds as far as there are so many decibels
+between loud and quiet moments: else others may be speaking in pauses, as in a babble of 10 dB (18 to 26)."""
 CONFIRMED = -0.5
 """An unreliable p, b or m closes the lips where the general network hears them less open than so many deviations."""
-NEAR_S, CLEAR_DB = 0.2, (25.0, 30.0)
-"""Seconds before and after speech in which that holds; in pauses it holds as far as they are so quiet: else others may
-be speaking there, as in a babble of 10 dB, which has 18 to 26 dB between quiet and loud moments."""
 VOWEL_S, OPENING_BY_DURATION = 0.1, 0.5
 """A vowel of the first duration is as open as the table says; one that is e times as long is more open by so many
 standard deviations of the speaker, and a shorter one less (docs/results/voices.md)."""
@@ -300,7 +300,7 @@ class UnseenSpeaker:
     range_db: Array | float = 0.0  # between loud and quiet moments, 0 in digital silence [shape=(T,)]
 
     def follow_sound(self, statistics: Predict, articulators: Array) -> Predict:
-        """Draw motion, in pauses where they are quiet, towards articulators that the general network hears [(T, 8)]."""
+        """Draw motion, but in loud pauses, towards articulators that the general network hears [shape=(T, 8)]."""
         spoken = smooth_steps((~mark_distant(self.units, self.frames, NEAR_S)[:, None]).astype(float))
         quiet = smooth_steps(np.broadcast_to(np.interp(self.range_db, CLEAR_DB, (0, 1)), self.frames)[:, None])
         unsure, sure = SOUND_SHARES
