@@ -292,7 +292,7 @@ def build_learning_section(figures: Mapping[str, Any]) -> Section:
     compared = {size: row[BLSTM]["channels"] for size, row in sizes.items() if BLSTM in row}
     if compared:
         words["Without pins, beside a BLSTM"] = [
-            f"{size} recordings, {channel}: {', BLSTM '.join(format_figure(row[key], '.3f') for key in ('ours', 'acc'))}, "
+            f"{size} recordings, {channel}: {', BLSTM '.join(format_figure(row[k], '.3f') for k in ('ours', 'acc'))}, "
             f"95 % interval of the difference {' to '.join(format_figure(end, '+.3f') for end in row['gain_95'])}."
             for size, channels in compared.items()
             for channel, row in channels.items()
