@@ -280,7 +280,8 @@ def test_unsure_words_are_asked_for_first(toy_model, toy_sentence, confidence, w
     request = Request(toy_sentence.audio, transcript=" ".join(toy_sentence.words))
     words = Timeline((Span(0.0, 1.0, RecognisedWord("papa", confidence)),))
     recognition = Recognition(RECOGNISED, words, word_s, 3.0 - word_s, -60.0)
-    understood = replace(analyse_speech(toy_model, request), recognition=recognition, range_db=range_db, fit=None)
+    understood = replace(analyse_speech(toy_model, request), recognition=recognition, fit=None)
+    understood = replace(understood, speech=replace(understood.speech, range_db=range_db))
     outlook = predict_outlook(request, understood)
     assert outlook.advice == advice
     assert outlook.text.endswith(f"would help most: {advice[0]}")
@@ -288,7 +289,8 @@ def test_unsure_words_are_asked_for_first(toy_model, toy_sentence, confidence, w
 
 def test_the_outlook_says_how_much_of_the_speech_a_transcript_fits(toy_model, toy_sentence):
     request = Request(toy_sentence.audio, transcript=" ".join(toy_sentence.words))
-    understood = replace(analyse_speech(toy_model, request), range_db=30.0)
+    understood = analyse_speech(toy_model, request)
+    understood = replace(understood, speech=replace(understood.speech, range_db=30.0))
     assert understood.fit is not None
     whole = predict_outlook(request, understood)
     assert (whole.confidence, whole.text) == (pytest.approx(1), "words: transcript; levels 30 dB apart")

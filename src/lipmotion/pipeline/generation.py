@@ -235,16 +235,16 @@ def predict_outlook(request: Request, analysis: SpeechAnalysis) -> Outlook:
     needs = (  # the most helpful first: before all else the words, where they are not sure
         (WHOLE_TRANSCRIPT, fit is not None and fit.is_partial),
         (TRANSCRIPT, recognition is not None and weigh_words(recognition) < SURE_CONFIDENCE),
-        (LESS_NOISE, analysis.range_db < NOISY_DB),
+        (LESS_NOISE, speech.range_db < NOISY_DB),
         (OWN_MODEL, recognition is not None and (similarity is None or similarity < FULL_WEIGHT_SCORE)),
     )
     advice = tuple(what for what, is_needed in needs if is_needed)
     if analysis.is_without_speech:
-        return Outlook("no speech", 0.0, None, analysis.range_db, ())
+        return Outlook("no speech", 0.0, None, speech.range_db, ())
     if recognition is not None:
         words = "words" if recognition.word_s > recognition.phone_s else "phones"
         voice = weigh_own_model(similarity) if similarity is not None else None
-        return Outlook(words, weigh_words(recognition), voice, analysis.range_db, advice)
+        return Outlook(words, weigh_words(recognition), voice, speech.range_db, advice)
     words = "given units" if request.units is not None else "transcript" if speech.units_known else "own model"
     share, known = fit.share if fit else 1.0, 1.0
     if words == "transcript" and request.language != ENGLISH:
@@ -256,7 +256,7 @@ def predict_outlook(request: Request, analysis: SpeechAnalysis) -> Outlook:
         known = sum(map(lexicon.known, labels)) / len(labels) if is_other_language(labels, lexicon) else 1.0
     if known < 1:
         words, share = "mapped transcript", share * known
-    return Outlook(words, share, 1.0 if words == "own model" else None, analysis.range_db, advice)
+    return Outlook(words, share, 1.0 if words == "own model" else None, speech.range_db, advice)
 
 
 def generate_passages(

@@ -85,7 +85,6 @@ class SpeechAnalysis:
     """The speech of a recording as input of an engine, and what was recognised in it.
 
     recognition : None where words or phones were given, or the engine's own model recognised the speaker
-    range_db    : decibels between the loud and the quiet moments of the recording
     fit         : of the transcript; None where there was none, or it was not compared with the sound
     tags        : the moods that tags in the transcript ask for
     events      : what is detected in the voice beside words; empty: nothing, or it was not asked for
@@ -93,7 +92,6 @@ class SpeechAnalysis:
 
     speech: Speech
     recognition: Recognition | None
-    range_db: float
     fit: TranscriptFit | None = None
     tags: tuple[MoodTag, ...] = ()
     events: tuple[VoiceEvent, ...] = ()
@@ -222,7 +220,6 @@ def _open_recogniser(model: Model, request: Request) -> Recogniser:
 
 
 def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: ParallelMap) -> SpeechAnalysis:
-    range_db = measure_level_range(audio.log_energy)
     phones, features, fit = _open_recogniser(model, request), audio.joined_mfcc(), None
     results: list[Recognition] = []
 
@@ -239,7 +236,7 @@ def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: Par
             LOG.warning("the transcript is not used: the units already say what is spoken; leave one of them out")
         units, fit = _follow_units(model, request, audio, phones.kind, lambda: recognised().units)
         speech = build_speech(model.engine, audio, features, units, phones.kind, each)
-        return SpeechAnalysis(replace(speech, times_given=True), None, range_db, fit)
+        return SpeechAnalysis(replace(speech, times_given=True), None, fit)
     words = _read_words(cast("str | TimedTranscript | None", request.transcript), audio.duration_s)
     if words is not None:
         from lipmotion.pipeline.analysis.transcribe import transcribe
@@ -249,8 +246,8 @@ def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: Par
         if aligned is not None:
             speech = build_speech(model.engine, audio, features, aligned, phones.kind, each)
             tags = words.tags if isinstance(words, TimedTranscript) else ()
-            return SpeechAnalysis(speech, None, range_db, fit, tags)
-    return SpeechAnalysis(recognised(), results[0] if results else None, range_db, fit)
+            return SpeechAnalysis(speech, None, fit, tags)
+    return SpeechAnalysis(recognised(), results[0] if results else None, fit)
 
 
 def build_speech(
